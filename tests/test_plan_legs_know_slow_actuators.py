@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.legs import LegTask
+from expdesign.plan.verify.tuning import TUNING as VERIFY
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, delivered_at_samples, simulate
 from expdesign.vessel import Response
@@ -19,6 +20,7 @@ CASES = {
     "lag": Response(lag_s=2.0),
     "lag and delay": Response(lag_s=1.5, delay_s=2.4),
     "delay": Response(delay_s=1.0),
+    "delay of no whole sample": Response(delay_s=1.3),
 }
 
 
@@ -60,3 +62,17 @@ def test_sailing_in_two_parts_is_sailing_at_once(name):
     second = water.sail(half, values[30:], values[:30])
     np.testing.assert_allclose(second.pose, whole.pose[30:], atol=1e-9)
     np.testing.assert_allclose(second.velocity, whole.velocity[30:], atol=1e-9)
+
+
+@pytest.mark.parametrize("delay_s", [0.43, 1.3])
+def test_a_dead_time_of_no_whole_sample_leaves_the_track_as_its_verification_finds_it(delay_s):
+    """Ten minutes of commands that jump: the errors of steps with the mean of two commands add up to a decimetre."""
+    water = slow_water(Response(delay_s=delay_s))
+    rng = np.random.default_rng(3)
+    jumps = np.repeat(rng.uniform(-1, 1, (150, 4)) * [6.0, 0.5, 6.0, 0.5], 4, axis=0)
+    values = np.vstack([np.zeros((1, 4)), jumps])
+    track = water.sail(np.zeros(6), values, values[:1])
+    commands = Commands(sample_time_s=1.0, names=water.vessel.model.inputs, values=values)
+    again = simulate(water.vessel, commands, environment=CALM, substeps=VERIFY.fine_substeps)
+    off_m = np.hypot(*(again.pose - track.pose)[:, :2].T).max()
+    assert off_m < 1e-3

@@ -17,6 +17,7 @@ from expdesign.simulation import (
     motion_rates,
     rk4_step,
     simulate,
+    step_shares,
 )
 from expdesign.simulation._casadi import compiled_steps
 from expdesign.simulation.motion import begun
@@ -52,20 +53,23 @@ def commands_of(ship: Vessel, samples: int = SAMPLES) -> Commands:
 
 def plain(ship: Vessel, commands: Commands, weather: np.ndarray, *, integrator: str, substeps: int) -> np.ndarray:
     """(k + 1, 6) states in plain floats, weather (k, 4)."""
-    given = deliver(ship.responses, commands.values, sample_time_s=commands.sample_time_s, substeps=substeps)
-    given = np.broadcast_to(given, (len(commands), substeps, given.shape[-1]))
+    step_s, shares = commands.sample_time_s, np.full(substeps, 1 / substeps)
+    if integrator == "rk4":
+        shares = step_shares(ship.responses, sample_time_s=step_s, substeps=substeps)
+    given = deliver(ship.responses, commands.values, sample_time_s=step_s, substeps=shares)
+    given = np.broadcast_to(given, (len(commands), len(shares), given.shape[-1]))
     step, theta = {"rk4": rk4_step, "euler": euler_step}[integrator], ship.model.parameters.tolist()
     state = begun(ship.model, tuple(START.tolist()))
     states = [state]
     for rows, sea in zip(given.tolist(), weather.tolist(), strict=True):
-        for held in rows:
+        for held, share in zip(rows, shares.tolist(), strict=True):
 
             def rates(x: tuple[float, ...], held: list[float] = held, sea: list[float] = sea) -> tuple[float, ...]:
                 return motion_rates(
                     ship.model, x, held, current_to=sea[:2], wind_to=sea[2:], ops=SCALAR, parameters=theta
                 )
 
-            state = step(rates, state, commands.sample_time_s / substeps)
+            state = step(rates, state, share * step_s)
         states.append(state)
     return np.array(states)[:, :6]
 

@@ -8,6 +8,7 @@ from expdesign.simulation.actuation import (
     delivered_at_samples,
     past_deadband,
     sample_map,
+    step_shares,
 )
 from expdesign.simulation.ensemble import Ensemble, mean_weather, simulate_ensemble
 from expdesign.simulation.environment import (
@@ -59,6 +60,7 @@ __all__ = [
     "simulate_many",
     "steady_ahead",
     "steering_signals",
+    "step_shares",
     "stopping",
     "to_body",
     "turning_circle",

@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from expdesign.simulation.actuation import step_times
 from expdesign.simulation.motion import State, integrator_step, motion_rates
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
@@ -47,7 +48,7 @@ class CompiledIntegrator:
         *,
         sea: Array,
         sample_time_s: float,
-        substeps: int,
+        substeps: int | Array,
         parameters: Array | None = None,
     ) -> Array:
         """States at every sample; not-a-numbers and infinities where the motion diverges.
@@ -57,34 +58,36 @@ class CompiledIntegrator:
             delivered: (k, substeps, m) inputs over each step, or (k, 1, m) where they are held over a sample.
             sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
             sample_time_s: time between samples [s].
-            substeps: integrator steps per sample.
+            substeps: integrator steps per sample, or the shares of it that they take.
             parameters: (p,) in the model's own form; None for the model's.
 
         Returns:
             (k + 1, 6 or 8), the start first.
         """
         samples, _, inputs = delivered.shape
-        drive = np.empty((samples, substeps, inputs + 4))
+        steps_s = step_times(substeps, sample_time_s)
+        count = len(steps_s)
+        drive = np.empty((samples, count, inputs + 4))
         drive[..., :inputs], drive[..., inputs:] = delivered, sea[:, None]
-        result = np.empty((samples * substeps + 1, self._states))
+        result = np.empty((samples * count + 1, self._states))
         result[0] = start
         theta = self._parameters if parameters is None else np.array(parameters, dtype=float)
-        self._fill(result, drive.reshape(samples * substeps, inputs + 4), theta, sample_time_s / substeps)
-        return result[::substeps]
+        self._fill(result, drive.reshape(samples * count, inputs + 4), theta, np.tile(steps_s, samples))
+        return result[::count]
 
-    def _fill(self, result: Array, drive: Array, parameters: Array, step_s: float) -> None:
-        """Write the states (k + 1, n) after the first, for drives (k, m + 4) over each step."""
-        length_s, done = np.array([step_s]), 0
+    def _fill(self, result: Array, drive: Array, parameters: Array, steps_s: Array) -> None:
+        """Write the states (k + 1, n) after the first, for drives (k, m + 4) over steps of these lengths (k,)."""
+        done = 0
         for length, function in self._functions.items():
             if done + length > len(drive):
                 continue
             buffer, run = function.buffer()
             buffer.set_arg(2, parameters.data)
-            buffer.set_arg(3, length_s.data)
             while done + length <= len(drive):
                 end = done + length
                 buffer.set_arg(0, result[done].data)
                 buffer.set_arg(1, drive[done:end].data)
+                buffer.set_arg(3, steps_s[done:end].data)
                 buffer.set_res(0, result[done + 1 : end + 1].data)
                 run()
                 done = end
@@ -96,9 +99,9 @@ class CompiledSample:
     def __init__(self, model: VesselModel, *, rows: int, substeps: int) -> None:
         """Of `substeps` Runge-Kutta steps, with as many `rows` of inputs, or one where they are held."""
         structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll, model.inertia
-        self._functions, self._substeps = compiled_samples(structure, rows, substeps), substeps
+        self._functions = compiled_samples(structure, rows, substeps)
 
-    def states(self, start: Array, delivered: Array, *, sea: Array, parameters: Array, sample_time_s: float) -> Array:
+    def states(self, start: Array, delivered: Array, *, sea: Array, parameters: Array, steps_s: Array) -> Array:
         """(n, 6) states a sample later; not-a-numbers and infinities where the motion diverges.
 
         Args:
@@ -106,19 +109,19 @@ class CompiledSample:
             delivered: (rows, m, n) inputs.
             sea: (4, n) n-frame current and wind to north and east [m/s].
             parameters: (n, p) in the model's own form.
-            sample_time_s: time of the sample [s].
+            steps_s: (substeps,) lengths of the steps [s].
         """
         rows, inputs, ships = delivered.shape
         drive = np.empty((ships, rows, inputs + 4))
         drive[..., :inputs], drive[..., inputs:] = delivered.transpose(2, 0, 1), sea.T[:, None]
         begin, theta = np.ascontiguousarray(start), np.ascontiguousarray(parameters)
-        step_s, result, done = np.array([sample_time_s / self._substeps]), np.empty_like(begin), 0
+        result, done = np.empty_like(begin), 0
         for count, function in self._functions.items():
             while done + count <= ships:
                 buffer, run = function.buffer()
                 for place, table in enumerate((begin, drive, theta)):
                     buffer.set_arg(place, table[done:].data)
-                buffer.set_arg(3, step_s.data)
+                buffer.set_arg(3, steps_s.data)
                 buffer.set_res(0, result[done:].data)
                 run()
                 done += count
@@ -143,7 +146,7 @@ Structure = tuple[tuple[Term, ...], str, float, tuple[Actuator, ...], Roll | Non
 
 @lru_cache(maxsize=16)
 def compiled_steps(structure: Structure, integrator: str) -> dict[int, Any]:
-    """Number of steps, largest first -> (state, drive of each step, parameters, length of a step) -> states."""
+    """Number of steps, largest first -> (state, drive of each step, parameters, length of each step) -> states."""
     step = _step(structure, integrator)
     most = max(1, LARGEST // step.n_instructions())
     return {length: _chained(step, length) for length in (1 << power for power in reversed(range(most.bit_length())))}
@@ -151,25 +154,25 @@ def compiled_steps(structure: Structure, integrator: str) -> dict[int, Any]:
 
 @lru_cache(maxsize=32)
 def compiled_samples(structure: Structure, rows: int, substeps: int) -> dict[int, Any]:
-    """Number of ships, largest first -> (state, drive, parameters of each, length of a step) -> states."""
+    """Number of ships, largest first -> (state, drive, parameters of each, length of each step) -> states."""
     step = _step(structure, "rk4")
     x, theta = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("theta", step.size1_in(2))
-    drive, step_s = ca.SX.sym("drive", step.size1_in(1), rows), ca.SX.sym("step_s")
+    drive, steps_s = ca.SX.sym("drive", step.size1_in(1), rows), ca.SX.sym("steps_s", substeps)
     state = x
     for index in range(substeps):
-        state = step(state, drive[:, index % rows], theta, step_s)
-    one = ca.Function("sample", [x, ca.vec(drive), theta, step_s], [ca.cse(state)])
+        state = step(state, drive[:, index % rows], theta, steps_s[index])
+    one = ca.Function("sample", [x, ca.vec(drive), theta, steps_s], [ca.cse(state)])
     return {count: one.map(count, [False, False, False, True], [False]) for count in SHIPS}
 
 
 def _chained(step: ca.Function, length: int) -> ca.Function:
     """So many steps as one flat function."""
     x, drive = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("drive", step.size1_in(1), length)
-    theta, step_s = ca.SX.sym("theta", step.size1_in(2)), ca.SX.sym("step_s")
+    theta, steps_s = ca.SX.sym("theta", step.size1_in(2)), ca.SX.sym("steps_s", length)
     states = [x]
     for index in range(length):
-        states.append(step(states[-1], drive[:, index], theta, step_s))
-    return ca.Function("steps", [x, drive, theta, step_s], [ca.horzcat(*states[1:])])
+        states.append(step(states[-1], drive[:, index], theta, steps_s[index]))
+    return ca.Function("steps", [x, drive, theta, steps_s], [ca.horzcat(*states[1:])])
 
 
 def _step(structure: Structure, integrator: str) -> ca.Function:

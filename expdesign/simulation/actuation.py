@@ -49,20 +49,38 @@ class SampleMap:
         seal(self, means="s 3", end="3")
 
 
-def sample_map(response: Response, *, sample_time_s: float, substeps: int = 1) -> SampleMap:
+def step_shares(responses: Sequence[Response], *, sample_time_s: float, substeps: int) -> Array:
+    """(s,) shares of a sample that integrator steps take: equal ones, divided where late commands arrive.
+
+    No command changes within a step then. The equations of motion are not linear in the inputs, so a step that acts
+    with the mean of two commands is only first-order accurate, and the errors of a whole trial add up.
+
+    Args:
+        responses: one for each signal.
+        sample_time_s: time for which commands are held [s].
+        substeps: equal steps that are divided.
+    """
+    late = np.array([response.delay_s for response in responses]) / sample_time_s
+    arrivals, edges = late - np.floor(late + 1e-9), np.arange(substeps + 1) / substeps
+    new = [share for share in np.unique(arrivals).tolist() if np.abs(edges - share).min() > 1e-6]
+    return np.diff(np.sort(np.r_[edges, new])) if new else np.full(substeps, 1.0 / substeps)
+
+
+def sample_map(response: Response, *, sample_time_s: float, substeps: int | Array = 1) -> SampleMap:
     """The map of a signal with this response over one sample, for arrays and for symbols.
 
     Args:
         response: of the signal.
         sample_time_s: time for which commands are held [s].
-        substeps: integrator steps per sample.
+        substeps: integrator steps per sample, or the shares of it that they take.
     """
     lateness = math.floor(response.delay_s / sample_time_s + 1e-9)
     change_s = max(0.0, response.delay_s - lateness * sample_time_s)
-    step_s = sample_time_s / substeps
+    steps_s = step_times(substeps, sample_time_s)
+    begins_s = np.cumsum(steps_s) - steps_s
     value, means = np.array([1.0, 0.0, 0.0]), []
-    for step in range(substeps):
-        early_s = min(max(change_s - step * step_s, 0.0), step_s)
+    for begin_s, step_s in zip(begins_s.tolist(), steps_s.tolist(), strict=True):
+        early_s = min(max(change_s - begin_s, 0.0), step_s)
         total = np.zeros(3)
         for command, time_s in ((1, early_s), (2, step_s - early_s)):
             area, value = _towards(value, np.eye(3)[command], response.lag_s, time_s)
@@ -70,6 +88,13 @@ def sample_map(response: Response, *, sample_time_s: float, substeps: int = 1) -
         means.append(total / step_s)
     return SampleMap(
         means=np.array(means), end=value, lateness=lateness, deadband=response.deadband, offset=response.offset
+    )
+
+
+def step_times(substeps: int | Array, sample_time_s: float) -> Array:
+    """(s,) times that integrator steps take, so many equal ones or of these shares of a sample [s]."""
+    return np.asarray(
+        np.full(substeps, sample_time_s / substeps) if isinstance(substeps, int) else substeps * sample_time_s
     )
 
 
@@ -93,7 +118,7 @@ def deliver(
     commands: Array,
     *,
     sample_time_s: float,
-    substeps: int = 1,
+    substeps: int | Array = 1,
     standing: Array | None = None,
 ) -> Array:
     """The mean delivered value over each integrator step, which acts in the equations of motion.
@@ -102,7 +127,7 @@ def deliver(
         responses: one for each signal.
         commands: (k, m, ...) held.
         sample_time_s: time between samples [s].
-        substeps: integrator steps per sample.
+        substeps: integrator steps per sample, or the shares of it that they take.
         standing: (m, ...) commands that stood before the first sample; None for those of the first sample.
 
     Returns:
@@ -110,7 +135,8 @@ def deliver(
     """
     if all(response == IDEAL for response in responses):
         return commands[:, None]
-    result = np.repeat(commands[:, None], substeps, axis=1)
+    count = substeps if isinstance(substeps, int) else len(substeps)
+    result = np.repeat(commands[:, None], count, axis=1)
     for column, response in enumerate(responses):
         if response == IDEAL:
             continue
@@ -174,7 +200,7 @@ class ActuatorState:
 
     @classmethod
     def standing(
-        cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int
+        cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int | Array
     ) -> ActuatorState:
         """After commands (m, n) held for long."""
         maps = tuple(
@@ -184,7 +210,8 @@ class ActuatorState:
         values = np.array([_effective(through, row) for through, row in zip(maps, commands, strict=True)])
         counts = [through.lateness + 1 if through else 0 for through in maps]
         past = tuple(np.tile(row, (count, 1)) for row, count in zip(values, counts, strict=True))
-        return cls(maps=maps, substeps=substeps, values=values, past=past)
+        count = substeps if isinstance(substeps, int) else len(substeps)
+        return cls(maps=maps, substeps=count, values=values, past=past)
 
     def mean(self, commands: Array) -> Array:
         """(substeps, m, n) mean over each integrator step of a sample with these commands (m, n).

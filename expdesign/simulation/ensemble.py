@@ -20,7 +20,7 @@ import numpy as np
 from expdesign.errors import InputError, ShapeError
 from expdesign.signals import Batch
 from expdesign.simulation._numba import kernels
-from expdesign.simulation.actuation import deliver
+from expdesign.simulation.actuation import deliver, step_shares, step_times
 from expdesign.simulation.environment import Environment, vary
 from expdesign.simulation.motion import begun, integrator_step
 from expdesign.simulation.program import STATES, RatesProgram, march
@@ -119,14 +119,18 @@ def simulate_ensemble(
     commands = _commands(vessel, inputs, runs)
     standing = None if standing is None else np.asarray(standing, dtype=float).reshape(commands.shape[2], 1)
     program = RatesProgram(vessel.model, runs=runs, parameters=parameters, engine=engine)
+    shares: int | Array = substeps
+    if integrator == "rk4":
+        shares = step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=substeps)
     given = deliver(
         vessel.responses,
         commands.swapaxes(1, 2),
         sample_time_s=vessel.sample_time_s,
-        substeps=substeps,
+        substeps=shares,
         standing=standing,
     )
-    marching = partial(march, program, step=step, step_s=vessel.sample_time_s / substeps, substeps=substeps)
+    steps_s = step_times(shares, vessel.sample_time_s)
+    marching = partial(march, program, step=step, step_s=steps_s, substeps=len(steps_s))
     means = mean_weather(environment, runs, rng) if weather is None else weather
     draw = partial(_stretches, vessel, environment, means, rng=rng, engine=engine)
     states, seen = _sailed(vessel, program, given, _start(vessel, pose, velocity, runs), marching=marching, draw=draw)

@@ -205,7 +205,7 @@ def prepared(codes: Array, memory: Array, constants: Mapping[int, float], engine
 
 
 def march(
-    program: RatesProgram, given: Array, state: Array, *, step: Step, step_s: float, substeps: int
+    program: RatesProgram, given: Array, state: Array, *, step: Step, step_s: float | Array, substeps: int
 ) -> Iterator[Array]:
     """The state (6 or 8, n) at every sample, then at the end of the last one.
 
@@ -217,15 +217,15 @@ def march(
             where runs share them.
         state: (6 or 8, n) at the first sample.
         step: of the integrator.
-        step_s: its length [s].
+        step_s: its length, or (substeps,) that of each in a sample [s].
         substeps: steps per sample.
     """
-    rows = given.shape[1]
+    rows, steps_s = given.shape[1], np.broadcast_to(step_s, substeps).tolist()
     program.hold(given.reshape(-1, *given.shape[2:]))
     for k in range(len(given)):
         yield state
-        for part in range(substeps):
+        for part, each_s in enumerate(steps_s):
             if part < rows:
                 program.select(k * rows + part)
-            state = program.rk4(state, step_s) if step is rk4_step else step(program.rates, (state,), step_s)[0]
+            state = program.rk4(state, each_s) if step is rk4_step else step(program.rates, (state,), each_s)[0]
     yield state

@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.errors import Diverged, InputError
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.actuation import deliver
+from expdesign.simulation.actuation import deliver, step_shares
 from expdesign.simulation.environment import CALM, Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import begun, rk4_step
 from expdesign.simulation.program import STATES, RatesProgram, march
@@ -44,7 +44,7 @@ def simulate(
         environment: its means act as steady n-frame current and wind; a series acts sample by sample.
         standing: (m,) commands that stood before the first sample, from which the actuators begin to move; None for
             those of the first sample. Without lag or dead time it means nothing.
-        substeps: integrator steps per sample.
+        substeps: integrator steps per sample, at least: where late commands arrive within one, it is divided.
         integrator: "rk4", or "euler" for the map of the discrete parameters (with one substep).
 
     Raises:
@@ -52,11 +52,16 @@ def simulate(
         InputError: commands of another vessel.
     """
     _check_inputs(vessel, commands)
+    shares = (
+        substeps
+        if integrator == "euler"
+        else step_shares(vessel.responses, sample_time_s=commands.sample_time_s, substeps=substeps)
+    )
     given = deliver(
         vessel.responses,
         commands.values,
         sample_time_s=commands.sample_time_s,
-        substeps=substeps,
+        substeps=shares,
         standing=standing,
     )
     sea = np.concatenate(weather_rows(environment, len(commands)), axis=1)
@@ -66,7 +71,7 @@ def simulate(
         np.array([*pose, *velocity]),
         sea=sea,
         sample_time_s=commands.sample_time_s,
-        substeps=substeps,
+        substeps=shares,
         integrator=integrator,
     )
     return Trajectory(
@@ -84,7 +89,7 @@ def integrate_motion(
     *,
     sea: Array,
     sample_time_s: float,
-    substeps: int = SUBSTEPS,
+    substeps: int | Array = SUBSTEPS,
     integrator: str = "rk4",
 ) -> Array:
     """`simulate` for delivered inputs: states (k + 1, 6), pose and velocity, the start first.
@@ -95,7 +100,8 @@ def integrate_motion(
         start: (6,) pose and velocity over ground; a model with a roll mode begins upright.
         sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
         sample_time_s: time between samples [s].
-        substeps, integrator: as in `simulate`.
+        substeps: steps per sample, or the shares of it that they take, for which inputs are delivered.
+        integrator: as in `simulate`.
 
     Raises:
         Diverged: a speed passed `LARGEST_SPEED`.
@@ -113,7 +119,7 @@ def _integrated(
     *,
     sea: Array,
     sample_time_s: float,
-    substeps: int,
+    substeps: int | Array,
     integrator: str,
 ) -> Array:
     """`integrate_motion` with roll: (k + 1, 6 or 8)."""
@@ -165,7 +171,8 @@ def simulate_many(
     else:
         commanded, sample_time_s = commands.transpose(1, 2, 0), vessel.sample_time_s
     before = None if standing is None else np.asarray(standing, dtype=float).T.reshape(commanded.shape[1], -1)
-    given = deliver(vessel.responses, commanded, sample_time_s=sample_time_s, substeps=substeps, standing=before)
+    shares = step_shares(vessel.responses, sample_time_s=sample_time_s, substeps=substeps)
+    given = deliver(vessel.responses, commanded, sample_time_s=sample_time_s, substeps=shares, standing=before)
     weather = [np.broadcast_to(item, (len(commanded), len(pose), 2)) for item in (current_to, wind_to)]
     runs = _Runs(
         model=vessel.model,
@@ -174,7 +181,7 @@ def simulate_many(
         sea=np.concatenate(weather, axis=-1).swapaxes(1, 2),
         parameters=parameters,
         sample_time_s=sample_time_s,
-        substeps=substeps,
+        shares=shares,
     )
     result = runs.one_by_one() if len(pose) <= FEW_RUNS else runs.together()
     settled = np.abs(result[..., 3:]).max(axis=(0, 2)) < LARGEST_SPEED
@@ -189,10 +196,11 @@ class _Runs:
     Attributes:
         model: their structure.
         start: (6 or 8, n) states.
-        given: (k, substeps or 1, m, n or 1) delivered inputs.
+        given: (k, s or 1, m, n or 1) delivered inputs.
         sea: (k, 4, n) current and wind.
         parameters: (n, p).
-        sample_time_s, substeps: between samples, and integrator steps in one.
+        sample_time_s: between samples.
+        shares: (s,) of it that integrator steps take.
     """
 
     model: VesselModel
@@ -201,7 +209,7 @@ class _Runs:
     sea: Array
     parameters: Array
     sample_time_s: float
-    substeps: int
+    shares: Array
 
     def one_by_one(self) -> Array:
         """(k + 1, n, 6) states by compiled steps, the quicker way for few runs."""
@@ -215,7 +223,7 @@ class _Runs:
                 inputs[..., run],
                 sea=self.sea[..., run],
                 sample_time_s=self.sample_time_s,
-                substeps=self.substeps,
+                substeps=self.shares,
                 parameters=theta,
             )
             for run, theta in enumerate(self.parameters)
@@ -226,8 +234,8 @@ class _Runs:
         """The same by operations on all runs at once."""
         program = RatesProgram(self.model, runs=len(self.parameters), parameters=self.parameters)
         result = np.empty((len(self.sea) + 1, len(self.parameters), STATES))
-        step_s = self.sample_time_s / self.substeps
-        states = march(program, self.given, self.start, step=rk4_step, step_s=step_s, substeps=self.substeps)
+        steps_s = self.sample_time_s * self.shares
+        states = march(program, self.given, self.start, step=rk4_step, step_s=steps_s, substeps=len(steps_s))
         with np.errstate(over="ignore", invalid="ignore"):
             for row, state, now in zip(result, states, (*self.sea, self.sea[-1:]), strict=True):
                 row[...] = state[:STATES].T

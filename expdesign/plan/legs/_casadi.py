@@ -24,7 +24,7 @@ import numpy as np
 
 from expdesign.plan.legs.problem import LegProblem
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map
+from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, Vessel
@@ -42,7 +42,7 @@ class Program:
         self.limits = vessel.limits
         self.state_scale = np.array([vessel.length_m] * 2 + [1.0] * 4)
         self.input_scale = np.array([max(abs(x.low), abs(x.high)) if np.isfinite(x.high) else 1.0 for x in self.limits])
-        self.maps = [sample_map(x, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS) for x in vessel.responses]
+        self.maps = [sample_map(x, sample_time_s=vessel.sample_time_s) for x in vessel.responses]
         self.lagging = np.flatnonzero([response.lag_s > 0 for response in vessel.responses])
         self.memory = 1 + max(through.lateness for through in self.maps)
         self._build()
@@ -286,21 +286,22 @@ def _block_map(ship: _Ship, block: int) -> BlockMap:
 
 
 def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX, substeps: int) -> ca.SX:
-    """State and what lagging actuators deliver after samples (m, block), each of so many integrator steps."""
+    """State and what lagging actuators deliver after samples (m, block), each of so many integrator steps or more."""
     vessel, environment = ship.vessel, ship.environment
-    maps = [sample_map(r, sample_time_s=vessel.sample_time_s, substeps=substeps) for r in vessel.responses]
+    shares = step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=substeps)
+    maps = [sample_map(r, sample_time_s=vessel.sample_time_s, substeps=shares) for r in vessel.responses]
     lagging = [index for index, response in enumerate(vessel.responses) if response.lag_s > 0]
     state: tuple[Any, ...] = tuple(ca.vertsplit(x))
     lagged: dict[int, Any] = dict(zip(lagging, ca.vertsplit(d), strict=True)) if lagging else {}
     current, wind = environment.current_to.tolist(), environment.wind_to.tolist()
     for sample in range(early.size2()):
         start, after = early[:, sample], late[:, sample]
-        for part in range(substeps):
+        for part, share in enumerate(shares.tolist()):
             given = [
                 _mixed(through.means[part], lagged.get(i, 0.0), start[i], after[i]) + through.offset
                 for i, through in enumerate(maps)
             ]
-            state = rk4_step(partial(_rates, vessel, given, current, wind), state, h / substeps)
+            state = rk4_step(partial(_rates, vessel, given, current, wind), state, share * h)
         lagged = {i: _mixed(maps[i].end, value, start[i], after[i]) for i, value in lagged.items()}
     moved: ca.SX = ca.vertcat(*state, *lagged.values())
     return moved

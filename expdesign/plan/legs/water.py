@@ -16,7 +16,7 @@ from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Trajectory
-from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, to_body
+from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, step_shares, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import IDEAL, NUMPY, Vessel
@@ -182,9 +182,17 @@ class LegWater:
         else:
             if before is not None:
                 earlier, values = len(before), np.concatenate([before, values])
-            given = deliver(self.vessel.responses, values, sample_time_s=sample_s, substeps=SUBSTEPS)
+            given = deliver(self.vessel.responses, values, sample_time_s=sample_s, substeps=self._shares)
             delivered = given[earlier:]
-        return integrate_motion(self.vessel, delivered, start, sea=self._sea, sample_time_s=sample_s)
+        return integrate_motion(
+            self.vessel, delivered, start, sea=self._sea, sample_time_s=sample_s, substeps=self._shares
+        )
+
+    @cached_property
+    def _shares(self) -> Array:
+        """(s,) shares of a sample that integrator steps take."""
+        vessel = self.vessel
+        return step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS)
 
     @cached_property
     def prompt(self) -> bool:

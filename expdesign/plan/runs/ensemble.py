@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.plan.runs.tuning import RUNS
-from expdesign.simulation import ActuatorState, Environment
+from expdesign.simulation import ActuatorState, Environment, step_shares
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
@@ -104,8 +104,9 @@ class Fleet:
         self.given: Array = np.repeat(standing[:, None], runs, axis=1).T
         self.delivered = self.given
         self.lost = np.zeros(runs, dtype=bool)
+        self._shares = step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS)
         self._actuators = ActuatorState.standing(
-            vessel.responses, self.given.T, sample_time_s=vessel.sample_time_s, substeps=SUBSTEPS
+            vessel.responses, self.given.T, sample_time_s=vessel.sample_time_s, substeps=self._shares
         )
         self._ships, self._parameters = np.arange(runs), truths.parameters
         self._program = RatesProgram(vessel.model, runs=runs, parameters=truths.parameters)
@@ -163,7 +164,7 @@ class Fleet:
         with np.errstate(over="ignore", invalid="ignore"):
             state = self._together(given) if len(commands) > RUNS.few_ships else self._one_by_one(given)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
-        delivered = given[0].T if len(given) == 1 else given.mean(axis=0).T
+        delivered = given[0].T if len(given) == 1 else np.tensordot(self._shares, given, axes=1).T
         if not settled.all():
             self.lost = ~settled
             state, commands, delivered = (
@@ -176,24 +177,24 @@ class Fleet:
     def _together(self, given: Array) -> Array:
         """(6, n) states a sample later by operations on all ships at a time."""
         self._program.hold(given)
-        state, step_s = self.states.T, self.vessel.sample_time_s / SUBSTEPS
-        for part in range(SUBSTEPS):
+        state = self.states.T
+        for part, share in enumerate(self._shares.tolist()):
             if part < len(given):
                 self._program.select(part)
-            state = self._program.rk4(state, step_s)
+            state = self._program.rk4(state, share * self.vessel.sample_time_s)
         return state
 
     def _one_by_one(self, given: Array) -> Array:
         """The same by compiled steps, the quicker way for few ships."""
         from expdesign.simulation._casadi import compiled_sample  # CasADi is loaded when a motion is integrated
 
-        sample = compiled_sample(self.vessel.model, rows=len(given), substeps=SUBSTEPS)
+        sample = compiled_sample(self.vessel.model, rows=len(given), substeps=len(self._shares))
         after = sample.states(
             self.states,
             given,
             sea=self._program.sea,
             parameters=self._parameters[self._ships],
-            sample_time_s=self.vessel.sample_time_s,
+            steps_s=self._shares * self.vessel.sample_time_s,
         )
         return np.ascontiguousarray(after.T)
 

@@ -15,7 +15,7 @@ import scipy
 
 from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.actuation import ActuatorState
+from expdesign.simulation.actuation import ActuatorState, step_shares
 from expdesign.simulation.helm import Approach, Helm
 from expdesign.simulation.motion import begun
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
@@ -107,7 +107,8 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     rows: list[list[float]] = []
     states, began_s, finished = [state], 0.0, False
     standing = approach.inputs[:, None]
-    actuators = ActuatorState.standing(vessel.responses, standing, sample_time_s=step_s, substeps=SUBSTEPS)
+    shares = step_shares(vessel.responses, sample_time_s=step_s, substeps=SUBSTEPS)
+    actuators = ActuatorState.standing(vessel.responses, standing, sample_time_s=step_s, substeps=shares)
     while not finished and len(rows) < round(end_s / step_s):
         stage, since_s = waiting[0], len(rows) * step_s - began_s
         row, moved = orders.toward(stage, stage, 1.0)
@@ -131,7 +132,7 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
 def _delivered(actuators: ActuatorState, row: list[float]) -> Array:
     """(substeps, m) delivered values over the steps of a sample with these commands."""
     given = actuators.mean(np.array(row)[:, None])[..., 0]
-    return np.broadcast_to(given, (SUBSTEPS, len(row)))
+    return np.broadcast_to(given, (actuators.substeps, len(row)))
 
 
 def _share_left(
@@ -153,9 +154,11 @@ def _stepped(vessel: Vessel, given: Array, state: Array, step_s: float, until_s:
     """The state a time into a sample, by the steps of `simulate`, with the delivered values of each."""
     from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
-    each_s, integrator, still = step_s / SUBSTEPS, compiled_integrator(vessel.model, "rk4"), np.zeros((1, 4))
-    for number, held in enumerate(given):
-        part_s = min(max(until_s - number * each_s, 0.0), each_s)
+    shares = step_shares(vessel.responses, sample_time_s=step_s, substeps=SUBSTEPS)
+    steps_s, integrator, still = step_s * shares, compiled_integrator(vessel.model, "rk4"), np.zeros((1, 4))
+    begins_s = np.cumsum(steps_s) - steps_s
+    for begin_s, each_s, held in zip(begins_s.tolist(), steps_s.tolist(), given, strict=True):
+        part_s = min(max(until_s - begin_s, 0.0), each_s)
         state = integrator.states(state, held[None, None], sea=still, sample_time_s=part_s, substeps=1)[-1]
     if not (np.abs(state[3:]) < LARGEST_SPEED).all():
         raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
