@@ -88,6 +88,31 @@ class Trajectory:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Delivered:
+    """What actuators deliver within samples.
+
+    Attributes:
+        values: (k, s, m) means of the inputs over each part of a sample.
+        shares: (s,) of the sample that the parts take.
+    """
+
+    values: Array
+    shares: Array
+
+    def __post_init__(self) -> None:
+        seal(self, values="k s m", shares="s")
+
+    @property
+    def mean(self) -> Array:
+        """(k, m) over each sample."""
+        return np.asarray(np.einsum("ksm,s->km", self.values, self.shares))
+
+    def cut(self, part: slice) -> Delivered:
+        """Consecutive samples."""
+        return replace(self, values=self.values[part])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Batch:
     """One uninterrupted stretch of measured data; a difference or a lag never reaches into another batch.
 
@@ -109,8 +134,8 @@ class Batch:
             all are readings.
         vane_std_rad: standard deviation of the noise on the angle of the vane that gave the wind, where the wind is
             divided by the shrinkage that it causes; else 0.
-        delivered: (k, s, m) means of the inputs over each of s equal parts of a sample, where actuators deliver other
-            than held inputs; then `inputs` are the means over the sample. None where inputs are held.
+        delivered: within samples, where actuators deliver other than held inputs; then `inputs` are the means over the
+            sample. None where inputs are held.
         steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
             data do not say.
         planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
@@ -130,7 +155,7 @@ class Batch:
     first_row: int = 0
     interpolated: Array | None = None
     vane_std_rad: float = 0.0
-    delivered: Array | None = None
+    delivered: Delivered | None = None
     steered: Array | None = None
     planned: Array | None = None
     auxiliary: Array | None = None
@@ -138,7 +163,7 @@ class Batch:
     def __post_init__(self) -> None:
         shapes = {
             "inputs": "k m", "velocity": "k 3", "pose": "k 3", "wind": "k 2", "depth_m": "k", "interpolated": "k 3",
-            "delivered": "k s m", "steered": "k", "planned": "k p", "auxiliary": "k 8",
+            "steered": "k", "planned": "k p", "auxiliary": "k 8",
         }  # fmt: skip
         seal(self, **{name: shape for name, shape in shapes.items() if getattr(self, name) is not None})
         if self.inputs.shape[1] != len(self.input_names):
@@ -159,10 +184,11 @@ class Batch:
     def cut(self, part: slice) -> Batch:
         """Consecutive samples of the batch."""
         series = (
-            "inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "delivered", "steered", "planned",
-            "auxiliary",
+            "inputs", "velocity", "pose", "wind", "depth_m", "interpolated", "steered", "planned", "auxiliary",
         )  # fmt: skip
         rows: dict[str, Any] = {name: values[part] for name in series if (values := getattr(self, name)) is not None}
+        if self.delivered is not None:
+            rows["delivered"] = self.delivered.cut(part)
         return replace(self, first_row=self.first_row and self.first_row + part.start, **rows)
 
 

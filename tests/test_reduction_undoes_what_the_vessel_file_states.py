@@ -113,7 +113,7 @@ def test_regressions_of_continuous_motion_are_as_good_as_without_faults(method: 
 def test_what_actuators_deliver_has_the_mean_of_its_parts():
     (batch,) = reduced(Record(batches=(sailed(ALL),)), ALL).batches
     assert batch.delivered is not None
-    np.testing.assert_allclose(batch.delivered.mean(axis=1), batch.inputs, rtol=1e-12)
+    np.testing.assert_allclose(batch.delivered.mean, batch.inputs, rtol=1e-12)
 
 
 def test_what_is_not_stated_is_not_touched():

@@ -21,7 +21,7 @@ import scipy
 from expdesign.assessment.runs import RunCheck
 from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
-from expdesign.estimation.regression import drive_of, model_for
+from expdesign.estimation.regression import drive_of, model_for, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Batch, Record
@@ -127,6 +127,7 @@ def _stretches(model: VesselModel, batch: Batch, wind: bool, integration: Integr
         sample_time_s=batch.sample_time_s,
         integrator=integration.integrator,
         substeps=integration.substeps,
+        parts=parts_of(batch, substeps=integration.substeps),
     )
 
 

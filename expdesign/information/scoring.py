@@ -33,7 +33,7 @@ from expdesign.information.moments import (
 )
 from expdesign.information.primitive_information import PrimitiveInformation, over_shares
 from expdesign.information.tuning import TUNING
-from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, to_body
+from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, step_shares, to_body
 from expdesign.simulation.motion import begun
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
@@ -218,10 +218,11 @@ class _Runs:
         commands = np.array([primitive.commands.values for primitive in primitives]).transpose(1, 2, 0)
         standing = np.array([primitive.entry_inputs for primitive in primitives]).T
         sample_time_s = primitives[0].commands.sample_time_s
-        given = deliver(vessel.responses, commands, sample_time_s=sample_time_s, substeps=SUBSTEPS, standing=standing)
+        shares = step_shares(vessel.responses, sample_time_s=sample_time_s, substeps=SUBSTEPS)
+        given = deliver(vessel.responses, commands, sample_time_s=sample_time_s, substeps=shares, standing=standing)
         entry = np.array([primitive.entry_velocity for primitive in primitives]).T
-        states = _sailed(vessel, given, entry, parameters, environment, sample_time_s)
-        inputs = given[:, 0] if given.shape[1] == 1 else given.mean(axis=1)
+        states = _sailed(vessel, given, entry, parameters, environment, shares * sample_time_s)
+        inputs = given[:, 0] if given.shape[1] == 1 else np.einsum("ksmn,s->kmn", given, shares)
         return _Runs(vessel=vessel, environment=environment, inputs=inputs, states=states)
 
     def moments(self, names: Sequence[str], excitation: str) -> _Moments:
@@ -287,7 +288,7 @@ def _kept(own: Array, group: Strata, label: int) -> tuple[Array, Array]:
 
 
 def _sailed(
-    vessel: Vessel, given: Array, entry: Array, parameters: Array, environment: Environment, sample_time_s: float
+    vessel: Vessel, given: Array, entry: Array, parameters: Array, environment: Environment, steps_s: Array
 ) -> Array:
     """(k, 6, m, h, n) states of all models on all headings, from entry velocities (3, n) through water.
 
@@ -296,11 +297,11 @@ def _sailed(
     """
     headings = _headings(environment)
     if len(headings) > 1 and not environment.current_to.any() and not _moved_by_air(vessel, parameters):
-        alone = _simulated(vessel, given, entry, parameters, CALM, sample_time_s, np.zeros(1))
+        alone = _simulated(vessel, given, entry, parameters, CALM, steps_s, np.zeros(1))
         states = np.repeat(alone, len(headings), axis=3)
         states[:, 2] += headings[:, None]
         return states
-    return _simulated(vessel, given, entry, parameters, environment, sample_time_s, headings)
+    return _simulated(vessel, given, entry, parameters, environment, steps_s, headings)
 
 
 def _moved_by_air(vessel: Vessel, parameters: Array) -> bool:
@@ -315,12 +316,13 @@ def _simulated(
     entry: Array,
     parameters: Array,
     environment: Environment,
-    sample_time_s: float,
+    steps_s: Array,
     headings: Array,
 ) -> Array:
     """(k, 6, m, h, n) states at the start of every command; runs that diverge are nan throughout.
 
-    `given` (k, steps, inputs, n) are the delivered inputs in each integrator step, or (k, 1, ...) if constant.
+    `given` (k, steps, inputs, n) are the delivered inputs in each integrator step, or (k, 1, ...) if constant; the
+    steps take `steps_s` (steps,).
     """
     shape = (len(parameters), len(headings), entry.shape[1])
     current_b = to_body(environment.current_to, headings[:, None], NUMPY)
@@ -335,15 +337,15 @@ def _simulated(
         runs = first[:, some].shape[1]
         program = RatesProgram(vessel.model, runs=runs, parameters=parameters[0] if len(parameters) == 1 else own[some])
         program.sea[...] = np.r_[environment.current_to, environment.wind_to][:, None]
-        states[..., some] = _marched(program, given, first[:, some], sample_time_s / SUBSTEPS)
+        states[..., some] = _marched(program, given, first[:, some], steps_s)
     return states.reshape(len(states), STATES, *shape)
 
 
-def _marched(program: RatesProgram, given: Array, start: Array, step_s: float) -> Array:
+def _marched(program: RatesProgram, given: Array, start: Array, steps_s: Array) -> Array:
     """(k, 6, n) states at the start of every command; runs that diverge are nan throughout."""
     states, largest = np.empty((len(given), STATES, start.shape[1])), np.zeros(start.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
-        marched = march(program, given, start, step=rk4_step, step_s=step_s, substeps=SUBSTEPS)
+        marched = march(program, given, start, step=rk4_step, step_s=steps_s, substeps=len(steps_s))
         states[0] = next(marched)[:STATES]
         for sample, state in enumerate(marched, start=1):
             largest = np.maximum(largest, np.abs(state[3:]).max(axis=0))

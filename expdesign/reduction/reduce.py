@@ -14,8 +14,8 @@ from expdesign.errors import InputError
 from expdesign.reduction.remarks import remarks
 from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
 from expdesign.reduction.tuning import TUNING
-from expdesign.signals import Batch, Record
-from expdesign.simulation import deliver
+from expdesign.signals import Batch, Delivered, Record
+from expdesign.simulation import deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
@@ -124,12 +124,13 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
 
 def _delivered(batch: Batch, responses: Mapping[str, Response], standing: Array | None) -> Batch:
     own = [responses.get(name, IDEAL) for name in batch.input_names]
-    how: dict[str, Any] = {"sample_time_s": batch.sample_time_s, "substeps": SUBSTEPS}
-    steps = deliver(own, batch.inputs, standing=standing, **how)
-    planned = batch.planned
+    time_s, planned = batch.sample_time_s, batch.planned
+    shares = step_shares(own, sample_time_s=time_s, substeps=SUBSTEPS)
+    values = deliver(own, batch.inputs, sample_time_s=time_s, substeps=shares, standing=standing)
     if planned is not None:
-        planned = deliver(own[: planned.shape[1]], planned, standing=None, **how).mean(axis=1)
-    return replace(batch, inputs=steps.mean(axis=1), delivered=steps, planned=planned)
+        planned = deliver(own[: planned.shape[1]], planned, sample_time_s=time_s)[:, 0]
+    steps = Delivered(values=values, shares=shares)
+    return replace(batch, inputs=steps.mean, delivered=steps, planned=planned)
 
 
 def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = False) -> Record:

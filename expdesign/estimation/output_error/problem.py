@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
-from expdesign.estimation.regression import Integers, Layout, drive_of
+from expdesign.estimation.regression import Integers, Layout, drive_of, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
@@ -138,6 +138,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
                 sample_time_s=time_s,
                 integrator=fitting.integration.integrator,
                 substeps=fitting.integration.substeps,
+                parts=parts_of(record.batches[0], substeps=fitting.integration.substeps),
                 counts=np.array([end - first for (_, first), end in zip(cuts, ends, strict=True)]),
             )
         ),

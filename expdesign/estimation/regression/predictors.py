@@ -36,7 +36,7 @@ from expdesign.estimation.regression.intervals import mean_between_readings
 from expdesign.estimation.regression.nuisance import Nuisance, batch_signs, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
 from expdesign.estimation.regression.regression import Integers, Regression
-from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, measured_table
+from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, inputs_within, measured_table
 from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, closed
@@ -79,6 +79,9 @@ PREDICTORS = (
 )
 
 
+Within = Sequence[tuple[float, Table]]
+"""Share of each part of a sample, and the signals of its inputs."""
+HELD: Within = ((1.0, {}),)
 QUADRATURES = ("euler", "trapezoid")
 """Regressors of the sample at which an interval begins, or the mean of both its ends under the inputs held over it."""
 
@@ -126,15 +129,35 @@ class Layout:
             full[self.model.names.index(name)] = 0.0
         return full
 
-    def rows(self, table: Table, signs: dict[str, float], *, used: Integers | slice, scale: float) -> Array:
-        """(k, n, p) regressors of a table of signals, times a scale, at the samples used."""
-        table = self._in_water(table)
-        rows = self._rows(table, signs, used, scale)
-        if self.quadrature == "euler":
-            return rows
-        rows += self._rows(ahead(table), signs, used, scale)
-        rows *= 0.5
+    def rows(
+        self,
+        table: Table,
+        signs: dict[str, float],
+        *,
+        used: Integers | slice,
+        scale: float,
+        within: Within = HELD,
+    ) -> Array:
+        """(k, n, p) regressors of a table of signals, times a scale, at the samples used.
+
+        `within` are the inputs of parts of samples, as of `inputs_within`.
+        """
+        first, *rest = self._points(table, within)
+        rows = self._rows(first[1], signs, used, first[0] * scale)
+        for share, part in rest:
+            rows += self._rows(part, signs, used, share * scale)
         return rows
+
+    def _points(self, table: Table, within: Within) -> list[tuple[float, Table]]:
+        """Tables whose sum with these weights is the mean over samples: terms run straight from sample to sample."""
+        table = self._in_water(table)
+        if self.quadrature == "euler":
+            return [(1.0, table)]
+        after, points, begun = ahead(table), [], 0.0
+        for share, inputs in within:
+            middle, begun = begun + share / 2.0, begun + share
+            points += [(share * (1.0 - middle), {**table, **inputs}), (share * middle, {**after, **inputs})]
+        return points
 
     def _rows(self, table: Table, signs: dict[str, float], used: Integers | slice, scale: float) -> Array:
         places = {name: index for index, name in enumerate(self.model.names)}
@@ -154,12 +177,9 @@ class Layout:
     def _in_water(self, table: Table) -> Table:
         return table if self.guess is None else through_water(table, self.guess.to_mps)
 
-    def known(self, table: Table) -> Array:
+    def known(self, table: Table, within: Within = HELD) -> Array:
         """(k, n) part explained by the parameters held fixed."""
-        table = self._in_water(table)
-        if self.quadrature == "euler":
-            return self._known(table)
-        return np.asarray(0.5 * (self._known(table) + self._known(ahead(table))))
+        return np.asarray(sum(share * self._known(part) for share, part in self._points(table, within)))
 
     def _known(self, table: Table) -> Array:
         outputs = self.model.outputs
@@ -270,8 +290,9 @@ def build_regression(layout: Layout, record: Record) -> Rows:
         table = measured_table(layout.model, batch, wind_measured=layout.predictor.wind)
         ratio = batch.sample_time_s / layout.model.time_scale_s
         signs = batch_signs(layout.nuisance, table)
-        regressors = layout.rows(table, signs, used=slice(0, -1), scale=ratio)
-        explained = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table)[:-1]
+        within = inputs_within(layout.model, batch)
+        regressors = layout.rows(table, signs, used=slice(0, -1), scale=ratio, within=within)
+        explained = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table, within)[:-1]
         if batch.interpolated is not None:
             regressors, explained = (
                 mean_between_readings(part, batch.interpolated[:, states]) for part in (regressors, explained)

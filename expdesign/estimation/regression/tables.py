@@ -72,18 +72,46 @@ def inputs_of(model: VesselModel, batch: Batch) -> Array:
 
 
 def drive_of(model: VesselModel, batch: Batch, *, substeps: int) -> Array:
-    """(k, m) inputs held over each sample, or (k, g m) those of its g equal parts, in the model's order.
+    """(k, m) inputs held over each sample, or (k, s m + s) those of its s parts, and their shares of it.
 
     Args:
-        model: gives the order.
+        model: gives the order of inputs.
         batch: recorded, or with delivered inputs.
-        substeps: integrator steps per sample, a multiple of g.
+        substeps: integrator steps per sample; a single one takes the mean over it.
     """
-    steps = batch.delivered
-    if steps is None or substeps % steps.shape[1]:
+    if parts_of(batch, substeps=substeps) == 1:
         return inputs_of(model, batch)
-    order = [batch.input_names.index(name) for name in model.inputs]
-    return np.asarray(steps[:, :, order].reshape(len(batch), -1))
+    assert batch.delivered is not None  # as it has parts
+    values, count = _delivered(model, batch), len(batch)
+    return np.hstack([values.reshape(count, -1), np.tile(batch.delivered.shares, (count, 1))])
+
+
+def drive_width(inputs: int, parts: int) -> int:
+    """Columns of `drive_of`."""
+    return inputs if parts == 1 else parts * (inputs + 1)
+
+
+def parts_of(batch: Batch, *, substeps: int) -> int:
+    """Parts of a sample with inputs of their own, for simulations of so many steps per sample."""
+    return 1 if batch.delivered is None or substeps == 1 else len(batch.delivered.shares)
+
+
+def inputs_within(model: VesselModel, batch: Batch) -> tuple[tuple[float, Table], ...]:
+    """Share of each part of a sample, and the signals of its inputs; one part without any where inputs are held."""
+    if batch.delivered is None:
+        return ((1.0, {}),)
+    still = (np.zeros(len(batch)),) * 5
+    found = []
+    for share, values in zip(batch.delivered.shares.tolist(), _delivered(model, batch).swapaxes(0, 1), strict=True):
+        table = model.signals(still[:3], still[3:], values.T, NUMPY)
+        found.append((share, {name: np.asarray(table[name]) for name in (*FORCE_SIGNALS, *model.inputs)}))
+    return tuple(found)
+
+
+def _delivered(model: VesselModel, batch: Batch) -> Array:
+    """(k, s, m) in the model's order."""
+    assert batch.delivered is not None  # asked before
+    return np.asarray(batch.delivered.values[:, :, [batch.input_names.index(name) for name in model.inputs]])
 
 
 def measured_table(model: VesselModel, batch: Batch, *, wind_measured: bool) -> Table:

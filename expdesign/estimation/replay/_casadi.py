@@ -13,9 +13,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from expdesign.estimation.regression import drive_width
 from expdesign.estimation.replay.stretches import INTEGRATORS, Called, Simulate, Stretches
 from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import motion_rates
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, VesselModel
 
@@ -29,18 +31,19 @@ def batch_simulator(
     sample_time_s: float,
     integrator: str,
     substeps: int,
-    width: int,
+    parts: int,
     windy: bool,
     flowing: bool = False,
 ) -> Simulate:
     """A function that simulates batches of so many samples; numbers that run away come back as inf or nan.
 
-    Its inputs have `width` columns: those of `drive_of`, where `windy` the n-frame wind to north and east [m/s], and
-    where `flowing` the current.
+    Its inputs have the columns of `drive_of` for so many parts of samples, where `windy` the n-frame wind to north and
+    east [m/s], and where `flowing` the current.
     """
+    width = drive_width(len(model.inputs), parts) + 2 * windy + 2 * flowing
     x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", len(model.terms)), ca.SX.sym("i", width)
     current = (drive[width - 2], drive[width - 1]) if flowing else (0.0, 0.0)
-    held, wind = _split(drive[: width - 2 * flowing], len(model.inputs), windy)
+    held, wind = _split(drive[: width - 2 * flowing], len(model.inputs), parts, windy)
 
     def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
         return motion_rates(model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=theta)
@@ -132,7 +135,7 @@ def velocity_step(problem: Stretches) -> ca.Function:
     """One sample of the modelled velocities: (state (n,), drive (m,), values (p + n,)) -> state."""
     model, n, p = problem.model, len(problem.states), len(problem.sought)
     x, drive, values = ca.SX.sym("x", n), ca.SX.sym("i", problem.drive.shape[2]), ca.SX.sym("p", p + n)
-    held, wind = _split(drive, len(model.inputs), problem.windy)
+    held, wind = _split(drive, len(model.inputs), problem.parts, problem.windy)
     theta = ca.SX(model.parameters)
     for index, place in enumerate(problem.sought):
         theta[place] = values[index]
@@ -149,19 +152,25 @@ def velocity_step(problem: Stretches) -> ca.Function:
     return ca.Function("velocities", [x, drive, values], [after], {"cse": True})
 
 
-def _split(drive: ca.SX, m: int, windy: bool) -> tuple[list[list[ca.SX]], tuple[Any, Any]]:
+Held = list[tuple[Any, list[ca.SX]]]
+"""Share of each part of a sample, and its inputs."""
+
+
+def _split(drive: ca.SX, m: int, parts: int, windy: bool) -> tuple[Held, tuple[Any, Any]]:
     """Inputs held over each part of a sample, and the wind."""
     signals = ca.vertsplit(drive)
     wind = (signals.pop(-2), signals.pop(-1)) if windy else (0.0, 0.0)
-    return [signals[first : first + m] for first in range(0, len(signals), max(1, m))] or [[]], wind
+    if parts == 1:
+        return [(1.0, signals)], wind
+    return [(signals[parts * m + part], signals[part * m : (part + 1) * m]) for part in range(parts)], wind
 
 
-def _stepped(
-    rates: Any, x: ca.SX, held: list[list[ca.SX]], sample_time_s: float, integrator: str, substeps: int
-) -> ca.SX:
+def _stepped(rates: Any, x: ca.SX, held: Held, sample_time_s: float, integrator: str, substeps: int) -> ca.SX:
+    """The state after a sample of so many steps or more; parts take no more than a step of `simulate` each."""
     state: tuple[Any, ...] = tuple(ca.vertsplit(x))
-    for step in range(substeps):
-        inputs = held[step * len(held) // substeps]
-        state = INTEGRATORS[integrator](partial(rates, inputs=inputs), state, sample_time_s / substeps)
+    each = substeps if len(held) == 1 else -(-substeps // SUBSTEPS)
+    for share, inputs in held:
+        for _ in range(each):
+            state = INTEGRATORS[integrator](partial(rates, inputs=inputs), state, share * sample_time_s / each)
     after: ca.SX = ca.vertcat(*state)
     return after

@@ -36,6 +36,7 @@ from expdesign.estimation.regression import (
     Table,
     batch_signs,
     heading_of,
+    inputs_within,
     measured_table,
     room_for,
 )
@@ -100,7 +101,13 @@ class InstrumentModel:
     def _batch(self, index: int, parameters: Array) -> Array:
         batch, (_, signs) = self.record.batches[index], self.measured[index]
         ratio = batch.sample_time_s / self.layout.model.time_scale_s
-        return self.layout.rows(self.table(index, parameters), signs, used=_run(self.rows.used[index]), scale=ratio)
+        return self.layout.rows(
+            self.table(index, parameters),
+            signs,
+            used=_run(self.rows.used[index]),
+            scale=ratio,
+            within=inputs_within(self.layout.model, batch),
+        )
 
     def table(self, index: int, parameters: Array) -> Table:
         """Signals of a batch that instruments are made from, for a model with all parameters (all,).

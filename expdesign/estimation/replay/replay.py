@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError, UnknownName
-from expdesign.estimation.regression import drive_of, model_for
+from expdesign.estimation.regression import drive_of, model_for, parts_of
 from expdesign.estimation.replay.stretches import INTEGRATORS, Simulate
 from expdesign.signals import Batch, Record, Trajectory
 from expdesign.simulation.motion import begun
@@ -44,7 +44,7 @@ class Replay:
 
     Attributes:
         model: driven by the recorded inputs.
-        simulators: (samples, sample time, columns of `drive_of`) of a batch -> compiled simulation.
+        simulators: (samples, sample time, parts of a sample) of a batch -> compiled simulation.
         substeps: integrator steps per sample.
         windy, flowing: whether simulations are given wind, and a current.
     """
@@ -72,7 +72,8 @@ class Replay:
         """
         start = np.array(begun(self.model, tuple(start_state(self.model, batch))))
         inputs = drive_of(self.model, batch, substeps=self.substeps)
-        simulator = self.simulators[len(batch), batch.sample_time_s, inputs.shape[1]]
+        parts = parts_of(batch, substeps=self.substeps)
+        simulator = self.simulators[len(batch), batch.sample_time_s, parts]
         if self.windy:
             inputs = np.concatenate([inputs, np.zeros((len(batch), 2)) if wind_to is None else wind_to], axis=1)
         if self.flowing:
@@ -100,24 +101,21 @@ def build_replay(
     from expdesign.estimation.replay._casadi import batch_simulator  # CasADi takes a second to load
 
     how = integration or Integration()
-    kinds = {
-        (len(batch), batch.sample_time_s, drive_of(model, batch, substeps=how.substeps).shape[1])
-        for batch in record.batches
-    }
+    kinds = {(len(batch), batch.sample_time_s, parts_of(batch, substeps=how.substeps)) for batch in record.batches}
     return Replay(
         model,
         {
-            (samples, time_s, columns): batch_simulator(
+            (samples, time_s, parts): batch_simulator(
                 model,
                 samples=samples,
                 sample_time_s=time_s,
                 integrator=how.integrator,
                 substeps=how.substeps,
-                width=columns + 2 * windy + 2 * flowing,
+                parts=parts,
                 windy=windy,
                 flowing=flowing,
             )
-            for samples, time_s, columns in kinds
+            for samples, time_s, parts in kinds
         },
         how.substeps,
         windy,

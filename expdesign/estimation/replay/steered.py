@@ -108,7 +108,9 @@ def _as_planned(batch: Batch) -> Batch:
     places, m = batch.steered > 0, batch.planned.shape[1]
     inputs = batch.inputs.copy()
     inputs[places, :m] = batch.planned[places]
-    delivered = None if batch.delivered is None else batch.delivered.copy()
+    delivered = batch.delivered
     if delivered is not None:
-        delivered[places, :, :m] = batch.planned[places, None]
+        values = delivered.values.copy()
+        values[places, :, :m] = batch.planned[places, None]
+        delivered = replace(delivered, values=values)
     return replace(batch, inputs=inputs, delivered=delivered)

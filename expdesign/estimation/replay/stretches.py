@@ -33,6 +33,7 @@ class Stretches:
         windy: whether air velocities are those of that wind.
         sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.
+        parts: of a sample, with inputs of their own.
         counts: (W,) samples of each stretch; L for all when left out.
     """
 
@@ -44,6 +45,7 @@ class Stretches:
     sample_time_s: float
     integrator: str
     substeps: int
+    parts: int = 1
     counts: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
