@@ -14,6 +14,8 @@ import pytest
 # Workers share the processors already; threads of linear algebra would only wait for each other.
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+# They take both cores already: commands without --jobs start no processes of their own.
+os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 # Results must come from the code that is tested, not from the cache of whoever runs the tests.
 os.environ["EXPDESIGN_CACHE"] = "off"
 # A shell starts background jobs with SIGINT ignored, and what they start inherits that.

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -174,37 +175,69 @@ def share_shown(
         drawn.append((statistic, (truth, noise, score)))
     drawn.sort(key=lambda item: -item[0])
     accepted = [item for item in drawn if item[0] > limit] or drawn[: max(1, len(drawn) // 4)]
-    return float(np.mean([_is_shown(units, kept, trial, prior, A) for _, trial in accepted]))
+    trials = _Trials(*(np.stack(parts) for parts in zip(*(trial for _, trial in accepted), strict=True)))
+    return float(np.mean(_are_shown(units, kept, trials, prior, A)))
 
 
-def _is_shown(
-    units: SimulatedUnits, kept: NDArray[np.int64], trial: tuple[Array, Array, Array], prior: Array, A: Array
-) -> bool:
-    """Whether held-out units show the effect in a drawn trial: its truth, scores' noise and scores."""
-    truth, noise, score = trial
-    c, count = len(units.precision), len(A)
-    left: dict[bool, tuple[Array, Array]] = {}
-    for fitted in (False, True):
-        free = slice(len(kept) if fitted else c)
-        off = np.tile(truth, (count, 1))
-        for fold in range(min(FOLDS, count)):
-            test = np.arange(count) % FOLDS == fold
-            own = A[~test].sum(axis=0) + prior
-            off[test, free] -= np.linalg.lstsq(own[free, free], score[~test].sum(axis=0)[free], rcond=None)[0]
-        squared = (
-            units.squared_error
-            + 2.0 * np.einsum("koc,kc->ko", units.with_error[..., kept], off)
-            + np.einsum("kc,kocd,kd->ko", off, units.products[:, :, kept[:, None], kept], off)
-        )
-        whitened = units.samples + 2.0 * (noise * off).sum(axis=1) + np.einsum("kc,kcd,kd->k", off, A, off)
-        left[fitted] = np.maximum(squared, 0.0), whitened
-    before, after = (
-        HeldOut(squared_error=left[fitted][0], squared_deviation=units.squared_deviation) for fitted in (False, True)
+class _Trials(NamedTuple):
+    """Drawn trials: (n, r) true numbers, (n, k, r) noise of the scores of each unit, and these scores."""
+
+    truth: Array
+    noise: Array
+    score: Array
+
+
+def _are_shown(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, prior: Array, A: Array) -> list[bool]:
+    """Whether held-out units show the effect, for each trial."""
+    c = len(units.precision)
+    (lost, whitened_lost), (squared, whitened) = (
+        _errors(units, kept, trials, _errors_of_folds(trials, slice(free), prior, A), A) for free in (c, len(kept))
     )
+    return [
+        _is_shown(
+            HeldOut(squared_error=lost[n], squared_deviation=units.squared_deviation),
+            HeldOut(squared_error=squared[n], squared_deviation=units.squared_deviation),
+            1.0 - float(whitened[n].sum() / whitened_lost[n].sum()),
+        )
+        for n in range(len(trials.truth))
+    ]
+
+
+def _errors_of_folds(trials: _Trials, free: slice, prior: Array, A: Array) -> Array:
+    """(n, k, r) errors of the numbers, of which the free ones are estimated without the fold of each unit."""
+    count = len(A)
+    off = np.repeat(trials.truth[:, None], count, axis=1)
+    for fold in range(min(FOLDS, count)):
+        test = np.arange(count) % FOLDS == fold
+        own = (A[~test].sum(axis=0) + prior)[free, free]
+        found = np.linalg.lstsq(own, trials.score[:, ~test, free].sum(axis=1).T, rcond=None)[0]
+        off[:, test, free] -= found.T[:, None]
+    return off
+
+
+def _errors(
+    units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, off: Array, A: Array
+) -> tuple[Array, Array]:
+    """(n, k, o) squared errors of simulating each unit and output, and (n, k) of predicting its samples, whitened."""
+    products = units.products[:, :, kept[:, None], kept]
+    squared = (
+        units.squared_error
+        + 2.0 * np.einsum("koc,nkc->nko", units.with_error[..., kept], off)
+        + np.einsum("nkc,kocd,nkd->nko", off, products, off, optimize=True)
+    )
+    whitened = (
+        units.samples
+        + 2.0 * (trials.noise * off).sum(axis=2)
+        + np.einsum("nkc,kcd,nkd->nk", off, A, off, optimize=True)
+    )
+    return np.maximum(squared, 0.0), whitened
+
+
+def _is_shown(before: HeldOut, after: HeldOut, predicted: float) -> bool:
+    """Whether simulations of held-out units, or at least predictions by a share, get better."""
     gained = held_out_gain(before, after, 0)
     if simulates_better(before, after, gained):
         return True
-    predicted = 1.0 - left[True][1].sum() / left[False][1].sum()
     return gained[1][1] >= 0.0 and predicted >= SELECTION_TUNING.least_predicted
 
 

@@ -8,6 +8,7 @@ from expdesign.processes.sharing import (
     leaving_interruptions,
     local_processes,
     on_cluster,
+    processors,
     shared_among,
 )
 from expdesign.processes.telling import told_together
@@ -20,6 +21,7 @@ __all__ = [
     "leaving_interruptions",
     "local_processes",
     "on_cluster",
+    "processors",
     "shared_among",
     "told_together",
 ]

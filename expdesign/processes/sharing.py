@@ -19,7 +19,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
-from joblib import Parallel, delayed, effective_n_jobs, parallel_config
+from joblib import Parallel, cpu_count, delayed, effective_n_jobs, parallel_config
 from joblib.externals.loky import ProcessPoolExecutor
 
 if TYPE_CHECKING:
@@ -90,6 +90,11 @@ def local_processes(count: int, *, load: Callable[[], None] | None = None) -> It
         finally:
             _START.reset(token)
         list(chain(*started))
+
+
+def processors() -> int:
+    """Cores that this process may use: its affinity, its container's quota and LOKY_MAX_CPU_COUNT are kept to."""
+    return int(cpu_count())
 
 
 def shared_among() -> int:

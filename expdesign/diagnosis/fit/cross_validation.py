@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -266,16 +266,20 @@ def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut,
 
     The same seed draws the same units, for decisions and for reports.
     """
-    count = len(before.squared_error)
-    drawn = np.random.default_rng(seed).integers(0, count, (TUNING.bootstrap_draws, count))
+    times = _times_drawn(len(before.squared_error), TUNING.bootstrap_draws, seed)
     first, second = (
-        HeldOut(
-            squared_error=item.squared_error[drawn].sum(axis=1),
-            squared_deviation=item.squared_deviation[drawn].sum(axis=1),
-        )
+        HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
         for item in (before, after)
     )
     return first, second
+
+
+@lru_cache(maxsize=16)
+def _times_drawn(count: int, draws: int, seed: int) -> Array:
+    """(draws, count) how often each unit is drawn."""
+    drawn = np.random.default_rng(seed).integers(0, count, (draws, count))
+    places = drawn + count * np.arange(draws)[:, None]
+    return np.bincount(places.ravel(), minlength=draws * count).reshape(draws, count).astype(float)
 
 
 def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from expdesign.errors import InputError
-from expdesign.processes import local_processes, on_cluster
+from expdesign.processes import local_processes, on_cluster, processors
 
 
 def load_plans() -> None:
@@ -31,7 +30,7 @@ def workers(
     """Independent work in this block is shared among processes; its results do not depend on them.
 
     Args:
-        jobs: processes; 0 for one per core, 1 for this one alone.
+        jobs: processes; 0 for one per core that this process may use, 1 for this one alone.
         scheduler: address of a Dask scheduler whose workers do the work instead.
         load: what processes of this machine do first, once something is missing in the cache.
 
@@ -44,5 +43,5 @@ def workers(
         with on_cluster(scheduler):
             yield
         return
-    with local_processes(jobs or os.cpu_count() or 1, load=load):
+    with local_processes(jobs or processors(), load=load):
         yield
