@@ -24,7 +24,7 @@ FLOORS = {
         ("dictionary", "estimation", "indices", "step_trials"),
         ("information", "diagnosis", "assessment", "roll"),
         ("durations",),
-        ("growing", "rehearsal", "plan", "monitoring"),
+        ("growing", "rehearsal", "plan", "monitoring", "loading"),
         ("shortest_day", "foresight"),
         ("scenario", "export"),
         ("workflows",),

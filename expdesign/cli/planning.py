@@ -182,3 +182,40 @@ def whatif(
         cache=not no_cache,
         seed=seed,
     )
+
+
+@command("roll-plan")
+def roll_plan(
+    scenario: ScenarioFile,
+    loads: Annotated[
+        Path,
+        typer.Option("--loads", metavar="LOADS.toml", help="Candidate load cases; see expdesign explain loads."),
+    ],
+    most_loads: Annotated[
+        int | None,
+        typer.Option(
+            "--most-loads", metavar="N", min=1, help="At most N. Default: the fewest that tell nearly as much as all."
+        ),
+    ] = None,
+    interest: Annotated[
+        list[str] | None,
+        typer.Option("--interest", metavar="NAME ...", help="Parameters to be told best, e.g. m z_m. Default: all."),
+    ] = None,
+    place: Annotated[
+        bool,
+        typer.Option("--place", help="Also plan each load case on the chart, with routes and run cards."),
+    ] = False,
+    out: Out = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Choose known loads, and manoeuvres at each, that tell most about roll and an unknown load.
+
+    The vessel file has [roll]; parameters with a standard deviation there are sought. Writes roll-plan.html and
+    roll-plan.json, loads.toml for expdesign roll, and durations-N.json of each load case for expdesign plan. Ends with
+    status 3 where no candidate tells a combination of the parameters, and names it.
+
+    Example: expdesign roll-plan scenarios/roll-trial.toml --loads scenarios/loads/roll-trial.toml
+    """
+    return ask(
+        "roll_plan", scenario, out, loads=loads, most_loads=most_loads, interest=interest or (), place=place, seed=seed
+    )

@@ -29,7 +29,7 @@ from expdesign.roll.model import (
     roll_frequency,
     stiffness,
 )
-from expdesign.roll.null_space import Cure, Direction, NullSpace, null_space
+from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, direction, null_space, open_directions
 from expdesign.roll.pendulum import load_from, own_parameters, pendulum_system
 from expdesign.roll.prepare import LowPass, low_pass, prepared
 from expdesign.roll.runs import SIGNALS, Case, Run
@@ -74,6 +74,8 @@ __all__ = [
     "closed_loop",
     "coefficients",
     "continuous",
+    "cures",
+    "direction",
     "discrete",
     "encounter",
     "estimate_roll",
@@ -85,6 +87,7 @@ __all__ = [
     "lumped_centre",
     "named",
     "null_space",
+    "open_directions",
     "own_parameters",
     "parameters",
     "pendulum_system",

@@ -89,16 +89,15 @@ def null_space(estimate: RollEstimate) -> NullSpace:
     """The report on an estimate."""
     problem, theta = estimate.problem, _sizes(estimate)
     loads = [case.load for case in problem.cases]
-    sensitivity = relative_sensitivity(theta, problem.body, loads, problem.free)
-    sizes, rows = _singular(sensitivity)
+    sizes, rows = _singular(relative_sensitivity(theta, problem.body, loads, problem.free))
     rank = _rank(sizes)
-    open_ = tuple(_direction(problem, theta, row, 0.0) for row in rows[rank:])
+    open_ = tuple(direction(problem.free, theta, row, 0.0) for row in rows[rank:])
     faint = _faint(problem, theta, estimate.sensed, rows[rank:])
-    cures = _cures(problem, theta, loads) if open_ or faint else ()
+    found = cures(problem.body, theta, loads, problem.free) if open_ or faint else ()
     return NullSpace(
         free=problem.free, singular_values=sizes, rank=rank, open=open_, faint=faint,
         undetermined=_undetermined(estimate, theta, rows[rank:]),
-        cures=tuple(sorted(cures, key=lambda cure: (-cure.rank, -cure.smallest))),
+        cures=tuple(found),
     )  # fmt: skip
 
 
@@ -112,6 +111,10 @@ def _sizes(estimate: RollEstimate) -> Array:
     return theta
 
 
+def _places(free: Sequence[str]) -> list[int]:
+    return [PARAMETERS.index(name) for name in free]
+
+
 def _singular(matrix: Array) -> tuple[Array, Array]:
     """Singular values, one for each column, and right singular vectors in rows."""
     _, sizes, rows = np.linalg.svd(matrix, full_matrices=True)
@@ -122,16 +125,16 @@ def _rank(sizes: Array) -> int:
     return int(np.sum(sizes > TUNING.unseen * sizes[0]))
 
 
-def _direction(problem: RollProblem, theta: Array, relative: Array, size: float) -> Direction:
-    """From relative changes (p,)."""
-    values = theta[problem.places]
+def direction(free: Sequence[str], theta: Array, relative: Array, size: float) -> Direction:
+    """From relative changes (p,) of the free parameters, at parameters (9,)."""
+    values = theta[_places(free)]
     largest = int(np.argmax(np.abs(relative)))
     moved = relative / relative[largest] * 0.1
     if moved[0] * values[0] < 0:
         moved = -moved
     named_ = {
         name: float(change * value)
-        for name, change, value in zip(problem.free, moved, values, strict=True)
+        for name, change, value in zip(free, moved, values, strict=True)
         if abs(change) > TUNING.small_share * 0.1
     }
     return Direction(change=named_, size=size)
@@ -150,15 +153,32 @@ def _faint(problem: RollProblem, theta: Array, sensed: Array, open_rows: Array) 
     sizes, rows = _singular(across)
     kept = len(problem.free) - len(open_rows)
     return tuple(
-        _direction(problem, theta, row, float(size))
+        direction(problem.free, theta, row, float(size))
         for size, row in zip(sizes[:kept], rows[:kept], strict=True)
         if size < 1.0 / TUNING.faint_std
     )
 
 
-def _cures(problem: RollProblem, theta: Array, loads: Sequence[Load | None]) -> list[Cure]:
-    """What one more piece of knowledge, another sensor, or one more load would do."""
-    body, free = problem.body, problem.free
+def open_directions(
+    body: Body, theta: Array, loads: Sequence[Load | None], free: Sequence[str]
+) -> tuple[Array, tuple[Direction, ...]]:
+    """Singular values (p,) of the relative sensitivity, falling, and the directions that the equations leave open.
+
+    Args:
+        body: what is known of the ship.
+        theta: (9,) parameters, the free ones not zero.
+        loads: of the cases; None for the unknown one.
+        free: names of the parameters.
+    """
+    sizes, rows = _singular(relative_sensitivity(theta, body, loads, free))
+    return sizes, tuple(direction(free, theta, row, 0.0) for row in rows[_rank(sizes) :])
+
+
+def cures(body: Body, theta: Array, loads: Sequence[Load | None], free: Sequence[str]) -> list[Cure]:
+    """What one more piece of knowledge, another sensor, or one more load would do, the best first.
+
+    Arguments are as in `open_directions`.
+    """
     result = []
     for name in free:
         others = [other for other in free if other != name]
@@ -168,9 +188,9 @@ def _cures(problem: RollProblem, theta: Array, loads: Sequence[Load | None]) -> 
         fixed = replace(body, z_s=body.sensor(named(theta)["z_f"]), sensor_from_axis=True)
         text = "measure how far the accelerometer is from the rotation axis"
         result.append(_cure(text, theta, fixed, loads, free))
-    for load, text in _further_loads(problem, loads):
+    for load, text in _further_loads(body, loads):
         result.append(_cure(text, theta, body, [*loads, load], free))
-    return result
+    return sorted(result, key=lambda cure: (-cure.rank, -cure.smallest))
 
 
 def _cure(
@@ -180,11 +200,11 @@ def _cure(
     return Cure(what=what, smallest=float(sizes[-1]), rank=_rank(sizes) + known)
 
 
-def _further_loads(problem: RollProblem, loads: Sequence[Load | None]) -> list[tuple[Load, str]]:
+def _further_loads(body: Body, loads: Sequence[Load | None]) -> list[tuple[Load, str]]:
     """One more known load: where there was one, near the rotation axis, and as far below it."""
     known = [load for load in loads if load is not None and load.mass_kg > 0]
-    mass = max((load.mass_kg for load in known), default=0.02 * problem.body.mass_kg)
-    axis, top = problem.body.z_g, min((load.z_m for load in known), default=problem.body.z_s)
+    mass = max((load.mass_kg for load in known), default=0.02 * body.mass_kg)
+    axis, top = body.z_g, min((load.z_m for load in known), default=body.z_s)
     places = {
         "at the same height" if known else "high up": top,
         "at half that height": (top + axis) / 2,

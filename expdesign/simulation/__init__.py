@@ -22,7 +22,7 @@ from expdesign.simulation.environment import (
 )
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
-from expdesign.simulation.rolling import steering_signals
+from expdesign.simulation.rolling import rudder_angle, steering_signals
 from expdesign.simulation.run import integrate_motion, simulate, simulate_many
 from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
@@ -53,6 +53,7 @@ __all__ = [
     "pull_out",
     "relative_velocity",
     "rk4_step",
+    "rudder_angle",
     "sample_map",
     "service_speed",
     "simulate",

@@ -11,14 +11,17 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from expdesign.signals import AUXILIARY
+from expdesign.signals import AUXILIARY, Commands
+from expdesign.simulation.actuation import delivered_at_samples
 from expdesign.simulation.motion import motion_rates
 from expdesign.simulation.program import STATES
 from expdesign.values import Array
-from expdesign.vessel import RollPendulum, Vessel
+from expdesign.vessel import IDEAL, RollPendulum, Vessel
 
 
-def rolled(vessel: Vessel, states: Array, given: Array, sea: Array, step_s: float) -> Array | None:
+def rolled(
+    vessel: Vessel, states: Array, commands: Commands, sea: Array, *, standing: Array | None = None
+) -> Array | None:
     """(k + 1, 8) of `AUXILIARY`, nan where not given; None where the vessel has no roll in radians.
 
     Accelerations are those just after the inputs of a sample, of the last one's at the end. A pendulum begins upright.
@@ -26,54 +29,61 @@ def rolled(vessel: Vessel, states: Array, given: Array, sea: Array, step_s: floa
     Args:
         vessel: whose roll is asked for.
         states: (k + 1, 6 or 8) at the samples.
-        given: (k, substeps or 1, m) delivered inputs.
+        commands: k samples.
         sea: (k or 1, 4) n-frame current and wind.
-        step_s: time between samples [s].
+        standing: (m,) commands before the first sample; None for those of the first sample.
     """
     mode, pendulum = vessel.model.roll, vessel.pendulum
     if pendulum is None and (mode is None or not mode.heel_rad_per_mps2):
         return None
     told: dict[str, Array] = {}
-    held, last = _held(given[:, 0]), given[:, -1]
-    sway = _sway(vessel, states, held, _held(np.broadcast_to(sea, (len(given), 4))))
+    first, last = _at_ends(vessel, commands, standing)
+    first = np.concatenate([first, last[-1:]])
+    flow = np.broadcast_to(sea, (len(commands), 4))
+    sway = _sway(vessel, states, first, np.concatenate([flow, flow[-1:]]))
     told["sway_acceleration_mps2"] = sway
     told["lateral_acceleration_mps2"] = side = sway + states[:, 3] * states[:, 5]
     if mode is not None:
         told["roll_rad"], told["roll_rate_radps"] = mode.heel_rad_per_mps2 * states[:, STATES:].T
     if pendulum is not None:
-        end = _sway(vessel, states[1:], last, sea) + states[1:, 3] * states[1:, 5]
-        begin, end = (
-            pendulum.acceleration(0.0, 0.0, push, states[rows, 5], _rudder(vessel, orders))
-            for push, rows, orders in ((side, slice(None), held), (end, slice(1, None), last))
-        )
-        told["roll_rad"], told["roll_rate_radps"] = roll, rate = _followed(pendulum, begin, end, step_s)
+        end_side = _sway(vessel, states[1:], last, flow) + states[1:, 3] * states[1:, 5]
+        begin = pendulum.acceleration(0.0, 0.0, side, states[:, 5], _mean_angle(commands.names, first))
+        end = pendulum.acceleration(0.0, 0.0, end_side, states[1:, 5], _mean_angle(commands.names, last))
+        told["roll_rad"], told["roll_rate_radps"] = roll, rate = _followed(pendulum, begin, end, commands.sample_time_s)
         spin = begin + pendulum.acceleration(roll, rate, 0.0, 0.0, 0.0)
         told["imu_lateral_mps2"] = -pendulum.reading(roll, spin, side)
     return np.column_stack([told.get(name, np.full(len(states), np.nan)) for name in AUXILIARY])
 
 
-def _held(rows: Array) -> Array:
-    return np.concatenate([rows, rows[-1:]])
+def _at_ends(vessel: Vessel, commands: Commands, standing: Array | None) -> tuple[Array, Array]:
+    """Delivered inputs (k, m) at the begin and at the end of every sample; held ones are the command at both."""
+    values = commands.values
+    exact = delivered_at_samples(vessel.responses, values, sample_time_s=commands.sample_time_s, standing=standing)
+    held = np.array([response == IDEAL for response in vessel.responses])
+    return np.where(held, values, exact[:-1]), np.where(held, values, exact[1:])
 
 
-def _sway(vessel: Vessel, states: Array, inputs: Array, sea: Array) -> Array:
-    """dv/dt (k,) [m/s2]."""
-    flow = np.broadcast_to(sea, (len(states), 4))
-    state, drive, weather = (tuple(np.moveaxis(x, -1, 0)) for x in (states, inputs, flow))
-    rates = motion_rates(vessel.model, state, drive, current_to=weather[:2], wind_to=weather[2:])
-    return np.asarray(rates[4] + np.zeros(len(states)))
-
-
-def _rudder(vessel: Vessel, inputs: Array) -> Array:
-    """(k,) mean angle of all rudders, or of all azimuths [rad]; zero for a ship that has neither."""
-    chosen = [vessel.model.inputs.index(name) for name in steering_signals(vessel.model.inputs)]
-    return np.asarray(inputs[:, chosen].mean(axis=1)) if chosen else np.zeros(len(inputs))
+def rudder_angle(vessel: Vessel, commands: Commands, *, standing: Array | None = None) -> Array:
+    """(k,) mean angle of what steers at the samples, as the actuators deliver it [rad]; zero where nothing steers."""
+    return _mean_angle(commands.names, _at_ends(vessel, commands, standing)[0])
 
 
 def steering_signals(names: tuple[str, ...]) -> tuple[str, ...]:
     """Signals whose mean steers: all rudders, or without rudders all azimuths; none where there are neither."""
     found = (tuple(name for name in names if name.rstrip("0123456789") == kind) for kind in ("rudder", "a"))
     return next(filter(None, found), ())
+
+
+def _mean_angle(names: tuple[str, ...], inputs: Array) -> Array:
+    chosen = [names.index(name) for name in steering_signals(names)]
+    return np.asarray(inputs[:, chosen].mean(axis=1)) if chosen else np.zeros(len(inputs))
+
+
+def _sway(vessel: Vessel, states: Array, inputs: Array, sea: Array) -> Array:
+    """dv/dt (k,) [m/s2]."""
+    state, drive, weather = (tuple(np.moveaxis(x, -1, 0)) for x in (states, inputs, sea))
+    rates = motion_rates(vessel.model, state, drive, current_to=weather[:2], wind_to=weather[2:])
+    return np.asarray(rates[4] + np.zeros(len(states)))
 
 
 def _followed(pendulum: RollPendulum, begin: Array, end: Array, step_s: float) -> Array:

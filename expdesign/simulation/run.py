@@ -78,7 +78,7 @@ def simulate(
         sample_time_s=commands.sample_time_s,
         pose=states[:, :3],
         velocity=states[:, 3:STATES],
-        auxiliary=rolled(vessel, states, given, sea, commands.sample_time_s),
+        auxiliary=rolled(vessel, states, commands, sea, standing=standing),
     )
 
 

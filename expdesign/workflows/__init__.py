@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.planning.durations import durations
     from expdesign.workflows.planning.export import export
     from expdesign.workflows.planning.plan import plan
+    from expdesign.workflows.planning.roll_plan import roll_plan
     from expdesign.workflows.planning.run import run
     from expdesign.workflows.planning.score import score
     from expdesign.workflows.planning.whatif import whatif
@@ -58,6 +59,7 @@ __all__ = [
     "planned",
     "replan",
     "roll",
+    "roll_plan",
     "run",
     "score",
     "scored",
@@ -84,6 +86,7 @@ if not TYPE_CHECKING:
             "planning.durations": ("durations",),
             "planning.export": ("export",),
             "planning.plan": ("plan",),
+            "planning.roll_plan": ("roll_plan",),
             "planning.run": ("run",),
             "planning.score": ("score",),
             "planning.whatif": ("whatif",),

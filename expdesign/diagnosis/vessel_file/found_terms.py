@@ -60,8 +60,8 @@ def found_model(
         notes.append("The vessel file describes the ship after the change.")
     if ship.has_roll:
         notes.append(
-            "The vessel file has the oscillation as [model.roll]: simulate, score, durations, indices and diagnose "
-            "follow it; estimate and plans need a vessel file without that table, and say so."
+            "The vessel file has the oscillation as [model.roll], and no [roll]: simulate, score, durations, indices "
+            "and diagnose follow it; estimate and plans need a vessel file without that table, and say so."
         )
     found = replace(
         model,

@@ -50,6 +50,7 @@ def extend(
             model=replace(model, actuators=actuators),
             sensors=_sensors(vessel.sensors, ship),
             environment=weather,
+            pendulum=None if model.roll is not None else vessel.pendulum,
             std=found_std(vessel, ship, std, std_keys(actuators)),
         ),
         (*missing, *more),

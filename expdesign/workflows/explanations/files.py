@@ -35,7 +35,8 @@ AREAS = (
 LOADS = (
     "One table [[load]] for each data file of expdesign roll, in their order; one without keys is the ship alone, one "
     "with unknown = true has the load that is sought. Heights are upward from one origin in the ship, which may be "
-    "anywhere. [ship] is left out where --vessel names a file with [roll], which says the same."
+    "anywhere. [ship] is left out where --vessel names a file with [roll], which says the same. expdesign roll-plan "
+    "reads such a file as candidates; it needs m and z_m of an unknown load under [start], roughly."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "

@@ -39,8 +39,9 @@ from expdesign.roll import (
 )
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import AUXILIARY, Batch
-from expdesign.simulation import steering_signals
-from expdesign.vessel import Vessel
+from expdesign.simulation import delivered_at_samples, steering_signals
+from expdesign.values import Array
+from expdesign.vessel import IDEAL, Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 
@@ -64,8 +65,8 @@ def roll(
         data: CSV files, one for each load.
         out: folder, or None.
         loads: file of load cases.
-        vessel: file of the ship: her [roll] says what is known of masses and places and where the search begins, and
-            vessel-roll.toml is the same ship with the estimate.
+        vessel: file of the ship: her [roll] says what is known of masses and places and where the search begins, her
+            actuators how late the rudder is, and vessel-roll.toml is the same ship with the estimate.
         rudder: signals whose mean steers; found by their kinds when empty.
         method: "iv" or "ls".
         lowpass_hz: of the filter; None for one that thinning out needs.
@@ -85,7 +86,7 @@ def roll(
     for path in data:
         if sum(path.resolve() == other.resolve() for other in data) > 1:
             raise InputError(f"{path}: is given more than once, expected each data file once")
-    cases, notes = _cases(data, known, rudder)
+    cases, notes = _cases(data, known, rudder, ship)
     filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=lowpass_hz)
     problem = build_problem(
         known.body, prepared(cases, filter_), beam_m=known.beam_m, roll_hz=1.0 / known.period_s, known=known.known,
@@ -121,7 +122,9 @@ def _fitted(ship: Vessel, content: RollContent) -> str:
     return vessel_toml(found, comments=head)
 
 
-def _cases(data: Sequence[Path], known: LoadCases, rudder: Sequence[str]) -> tuple[tuple[Case, ...], tuple[str, ...]]:
+def _cases(
+    data: Sequence[Path], known: LoadCases, rudder: Sequence[str], ship: Vessel | None
+) -> tuple[tuple[Case, ...], tuple[str, ...]]:
     """One case for each file, and notes on them."""
     cases: list[Case] = []
     notes: list[str] = []
@@ -129,24 +132,36 @@ def _cases(data: Sequence[Path], known: LoadCases, rudder: Sequence[str]) -> tup
     for path, load in zip(data, known.loads, strict=True):
         record = load_records([path], outputs=("r",), sample_time_s=step_s)
         step_s = record.batches[0].sample_time_s
-        runs = tuple(_run(path, batch, rudder) for batch in record.batches)
+        runs = tuple(_run(path, batch, rudder, ship) for batch in record.batches)
         cases.append(Case(name=path.stem, load=load, runs=runs))
         notes += record.notes
     return tuple(cases), tuple(notes)
 
 
-def _run(path: Path, batch: Batch, rudder: Sequence[str]) -> Run:
+def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -> Run:
     """Signals of a batch; the accelerometer counts to port in the room of roll."""
     for name in NEEDED:
         if not batch.measures(name):
             raise InputError(f"{path}: {name}: is missing, expected it beside r_radps and the rudder")
     assert batch.auxiliary is not None
     roll_rate, sensed = (batch.auxiliary[:, AUXILIARY.index(name)] for name in NEEDED)
-    steering = [batch.inputs[:, batch.input_names.index(name)] for name in _rudders(batch.input_names, rudder)]
-    return Run(
-        step_s=batch.sample_time_s,
-        signals=np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], np.mean(steering, axis=0)]),
-    )
+    chosen = [batch.input_names.index(name) for name in _rudders(batch.input_names, rudder)]
+    steering = _delivered(batch, ship)[:, chosen].mean(axis=1)
+    signals = np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], steering])
+    return Run(step_s=batch.sample_time_s, signals=signals)
+
+
+def _delivered(batch: Batch, ship: Vessel | None) -> Array:
+    """(k, m) inputs at the samples, with the lags and dead times that the vessel file states for its signals."""
+    inputs = np.array(batch.inputs)
+    if ship is None:
+        return inputs
+    for signal, response in zip(ship.model.inputs, ship.responses, strict=True):
+        if signal in batch.input_names and response != IDEAL:
+            column = batch.input_names.index(signal)
+            told = inputs[:, [column]]
+            inputs[:, column] = delivered_at_samples([response], told, sample_time_s=batch.sample_time_s)[:-1, 0]
+    return inputs
 
 
 def _rudders(names: tuple[str, ...], asked: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,26 @@
+"""Load trials: which known loads, and which manoeuvres at each, tell most about a ship's roll; and inclining tests.
+
+    vessel with [roll], candidate loads, dictionary -> run_information -> choose_loads -> LoadPlan
+    ship, shifted mass -> inclining
+
+Parameters, frames and signs are those of `roll`; parameters that the vessel file states a standard deviation for are
+free, the others count as known.
+"""
+
+from expdesign.loading.choice import LoadPlan, Step, choose_loads
+from expdesign.loading.inclining import Inclining, heel_of_shift, inclining
+from expdesign.loading.information import LoadOption, run_information
+from expdesign.loading.question import Question, build_question
+
+__all__ = [
+    "Inclining",
+    "LoadOption",
+    "LoadPlan",
+    "Question",
+    "Step",
+    "build_question",
+    "choose_loads",
+    "heel_of_shift",
+    "inclining",
+    "run_information",
+]

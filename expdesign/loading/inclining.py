@@ -1,0 +1,81 @@
+"""Inclining and roll-decay tests: a shifted mass heels the ship, and tells her metacentric height and roll inertia.
+
+    tan phi = m y / (D GM)          GM = m y / (D tan phi)          D = M + m
+    I = D g GM (T / 2 pi)^2
+
+with the displaced mass D, which includes the shifted mass m, a shift y across the ship, and the period T of undamped
+roll. A mass raised by h lowers GM by m h / D.
+
+Source: IMO, Intact Stability Code (2008), annex 1, for the inclining test; E. V. Lewis (ed.), Principles of Naval
+Architecture (1988), volume I, for its errors.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from expdesign.errors import InputError
+from expdesign.vessel.masses import G_MPS2
+
+
+def heel_of_shift(*, mass_kg: float, shift_m: float, displacement_kg: float, metacentric_height_m: float) -> float:
+    """Heel [rad] of a mass shifted across the ship; positive towards it."""
+    return math.atan2(mass_kg * shift_m, displacement_kg * metacentric_height_m)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inclining:
+    """What a test tells.
+
+    Attributes:
+        heel_rad: of the shift.
+        metacentric_height_std_m: of the height from the heel.
+        inertia_kgm2: about the axis, added inertia included.
+        inertia_std_kgm2: from the height and the period; infinite without a decay.
+    """
+
+    heel_rad: float
+    metacentric_height_std_m: float
+    inertia_kgm2: float
+    inertia_std_kgm2: float
+
+
+def inclining(
+    *, mass_kg: float, shift_m: float, displacement_kg: float, metacentric_height_m: float, period_s: float,
+    heel_std_rad: float, period_std_s: float = math.inf, shifts: int = 1,
+) -> Inclining:  # fmt: skip
+    """Standard deviations of metacentric height and inertia by shifts of a known mass and a decay, errors small.
+
+    GM = m y / (D tan phi), so that dGM = -GM / (sin phi cos phi) dphi; I is proportional to GM T^2.
+
+    Args:
+        mass_kg, shift_m: of the test, known exactly.
+        displacement_kg: of the ship with the mass.
+        metacentric_height_m: as believed.
+        period_s: of undamped roll, as believed.
+        heel_std_rad: of one reading of the change of heel.
+        period_std_s: of the period of the decay; infinite without one.
+        shifts: how often the mass is shifted and heel read, each with an error of its own.
+
+    Raises:
+        InputError: a quantity is not positive.
+    """
+    given = {
+        "mass_kg": mass_kg, "shift_m": shift_m, "displacement_kg": displacement_kg, "period_s": period_s,
+        "metacentric_height_m": metacentric_height_m, "heel_std_rad": heel_std_rad, "shifts": shifts,
+    }  # fmt: skip
+    for name, value in given.items():
+        if not 0 < value < math.inf:
+            raise InputError(f"{name} is {value:g}, expected more than 0")
+    heel = heel_of_shift(
+        mass_kg=mass_kg, shift_m=shift_m, displacement_kg=displacement_kg, metacentric_height_m=metacentric_height_m
+    )
+    height_share = heel_std_rad / math.sqrt(shifts) / (math.sin(heel) * math.cos(heel))
+    inertia = displacement_kg * G_MPS2 * metacentric_height_m * (period_s / (2.0 * math.pi)) ** 2
+    return Inclining(
+        heel_rad=heel,
+        metacentric_height_std_m=metacentric_height_m * height_share,
+        inertia_kgm2=inertia,
+        inertia_std_kgm2=inertia * math.hypot(height_share, 2.0 * period_std_s / period_s),
+    )

@@ -1,0 +1,169 @@
+"""`expdesign roll-plan`: which known loads, and which manoeuvres at each, tell most about roll."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.dictionary import build_dictionary
+from expdesign.durations import Aim, with_repeats
+from expdesign.errors import FileError, UnknownName
+from expdesign.export import write_files
+from expdesign.export.load_page import (
+    CASE_HEADER,
+    PRECISION_HEADER,
+    LoadContent,
+    case_rows,
+    load_plan_html,
+    load_plan_json,
+    load_sentences,
+    loads_toml,
+    precision_rows,
+    repeats_json,
+)
+from expdesign.loading import LoadPlan, Question, build_question, choose_loads
+from expdesign.progress import Progress, silent, within
+from expdesign.scenario import Scenario, load_cases
+from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
+from expdesign.workflows.command_text import command_text
+from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.steps.case import loaded
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.planned import check_plannable, planned
+from expdesign.workflows.steps.scored import scored
+from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+
+
+def roll_plan(
+    scenario: Path,
+    out: Path | None,
+    *,
+    loads: Path,
+    most_loads: int | None = None,
+    interest: Sequence[str] = (),
+    place: bool = False,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """Load cases and runs, into `out` or runs/<scenario>; with `place` also a plan and run cards of each load case.
+
+    Args:
+        scenario: its vessel has [roll], its dictionary the manoeuvres, and design.total_s the informative time.
+        out: folder, or None.
+        loads: file of load cases, here the candidates.
+        most_loads: at most so many load cases; None for the fewest that tell nearly as much as all.
+        interest: parameters whose precision is to be best; all of them when empty.
+        place: whether each load case is planned on the chart, too.
+        seed: of the planner.
+        progress: of the command.
+
+    Raises:
+        InputError: arguments or files that are wrong.
+        NoAnswer: the candidates leave a combination of parameters open, or a load case has no plan.
+    """
+    case = loaded(scenario, progress)
+    pendulum = case.vessel.pendulum
+    if pendulum is None:
+        raise FileError(
+            scenario, "vessel", f"is {case.vessel.name!r}, whose file has no [roll], expected a vessel file with it"
+        )
+    if place:
+        check_plannable(case)
+    asked = load_cases(loads, case.vessel)
+    question = build_question(case.vessel, asked.loads, known=asked.known, guess=asked.start)
+    progress("simulating manoeuvres", 0.05)
+    primitives = build_dictionary(case.vessel, case.dictionary)
+    plan = choose_loads(
+        question, primitives, total_s=case.design.total_s, aim=_aim(question, interest), most_loads=most_loads,
+        progress=within(progress, 0.1, 0.4 if place else 0.9),
+    )  # fmt: skip
+    folder = out or Path("runs") / case.name
+    options = {
+        "--loads": loads,
+        "--most-loads": most_loads,
+        "--interest": tuple(interest),
+        "--place": place,
+        "--seed": seed,
+    }
+    content = LoadContent(
+        scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
+        commands=_commands(scenario, folder, plan),
+        command=command_text("roll-plan", [scenario], options, usual={"--seed": 0}), version=__version__,
+    )  # fmt: skip
+    names = {_runs_name(case): repeats_json(content, case) for case in range(len(plan.repeats))}
+    files = {
+        "roll-plan.json": load_plan_json(content), "roll-plan.html": load_plan_html(content),
+        "loads.toml": loads_toml(content), **names,
+    }  # fmt: skip
+    paths = write_files(folder, files)
+    if place:
+        paths += _placed(case, plan, folder, seed, within(progress, 0.4, 1.0))
+    progress("done", 1.0)
+    return Outcome(files=paths, summary=_summary(content), tables=_tables(content))
+
+
+def _aim(question: Question, interest: Sequence[str]) -> Aim:
+    for name in interest:
+        if name not in question.free:
+            raise UnknownName("parameter of --interest", name, known=question.free)
+    return Aim(criterion="D_s", interest=tuple(interest)) if interest else Aim()
+
+
+def _known(pendulum: RollPendulum, plan: LoadPlan) -> dict[str, float]:
+    """Parameters that the vessel file states without a standard deviation."""
+    return {name: pendulum.parameters[name] for name in ROLL_PARAMETERS if name not in plan.question.free}
+
+
+def _runs_name(case: int) -> str:
+    return f"durations-{case + 1}.json"
+
+
+def _commands(scenario: Path, folder: Path, plan: LoadPlan) -> tuple[str, ...]:
+    """What to type for every load case, and for the data of all."""
+    cases = range(len(plan.repeats))
+    each = [
+        command_text(
+            "plan", [scenario], {"--durations": folder / _runs_name(case), "--out": folder / f"case-{case + 1}"}
+        )
+        for case in cases
+    ]
+    data = [f"case-{case + 1}.csv" for case in cases]
+    return (*each, command_text("roll", data, {"--loads": folder / "loads.toml", "--vessel": "VESSEL.toml"}))
+
+
+def _placed(case: Scenario, plan: LoadPlan, folder: Path, seed: int, progress: Progress) -> tuple[Path, ...]:
+    """A plan with routes, run cards and report for every load case, in folders of their own."""
+    information = scored(case, progress=within(progress, 0.0, 0.1))
+    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.2))
+    order = list(plan.manoeuvres)
+    paths: tuple[Path, ...] = ()
+    for number, repeats in enumerate(plan.repeats.astype(int).tolist(), start=1):
+        part = within(progress, 0.2 + 0.8 * (number - 1) / len(plan.repeats), 0.2 + 0.8 * number / len(plan.repeats))
+        runs = with_repeats(design, [repeats[order.index(item.primitive.name)] for item in information])
+        trip = planned(case, information, runs, seed=seed, progress=within(part, 0.0, 0.8))
+        route = built_route(case, trip)
+        content = replace(report_content(case, information, runs, trip, seed), route=route)
+        files = trial_files(case, None, content, route, progress=within(part, 0.8, 1.0))
+        paths += write_files(folder / f"case-{number}", files)
+    return paths
+
+
+def _summary(content: LoadContent) -> dict[str, object]:
+    plan = content.plan
+    return {
+        "scenario": content.scenario,
+        "load_cases": [option.name for option in content.options],
+        "runs": int(plan.repeats.sum()),
+        "efficiency": plan.chosen.efficiency,
+        "gap": plan.design.gap,
+        "smallest_relative_sensitivity": float(plan.chosen.smallest),
+        "remarks": list(load_sentences(content)),
+    }
+
+
+def _tables(content: LoadContent) -> tuple[TextTable, ...]:
+    found = TextTable(title="Load plan", header=("finding",), rows=tuple((text,) for text in load_sentences(content)))
+    cases = TextTable(title="Load cases", header=CASE_HEADER, rows=tuple(case_rows(content)))
+    return found, cases, TextTable(title="Precision", header=PRECISION_HEADER, rows=tuple(precision_rows(content)))
