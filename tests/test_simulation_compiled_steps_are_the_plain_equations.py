@@ -93,7 +93,7 @@ def agree(
         integrator=integrator,
         substeps=substeps,
     )
-    assert np.ptp(expected[:, :3], axis=0).min() > 0.01
+    assert np.ptp(expected[:, :3], axis=0).min() > 0.001  # some ships have short samples
     np.testing.assert_allclose(np.hstack([track.pose, track.velocity]), expected, rtol=1e-12, atol=1e-12)
 
 
