@@ -1,10 +1,11 @@
 """Joint estimate of roll parameters over load cases: closed-loop instrumental variables, or least squares.
 
-    min over theta of  sum over cases of  || Q' (y - X c(theta, load)) ||^2 / sigma^2
+    min over theta of  sum over cases of  || V^(-1/2) Z' (y - X c(theta, load)) ||^2,     V = sum |Z(f)|^2 S(f)
 
-Q is an orthonormal basis of the instruments, c the sampled coefficients; equation and instruments are whitened by an
-autoregression of the case's residuals. With white residuals these weights are the efficient ones, and the inverse of
-the curvature is the covariance; the covariance that is reported counts what colour and changing variance are left.
+c are the sampled coefficients. An autoregression whitens equation and instruments; S is the spectrum of what colour is
+left, and the instruments Z, which come from the rudder, pass 1 / S. The sum over frequencies is the covariance of Z' e
+for any stationary noise e that the instruments do not depend on, narrow-band waves too, so that the inverse of the
+curvature is the covariance of the estimate, but for the errors of S.
 
 Source: doctoral thesis on grey-box identification of roll with few sensors, approach 5.3 and algorithm 5.1; L. P.
 Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
@@ -19,11 +20,9 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.estimation.noise import automatic_lags, long_run_covariance
-from expdesign.roll.closed_loop import closed_loop
-from expdesign.roll.instruments import black_box_signals, loop_signals
-from expdesign.roll.model import PARAMETERS, coefficients, discrete, named, parameters, relative_sensitivity
-from expdesign.roll.regression import WHITE, Rows, build_rows, instrument_columns, noise_model
+from expdesign.roll.instruments import Fold, folds, weighted_columns
+from expdesign.roll.model import PARAMETERS, discrete, named, parameters, relative_sensitivity
+from expdesign.roll.regression import WHITE, Rows, Spectrum, build_rows, flat_spectrum, noise_model, spectrum
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
@@ -129,9 +128,9 @@ class RollEstimate:
         covariance: (p, p) of the free ones, for the held ones as they are.
         held: free parameters that kept their start values because the equations leave directions open.
         sensed: (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters.
-        rounds: (r, 9) parameters after each round of instruments and noise models.
+        rounds: (r, 9) parameters after each round of spectra.
         settled: whether the last round changed little.
-        residual_std: (c,) of each case, whitened [rad/s].
+        residual_std: (c,) of each case [rad/s].
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
     """
 
@@ -175,10 +174,16 @@ class RollEstimate:
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:
-    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations."""
+    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations.
 
-    rows: Rows
-    basis: Array
+    Attributes:
+        rows: of each run.
+        basis: (n, q) of each run, whose sum of products with the noise has unit covariance.
+        top, slope: sums of its products with y and X, (q,) and (q, 5).
+    """
+
+    rows: tuple[Rows, ...]
+    basis: tuple[Array, ...]
     top: Array
     slope: Array
 
@@ -192,27 +197,27 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
     if method not in METHODS:
         raise InputError(f"method is {method!r}, expected one of {', '.join(METHODS)}")
     held = _held(problem)
-    begun = [black_box_signals(case.runs) for case in problem.cases]
+    instruments = [folds(case.runs) if method == "iv" else None for case in problem.cases]
     theta, history, settled = np.array(problem.start), [], False
-    signals, weighted = begun, _weighted(problem, begun, None, method)
+    weighted = [_weighted(case, own, None) for case, own in zip(problem.cases, instruments, strict=True)]
     while True:
         before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
         history.append(theta)
         settled = len(history) > 1 and _little(problem, theta - before, sensed)
         if settled or len(history) == TUNING.most_rounds:
             break
-        signals = _signals(problem, theta, begun)
-        weighted = _weighted(problem, signals, theta, method)
+        parts = zip(problem.cases, instruments, _sampled(problem, theta), strict=True)
+        weighted = [_weighted(case, own, values) for case, own, values in parts]
     return RollEstimate(
         problem=problem,
         method=method,
         theta=theta,
-        covariance=_covariance(problem, weighted, theta, sensed, held),
+        covariance=_covariance(problem, weighted, theta, sensed, held, method),
         held=held,
         sensed=sensed,
         rounds=np.array(history),
         settled=settled,
-        residual_std=np.array([_deviation(part.rows, _sampled(problem, theta)[i]) for i, part in enumerate(weighted)]),
+        residual_std=np.array([np.std(np.concatenate(e)) for e in _noise(problem, weighted, theta)]),
         surprise=_surprise(left, len(problem.free) - len(held)),
     )
 
@@ -243,45 +248,42 @@ def _sampled(problem: RollProblem, theta: Array) -> list[Array]:
     return [discrete(theta, problem.body, case.load, problem.step_s).values for case in problem.cases]
 
 
-def _signals(problem: RollProblem, theta: Array, begun: Sequence[list[Array]]) -> list[list[Array]]:
-    """Simulated signals of each case; black boxes where the model is unstable or its loop has no gain."""
-    result = []
-    for case, first in zip(problem.cases, begun, strict=True):
-        values = coefficients(theta, problem.body, case.load).values
-        z_s = problem.body.sensor(float(theta[PARAMETERS.index("z_f")]))
-        loop = closed_loop(values, z_s) if values[2] else None
-        result.append(loop_signals(case.runs, loop, first) if loop is not None and loop.stable else first)
-    return result
+def _noise(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> list[list[Array]]:
+    """Residuals (n,) of each run of each case."""
+    by = zip(weighted, _sampled(problem, theta), strict=True)
+    return [[rows.residuals(values) for rows in part.rows] for part, values in by]
 
 
-def _weighted(
-    problem: RollProblem, signals: Sequence[list[Array]], theta: Array | None, method: str
-) -> list[_Weighted]:
-    """Equations of each case; before there are parameters, without noise models and with equal weights."""
-    result = []
-    for place, case in enumerate(problem.cases):
-        instruments = None if method == "ls" else [instrument_columns(run) for run in signals[place]]
-        rows, deviation = build_rows(case.runs, instruments, WHITE), 1.0
-        if theta is not None:
-            values = _sampled(problem, theta)[place]
-            if method == "iv":
-                own = [rows.residuals(values)[rows.run == run] for run in np.unique(rows.run)]
-                rows = build_rows(case.runs, instruments, noise_model(own, values[:2], TUNING.noise_order))
-            deviation = _deviation(rows, values)
-        result.append(_projected(rows, max(deviation, 1e-12)))
-    return result
-
-
-def _projected(rows: Rows, deviation: float) -> _Weighted:
-    Q, R, _ = scipy.linalg.qr(
-        rows.Z / np.maximum(np.linalg.norm(rows.Z, axis=0), 1e-300), mode="economic", pivoting=True
+def _weighted(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> _Weighted:
+    """Of sampled coefficients (5,); before there are any, as if noise were white, as least squares always does."""
+    plain = tuple(build_rows(run, WHITE) for run in case.runs)
+    if values is None:
+        model, rows, left = WHITE, plain, flat_spectrum([one.y for one in plain])
+    elif instruments is None:
+        model, rows, left = WHITE, plain, flat_spectrum([one.residuals(values) for one in plain])
+    else:
+        model = noise_model([one.residuals(values) for one in plain], values[:2], TUNING.noise_order)
+        rows = tuple(build_rows(run, model) for run in case.runs)
+        left = spectrum([one.residuals(values) for one in rows])
+    by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
+    basis = _basis(by, left)
+    parts = list(zip(basis, rows, strict=True))
+    return _Weighted(
+        rows,
+        basis,
+        np.sum([B.T @ one.y for B, one in parts], axis=0),
+        np.sum([B.T @ one.X for B, one in parts], axis=0),
     )
-    basis = Q[:, np.abs(np.diag(R)) > 1e-9]
-    return _Weighted(rows, basis / deviation, basis.T @ rows.y / deviation, basis.T @ rows.X / deviation)
 
 
-def _deviation(rows: Rows, values: Array) -> float:
-    return float(np.std(rows.residuals(values)))
+def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
+    """(n, q) combinations of the columns of each run whose sums of products with the noise have unit covariance."""
+    power = noise.covariance(columns)
+    there = np.diag(power) > 0
+    size = np.sqrt(np.diag(power)[there])
+    powers, axes = np.linalg.eigh(power[np.ix_(there, there)] / np.outer(size, size))
+    kept = powers > TUNING.repeated * powers[-1:]
+    return tuple(Z[:, there] / size @ (axes[:, kept] / np.sqrt(powers[kept])) for Z in columns)
 
 
 def _solved(
@@ -328,20 +330,21 @@ def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
 
 
 def _covariance(
-    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, sensed: Array, held: Sequence[str]
+    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, sensed: Array, held: Sequence[str], method: str
 ) -> Array:
-    """(p, p) with scores that may depend on each other; zero for what is held."""
+    """(p, p) with the spectra of the last residuals, flat ones for least squares; zero for what is held.
+
+    The same residuals give the spectrum and are weighed by it. With 2 K degrees of freedom at each frequency the
+    inverse of the curvature comes out too small by (K - 1) / K, and the variance is larger by K / (K - 1) than with the
+    true spectrum: so it is for chi-square powers that count among the K they are divided by.
+    """
     scale = problem.scale[problem.places] * [name not in held for name in problem.free]
     inverse = np.linalg.pinv(sensed * scale, rcond=1e-12)
     first, middle = 0, np.zeros((len(scale),) * 2)
-    for part, values in zip(weighted, _sampled(problem, theta), strict=True):
+    for part, residuals in zip(weighted, _noise(problem, weighted, theta), strict=True):
         last = first + len(part.top)
-        scores = (part.basis @ inverse[:, first:last].T) * part.rows.residuals(values)[:, None]
-        middle += _long_run(scores, part.rows)
+        change = inverse[:, first:last]
+        noise = spectrum(residuals) if method == "iv" else flat_spectrum(residuals)
+        middle += change @ noise.covariance(part.basis) @ change.T / (1.0 - 2.0 / noise.freedom) ** 2
         first = last
     return np.asarray(middle * np.outer(scale, scale))
-
-
-def _long_run(scores: Array, rows: Rows) -> Array:
-    run, step = rows.run.astype(int), rows.step.astype(int)
-    return long_run_covariance(scores, run, step, lags=automatic_lags(scores, run, step))

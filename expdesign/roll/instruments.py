@@ -1,23 +1,24 @@
 """Instruments: what the ship would have done by the rudder alone, without noise and waves.
 
-The rudder moves sway, yaw and roll in ways that nobody models. Black boxes from rudder to each signal begin; from then
-on roll rate and accelerometer come from the closed loop of the current parameters, driven by the rudder, the black
-box's yaw rate and a side acceleration that is fitted through that loop. Errors of these models cost accuracy, not
-consistency.
+The rudder moves sway, yaw and roll in ways that nobody models: black boxes from rudder to each signal tell what it
+does. A box that is fitted to the noise among which it is used makes instruments that follow this noise, and intervals
+that are too short; so the record is split into parts, and each has the boxes that the others were fitted to. Errors of
+the boxes then cost accuracy, not consistency.
 
-Source: doctoral thesis on grey-box identification of roll with few sensors, algorithms 2.1 and 5.1; the fitted side
-acceleration takes the place of U r, which leaves v' out.
+Source: doctoral thesis on grey-box identification of roll with few sensors, algorithm 5.1, step A; J. D. Angrist, G. W.
+Imbens and A. B. Krueger, J. Applied Econometrics 14 (1999), 57-67, for instruments fitted elsewhere. The simulation of
+the grey-box model that the thesis goes on with is left out: instruments so made were no better (`tests/benchmarks`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from expdesign.roll.closed_loop import ClosedLoop, filtered, simulated
-from expdesign.roll.regression import delayed, inside
+from expdesign.roll.regression import NoiseModel, Spectrum, delayed, difference, inside, without_start
 from expdesign.roll.runs import Run
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array
@@ -26,47 +27,90 @@ BlackBox = tuple[Array, Array]
 """Numerator and denominator in powers of the delay."""
 
 
-def black_box(inputs: Sequence[Array], outputs: Sequence[Array], orders: tuple[int, int]) -> BlackBox:
-    """Least-squares ARX model from inputs (k,) to outputs (k,) of several runs, with its poles inside."""
-    past, width = orders
-    skip = max(past, width)
-    tables = [
-        np.column_stack([-delayed(y, range(1, past + 1)), delayed(u, range(width))])[skip:]
-        for u, y in zip(inputs, outputs, strict=True)
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """A part of a run and the instruments there.
+
+    Attributes:
+        part: samples of the run.
+        columns: (k, q) instruments of the whole run, by black boxes that were not fitted to this part.
+    """
+
+    part: slice
+    columns: Array
+
+
+def folds(runs: Sequence[Run]) -> list[list[Fold]]:
+    """Of each run: whole runs where there are enough of them, else parts of equal length."""
+    parts = _parts([len(run.signals) for run in runs])
+    rudders = [run.signals[:, 3] for run in runs]
+    boxes = [_boxes(rudders, [run.signals[:, place] for run in runs], parts) for place in range(3)]
+    return [
+        [Fold(part, instrument_columns(_simulated(rudder, [box[number] for box in boxes]))) for number, part in own]
+        for rudder, own in zip(rudders, parts, strict=True)
     ]
-    found = np.linalg.lstsq(np.concatenate(tables), np.concatenate([y[skip:] for y in outputs]), rcond=None)[0]
+
+
+def _parts(lengths: Sequence[int]) -> list[list[tuple[int, slice]]]:
+    """Of each run: number of the fold, and samples."""
+    count = TUNING.folds
+    if len(lengths) >= count:
+        return [[(place % count, slice(0, length))] for place, length in enumerate(lengths)]
+    edges = [np.linspace(0, length, count + 1).astype(int).tolist() for length in lengths]
+    return [[(number, slice(own[number], own[number + 1])) for number in range(count)] for own in edges]
+
+
+def _boxes(
+    inputs: Sequence[Array], outputs: Sequence[Array], parts: Sequence[Sequence[tuple[int, slice]]]
+) -> list[BlackBox]:
+    """For each fold the black box that the other folds tell."""
+    triangles: list[list[Array]] = [[] for _ in range(TUNING.folds)]
+    for u, y, own in zip(inputs, outputs, parts, strict=True):
+        table = _arx_table(u, y)
+        for number, part in own:
+            triangles[number].append(np.asarray(np.linalg.qr(table[part], mode="r")))
+    return [
+        _solved(np.concatenate([R for other, own in enumerate(triangles) if other != number for R in own]))
+        for number in range(TUNING.folds)
+    ]
+
+
+def _arx_table(u: Array, y: Array) -> Array:
+    """(k, o + w + 1) past outputs, inputs and the output; zero for samples whose past reaches before the run."""
+    past, width = TUNING.black_box
+    table = np.column_stack([-delayed(y, range(1, past + 1)), delayed(u, range(width)), y])
+    table[: max(past, width)] = 0.0
+    return table
+
+
+def _solved(table: Array) -> BlackBox:
+    past = TUNING.black_box[0]
+    found = np.asarray(np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0], dtype=float)
     return found[past:], inside(np.concatenate([[1.0], found[:past]]))
 
 
-def black_box_signals(runs: Sequence[Run]) -> list[Array]:
-    """(k, 4) signals of each run by black boxes from its rudder, which is the last column."""
-    rudders = [run.signals[:, 3] for run in runs]
-    boxes = [black_box(rudders, [run.signals[:, place] for run in runs], TUNING.black_box) for place in range(3)]
-    return [np.column_stack([*(scipy.signal.lfilter(*box, rudder) for box in boxes), rudder]) for rudder in rudders]
+def _simulated(rudder: Array, boxes: Sequence[BlackBox]) -> Array:
+    """(k, 4) signals as in a run."""
+    return np.column_stack([*(scipy.signal.lfilter(*box, rudder) for box in boxes), rudder])
 
 
-def loop_signals(runs: Sequence[Run], loop: ClosedLoop, begun: Sequence[Array]) -> list[Array]:
-    """(k, 4) signals of each run by the closed loop of a stable model.
+def instrument_columns(simulated: Array) -> Array:
+    """(k, q) lags of simulated signals (k, 4): the regressors without noise, and some more."""
+    roll_rate, *others = np.column_stack([simulated[:, :1], difference(simulated[:, 1:])]).T
+    lags = [TUNING.lags, TUNING.lags, TUNING.rudder_lags]
+    parts = [delayed(signal, range(count)) for signal, count in zip(others, lags, strict=True)]
+    return np.column_stack([delayed(roll_rate, range(1, 1 + TUNING.lags)), *parts])
 
-    Args:
-        runs: of one case.
-        loop: stable.
-        begun: (k, 4) of `black_box_signals`, whose yaw rate is kept.
+
+def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> Array:
+    """(n, q) instruments of the rows of a run, whitened as these are and through 1 / spectrum of what colour is left.
+
+    These are the weights of least variance. The equation is whitened too, as instruments that end suddenly would pick
+    up the noise of high frequencies, which is many times stronger.
+
+    Source: E. J. Hannan, in Time Series Analysis (M. Rosenblatt, ed., 1963), 17-37.
     """
-    sides = _side_accelerations(runs, loop, begun)
-    result = []
-    for run, first, side in zip(runs, begun, sides, strict=True):
-        driven = np.column_stack([side, first[:, 2:]])
-        result.append(np.column_stack([*simulated(loop, driven, run.step_s), first[:, 2:]]))
-    return result
-
-
-def _side_accelerations(runs: Sequence[Run], loop: ClosedLoop, begun: Sequence[Array]) -> list[Array]:
-    """(k,) of each run, by the black box whose output makes the loop roll as measured."""
-    seen, wanted = [], []
-    for run, first in zip(runs, begun, strict=True):
-        driven = filtered(loop.roll, loop.below, first[:, 2:] @ loop.gains, run.step_s)
-        wanted.append(driven - run.signals[:, 0])
-        seen.append(filtered(loop.roll, loop.below, run.signals[:, 3], run.step_s))
-    box = black_box(seen, wanted, TUNING.side_black_box)
-    return [scipy.signal.lfilter(*box, run.signals[:, 3]) for run in runs]
+    first = TUNING.left_out_samples
+    divided = [(fold.part, left.divided(noise.whitened(fold.columns)[first:])) for fold in own]
+    stitched = np.concatenate([columns[max(part.start - first, 0) : part.stop - first] for part, columns in divided])
+    return without_start(stitched, noise)

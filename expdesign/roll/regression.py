@@ -1,4 +1,4 @@
-"""Rows of the sampled equation: y(t) on its past and on differences of accelerometer, yaw rate and rudder.
+"""Rows of the sampled equation, y(t) on its past and on differences of other signals, and the spectrum of its noise.
 
 Source: doctoral thesis on grey-box identification of roll with few sensors, (4.33), (5.54).
 """
@@ -33,27 +33,41 @@ def difference(signals: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rows:
-    """The equation y = X theta + noise of one case, every run without its mean.
+    """The equation y = X theta + noise of one run, whitened, without its mean and its first samples.
 
     Attributes:
         y: (n,) roll rate.
         X: (n, 5) regressors.
-        Z: (n, q) instruments.
-        run, step: (n,) run, and sample in it.
     """
 
     y: Array
     X: Array
-    Z: Array
-    run: Array
-    step: Array
 
     def __post_init__(self) -> None:
-        seal(self, y="n", X="n 5", Z="n q", run="n", step="n")
+        seal(self, y="n", X="n 5")
 
     def residuals(self, values: Array) -> Array:
         """(n,) of coefficients (5,)."""
         return np.asarray(self.y - self.X @ values)
+
+
+def build_rows(run: Run, noise: NoiseModel) -> Rows:
+    """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
+    table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
+    table[:2] = 0.0
+    table = without_start(noise.whitened(table)[TUNING.left_out_samples :], noise)
+    return Rows(y=table[:, 0], X=table[:, 1:])
+
+
+def without_start(table: Array, noise: NoiseModel) -> Array:
+    """Columns (k, n) without their means, and without what whitening makes of noise before the run.
+
+    The whitening filter has poles near the unit circle, where noise has its zeros. What it does not know of the noise
+    before the run rings there for long, in a shape for each of its two states, which are projected out.
+    """
+    rings = delayed(scipy.signal.lfilter([1.0], noise.moving, np.r_[1.0, np.zeros(len(table) - 1)]), (0, 1))
+    Q = np.linalg.qr(np.column_stack([np.ones(len(table)), rings]))[0]
+    return np.asarray(table - Q @ (Q.T @ table))
 
 
 def regressors(signals: Array) -> Array:
@@ -61,32 +75,72 @@ def regressors(signals: Array) -> Array:
     return np.column_stack([-delayed(signals[:, 0], (1, 2)), difference(signals[:, 1:])])
 
 
-def instrument_columns(simulated: Array) -> Array:
-    """(k, q) lags of simulated signals (k, 4): the regressors without noise, and some more."""
-    roll_rate, *others = np.column_stack([simulated[:, :1], difference(simulated[:, 1:])]).T
-    lags = [TUNING.lags, TUNING.lags, TUNING.rudder_lags]
-    parts = [delayed(signal, range(count)) for signal, count in zip(others, lags, strict=True)]
-    return np.column_stack([delayed(roll_rate, range(1, 1 + TUNING.lags)), *parts])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Spectrum:
+    """Spectral density of residuals at the frequencies j / n of a real transform of length n, j = 0 to n / 2.
 
-
-def build_rows(runs: Sequence[Run], instruments: Sequence[Array] | None, noise: NoiseModel) -> Rows:
-    """Rows of a case.
-
-    Args:
-        runs: prepared.
-        instruments: (k, q) of each run; None for the regressors themselves, which is least squares.
-        noise: of the residuals, which whitens them.
+    Attributes:
+        density: (f,) two-sided; its mean over all n frequencies is the variance.
+        length: n, even.
+        freedom: degrees of freedom of the estimate at one frequency; infinite for a density that is given.
     """
-    parts = []
-    for number, run in enumerate(runs):
-        X = regressors(run.signals)
-        Z = X if instruments is None else instruments[number]
-        table = noise.whitened(np.column_stack([run.signals[:, 0], X, Z]))
-        table = table[TUNING.left_out_samples :]
-        steps = np.arange(len(table))
-        parts.append(np.column_stack([table - table.mean(axis=0), np.full(len(table), number), steps]))
-    whole = np.concatenate(parts)
-    return Rows(y=whole[:, 0], X=whole[:, 1:6], Z=whole[:, 6:-2], run=whole[:, -2], step=whole[:, -1])
+
+    density: Array
+    length: int
+    freedom: float
+
+    def __post_init__(self) -> None:
+        seal(self, density="f")
+
+    def divided(self, signals: Array) -> Array:
+        """Signals (k, q), k up to half the length, through the filter 1 / density, which shifts nothing in time."""
+        changed = np.fft.rfft(signals, self.length, axis=0) / self.density[:, None]
+        return np.asarray(np.fft.irfft(changed, self.length, axis=0)[: len(signals)])
+
+    def covariance(self, columns: Sequence[Array]) -> Array:
+        """(q, q) of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
+        both = np.r_[1.0, np.full(len(self.density) - 2, 2.0), 1.0] * self.density / self.length
+        seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
+        return np.asarray(sum((F.conj().T @ (both[:, None] * F)).real for F in seen))
+
+
+def flat_spectrum(residuals: Sequence[Array]) -> Spectrum:
+    """Of white noise with the variance of residuals (k,) of each run."""
+    length = _transform_length(residuals)
+    variance = max(float(np.var(np.concatenate(residuals))), 1e-300)
+    return Spectrum(density=np.full(length // 2 + 1, variance), length=length, freedom=np.inf)
+
+
+def spectrum(residuals: Sequence[Array]) -> Spectrum:
+    """Estimate by averaged periodograms of whitened residuals (k,) of each run of one case.
+
+    Whitening before keeps a narrow peak, and the zero at frequency zero, from leaking into what lies beside them. The
+    segments are as long as some degrees of freedom allow, so that the resolution grows with the record.
+
+    Source: P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967), 70-73; R. B. Blackman and J. W. Tukey, The
+    Measurement of Power Spectra (1958), for whitening before.
+    """
+    length, total = _transform_length(residuals), sum(map(len, residuals))
+    segments = [min(len(e), total // TUNING.spectral_segments) for e in residuals]
+    powers = [
+        len(e) / total * scipy.signal.welch(e, nperseg=n, nfft=length, return_onesided=False)[1]
+        for e, n in zip(residuals, segments, strict=True)
+    ]
+    density = np.sum(powers, axis=0)[: length // 2 + 1]
+    return Spectrum(
+        density=np.maximum(density, max(TUNING.least_density * float(density.max()), 1e-100)),
+        length=length,
+        freedom=sum(_freedom(len(e) // (n // 2) - 1) for e, n in zip(residuals, segments, strict=True)),
+    )
+
+
+def _freedom(segments: int) -> float:
+    """Of an average of periodograms of Hann windows that overlap by half, whose powers correlate by 1 / 36."""
+    return 2.0 * segments / (1.0 + 2.0 / 36.0 * (1.0 - 1.0 / segments))
+
+
+def _transform_length(residuals: Sequence[Array]) -> int:
+    return 2 * int(scipy.fft.next_fast_len(max(map(len, residuals)), real=True))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,12 +17,15 @@ class Tuning:
         least_samples_per_period: of roll in the data.
         least_samples: in a run, beside those that are left out.
         black_box: orders (past outputs, inputs) of the models from rudder to each signal.
-        side_black_box: of the model from rudder to side acceleration.
+        folds: parts of the record, each of which has black boxes that were fitted to the others.
         largest_pole: of these models; larger ones are moved inside.
         lags: of each simulated signal among the instruments.
         rudder_lags: of the rudder's difference.
         noise_order: of the autoregression in the noise model of a case.
+        spectral_segments: lengths of a segment in all runs of a case, where spectra of residuals are estimated.
+        least_density: of that of its peak, in such a spectrum, below which no frequency weighs more.
         noise_ratios: of the noise of roll rates to that of other signals, as they enter the equation, that are tried.
+        repeated: share of variance below which a combination of instruments repeats others.
         left_out_samples: at the beginning of a run, where lags reach before it.
         farthest: typical sizes from zero, beyond which no parameter is sought.
         at_bound: share of the range of the search, within which of its end a parameter stands at the bound.
@@ -42,17 +45,20 @@ class Tuning:
     least_samples_per_period: float = 10.0
     least_samples: int = 100
     black_box: tuple[int, int] = (24, 25)
-    side_black_box: tuple[int, int] = (16, 17)
+    folds: int = 3
     largest_pole: float = 0.999
     lags: int = 4
     rudder_lags: int = 2
     noise_order: int = 12
+    spectral_segments: int = 4
+    least_density: float = 1e-14
     noise_ratios: tuple[float, ...] = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
+    repeated: float = 1e-10
     left_out_samples: int = 50
     farthest: float = 10.0
     at_bound: float = 1e-4
     most_rounds: int = 12
-    settled: float = 0.02
+    settled: float = 0.1
     most_surprise: float = 3.0
     unseen: float = 1e-9
     open_sizes: float = 5.0
