@@ -19,7 +19,19 @@ from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
 
-LISTS = ("--format", "--method", "--fixed", "--test", "--data", "--interest", "--reference", "--throttle", "--rudder")
+LISTS = (
+    "--format",
+    "--method",
+    "--fixed",
+    "--test",
+    "--data",
+    "--interest",
+    "--reference",
+    "--throttle",
+    "--rudder",
+    "--mass-kg",
+    "--shift-m",
+)
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data", "--reference")
 """Those of them whose values are files."""

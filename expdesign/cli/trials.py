@@ -17,6 +17,7 @@ from expdesign.cli.options import (
     Out,
     OutBesidePlan,
     OutByData,
+    OutInclined,
     PlanFile,
     ScenarioFile,
     Scheduler,
@@ -236,3 +237,38 @@ def roll(
     Example: expdesign roll nominal.csv calibration.csv loaded.csv --loads loads.toml
     """
     return ask("roll", data, out, loads=loads, vessel=vessel, rudder=rudder or (), method=method, lowpass_hz=lowpass)
+
+
+@command("incline")
+def incline(
+    vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll].")],
+    mass: Annotated[
+        list[float], typer.Option("--mass-kg", metavar="M ...", help="Weights on board that may be shifted.")
+    ],
+    shift: Annotated[list[float], typer.Option("--shift-m", metavar="Y ...", help="Shifts across the ship.")],
+    heel_std: Annotated[
+        float, typer.Option("--heel-std-deg", metavar="S", help="Standard deviation of one reading of heel.")
+    ] = 0.02,
+    period_std: Annotated[
+        float | None,
+        typer.Option("--period-std-s", metavar="S", help="Standard deviation of a decay's period. Default: no decay."),
+    ] = None,
+    shifts: Annotated[int, typer.Option("--shifts", metavar="N", min=1, help="Shifts that are read.")] = 4,
+    out: OutInclined = None,
+) -> Asked:
+    """Say what inclining tests tell: heel, and the accuracy of metacentric height and roll inertia.
+
+    Writes incline.json, with a row for every weight and shift.
+
+    Example: expdesign incline --vessel scenarios/vessels/roll-model.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1
+    """
+    return ask(
+        "incline",
+        vessel,
+        out,
+        mass_kg=mass,
+        shift_m=shift,
+        heel_std_deg=heel_std,
+        period_std_s=period_std,
+        shifts=shifts,
+    )

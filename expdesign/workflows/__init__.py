@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.steps.planned import plan_problem, planned
     from expdesign.workflows.steps.scored import scored
     from expdesign.workflows.trials.foresee import foresee
+    from expdesign.workflows.trials.incline import incline
     from expdesign.workflows.trials.replan import replan
     from expdesign.workflows.trials.roll import roll
     from expdesign.workflows.trials.simulate import simulate
@@ -50,6 +51,7 @@ __all__ = [
     "export",
     "foresee",
     "identify_steps",
+    "incline",
     "indices",
     "measured",
     "mine",
@@ -95,6 +97,7 @@ if not TYPE_CHECKING:
             "steps.planned": ("plan_problem", "planned"),
             "steps.scored": ("scored",),
             "trials.foresee": ("foresee",),
+            "trials.incline": ("incline",),
             "trials.replan": ("replan",),
             "trials.roll": ("roll",),
             "trials.simulate": ("simulate",),
