@@ -209,12 +209,13 @@ def _further_loads(body: Body, loads: Sequence[Load | None]) -> list[tuple[Load,
         "at the same height" if known else "high up": top,
         "at half that height": (top + axis) / 2,
         "near the centre of mass": axis,
-        "as far below it": 2 * axis - top,
+        "as far below the centre of mass": 2 * axis - top,
     }
     return [
         (
             Load(mass_kg=factor * mass, z_m=place),
-            f"a run with a known load of {factor * mass:.3g} kg {words}, {-place:.3g} m above the body origin",
+            f"a run with a known load of {factor * mass:.3g} kg {words}, {abs(place):.3g} m "
+            f"{'above' if place <= 0 else 'below'} the body origin",
         )
         for words, place in places.items()
         for factor in (1.0, 2.0)

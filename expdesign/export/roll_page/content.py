@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from expdesign.export.files import finite, strict_json
 from expdesign.roll import (
+    G_MPS2,
     MEANINGS,
     TUNING,
     UNITS,
@@ -89,8 +90,10 @@ def _sentences(content: RollContent) -> Iterator[str]:
         right = stiffness(estimate.theta, body, case.load)
         hertz = roll_frequency(estimate.theta, body, case.load)
         upright = f"a roll period of {1.0 / hertz:.3g} s" if hertz else "which does not keep her upright"
-        if_so = f", if {' and '.join(estimate.held)} is right" if estimate.held else ""
-        yield f"{case.name}: righting moment {right:.4g} N m/rad, {upright}{if_so}."
+        if_so = f", for {' and '.join(estimate.held)} as held" if estimate.held else ""
+        mass = body.mass_kg + (estimate.values["m"] if case.load is None else case.load.mass_kg)
+        height = f"a metacentric height of {right / (G_MPS2 * mass):.3g} m"
+        yield f"{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
     yield from _open(content)
     for one in report.faint:
         yield f"The data hardly show the combination {one}: its relative standard deviation is {1.0 / one.size:.2g}."
@@ -123,7 +126,7 @@ def _open(content: RollContent) -> Iterator[str]:
         f"{', '.join(held)} {'was' if len(held) == 1 else 'were'} held at the start value."
     )
     for one in report.open:
-        yield f"Nothing changes if together: {one}."
+        yield f"The data would be the same if these changed together: {one}. So none of them is known by itself."
 
 
 def _filtered(content: RollContent) -> str:

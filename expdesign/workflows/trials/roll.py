@@ -201,5 +201,5 @@ def _summary(content: RollContent) -> dict[str, object]:
 def _tables(content: RollContent) -> tuple[TextTable, ...]:
     found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
     values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
-    cures = TextTable(title="What would tell apart what is not", header=CURE_HEADER, rows=tuple(cure_rows(content)))
+    cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
     return (found, values, cures) if cures.rows else (found, values)
