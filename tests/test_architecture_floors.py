@@ -57,7 +57,7 @@ FLOORS = {
         ("accuracy", "discriminating_manoeuvre"),
         ("fit",),
         ("select",),
-        ("remainder",),
+        ("remainder", "judgement"),
         ("values",),
         ("conclusions",),
         ("diagnose",),

@@ -19,7 +19,7 @@ from expdesign.diagnosis.select.backward_elimination import before_first_without
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward, to_take_out
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, wald_p_value, without_step
+from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
     _best_on_held_out,
     _starting_points,
@@ -31,26 +31,7 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import Estimated, silent
-
-DEVIATION = np.ones((6, 3))
-
-
-def errors(fit_percent: np.ndarray | float) -> HeldOut:
-    """Of six runs with these fits (b, 1) or one fit, all outputs alike."""
-    return HeldOut(squared_error=DEVIATION * (1.0 - np.asarray(fit_percent) / 100.0) ** 2, squared_deviation=DEVIATION)
-
-
-def steps_of(*keys: str) -> Selection:
-    """A search that found one cause for every key."""
-    steps = [
-        SimpleNamespace(
-            chosen=SimpleNamespace(keys=(key,), fit=key, candidate=Candidate(cause="current", free={key: 0.0})),
-            tests=(key,), p_value=1e-4,
-        )
-        for key in keys
-    ]  # fmt: skip
-    first, last = SimpleNamespace(keys=()), SimpleNamespace(value=lambda _key: 0.0)
-    return Selection(steps=tuple(steps), first=first, last=last, last_tests=())  # type: ignore[arg-type]
+from held_out_cases import errors, steps_of
 
 
 def kept_count(*fits: np.ndarray | float) -> int:

@@ -39,11 +39,11 @@ from expdesign.diagnosis.fit import (
     HeldOut,
     held_out_gain,
     judged,
-    leads_away,
     unmeasured_force_share,
     with_longer_windows,
     within_stated_std,
 )
+from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
@@ -51,22 +51,20 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
-    beside_stated_parameters,
     eliminate_backward,
     leading_candidates,
-    only_nuisance,
     select_forward,
 )
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged, InputError
-from expdesign.progress import Estimated, Progress, silent, within
+from expdesign.progress import Estimated, silent
 from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-LITTLE_FIT, MORE_THAN_NOISE = 50.0, 2.0
-"""Fit of an output [%] below which the simulation explains little, if its error is so many times the noise."""
+MORE_THAN_NOISE = 2.0
+"""The simulation explains little of an output below `LITTLE_FIT`, if its error is so many times the noise."""
 LEAST_GAIN_WITHIN_STD = 1.0
 """Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
 MOST_SAMPLES = 400_000
@@ -205,68 +203,11 @@ def _select(
 
     def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
         progress = told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
-        return _as_judged(found, as_stated, validation, windows, progress)
+        return errors_as_judged(found, as_stated, validation, windows, progress, seed)
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     rest = with_unlisted_terms(kept, held, windows, validation, seed)
     return _Selected(found=found, kept=rest.kept, as_stated=as_stated, held=rest.held, validation=validation, rest=rest)
-
-
-def _as_judged(
-    found: Selection, as_stated: HeldOut, validation: CrossValidation, windows: Windows, progress: Progress
-) -> tuple[Selection, list[HeldOut]]:
-    """Causes beside uncertain parameters fitted with them, or beside those of the file: what simulates better.
-
-    Errors are those of the model before any cause, then after every step. Parameters re-estimated within their standard
-    deviations may simulate held-out units worse than those of the file, which many other data may have gone into. Then
-    a cause has to improve on the file's parameters, and is fitted beside them: else it would have to make up for the
-    loss. A file with which the simulation leads away is no such file.
-    """
-    short = validation.short_windows(found.first.ship)
-    if found.beside_stated:
-        again = beside_stated_parameters(found, windows, short) or found
-        return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
-    held = _cross_validated(found, as_stated, validation, progress)
-    uncertain = found.steps and found.first.keys and not leads_away(as_stated)
-    if not uncertain or not as_stated.mean_fit > validation.of(found.first).mean_fit:
-        return found, held
-    known = beside_stated_parameters(found, windows, short)
-    if known is None or not validation.of(known.last).mean_fit > validation.of(found.last).mean_fit:
-        return found, held
-    return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
-
-
-def _ahead(held: Sequence[HeldOut]) -> list[HeldOut]:
-    """Errors in short stretches."""
-    return [item.ahead() for item in held if item.ahead is not None]
-
-
-def _cross_validated(
-    found: Selection, as_stated: HeldOut, validation: CrossValidation, progress: Progress
-) -> list[HeldOut]:
-    """Of the model before any cause, then after every step.
-
-    The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
-    has them fitted, unless it simulates held-out units well as it is, and better: what a cause repairs of a worse fit
-    is no gain. If the first cause is that they exceed their standard deviations, it gets their gain, and the model is
-    not fitted. Neither is it where a fit without any cause needs parameters far beyond them: that fit is no model that
-    the vessel file allows.
-    """
-    fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
-    fitted = fitted and (within_stated_std(found.first) or not found.steps)
-    fits = [*[found.first] * fitted, *(step.chosen.fit for step in found.steps)]
-    results = [as_stated]
-    for number, item in enumerate(fits):
-        part = within(progress, number / len(fits), (number + 1) / len(fits))
-        results.append(validation.of(item, part))
-    if fitted:
-        results[:2] = [results[0] if _simulates_better(*results[:2]) else results[1]]
-    return judged(results)
-
-
-def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
-    one, other = (np.nan_to_num(held.fit, nan=-np.inf) for held in (as_stated, fitted))
-    return bool(one.min() >= LITTLE_FIT and one.mean() > other.mean())
 
 
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:

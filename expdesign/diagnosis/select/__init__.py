@@ -1,6 +1,11 @@
 """Which causes explain the data: score tests, forward selection, backward elimination, profile likelihood."""
 
-from expdesign.diagnosis.select.backward_elimination import eliminate_backward, only_nuisance, simulates_better
+from expdesign.diagnosis.select.backward_elimination import (
+    eliminate_backward,
+    improves_held_out,
+    only_nuisance,
+    simulates_better,
+)
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
@@ -19,6 +24,7 @@ __all__ = [
     "candidate_disturbances",
     "eliminate_backward",
     "fit_nuisance",
+    "improves_held_out",
     "leading_candidates",
     "only_nuisance",
     "open_candidates",

@@ -112,7 +112,7 @@ def improves_held_out(
             certain=not found.beside_stated and (index == 0 or only_nuisance(step, found)),
             imitates=step.chosen.candidate.imitates,
         )
-        and ((index == 0 and not found.beside_stated) or not held[0].in_stretches or interval[0] > 0.0)
+        and ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, (gain, interval)))
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
     if windows is None:
@@ -121,6 +121,25 @@ def improves_held_out(
     if high >= 0.0 and not simulated[0]:
         simulated[0] = predicts_better(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
     return simulated
+
+
+def _is_certain_ahead(
+    held: Sequence[HeldOut], index: int, seed: int, gained: tuple[float, tuple[float, float]]
+) -> bool:
+    """Whether the gain of a step is certain, or else that in short stretches is.
+
+    Stretches of one run share its slow errors, so their interval is too narrow: a cause after the first needs a clear
+    gain there too.
+    """
+    gain, (low, _) = gained
+    least = TUNING.clear_gain_points if index else 0.0
+    if held[0].in_stretches:
+        return low > 0.0 and gain > least
+    before, after = (held[place].ahead for place in (index, index + 1))
+    if low > 0.0 or before is None or after is None:
+        return True
+    gain, (low, _) = held_out_gain(before(), after(), seed)
+    return low > 0.0 and gain > least
 
 
 def simulates_better(

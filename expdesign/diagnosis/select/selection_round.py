@@ -145,10 +145,12 @@ def _best_on_held_out(
     One that imitates many causes has to be clearly better itself; else it remains among the alternatives. So does one
     that others with fewer numbers are about as likely as. Many numbers explain errors of the model's structure in the
     data that they are fitted to, and in no others. Where the simulation of whole units leads away from the ship,
-    likelihoods tell little, and the best candidates of all other causes are compared.
+    likelihoods tell little, and the best candidates of all other causes are compared. Where it does so only with
+    another cause, that one is no rival.
     """
     astray = leads_away(validation.of(first.fit))
     rivals = _rivals(first, accepted, any_number=astray)
+    rivals = [item for item in rivals if astray or not leads_away(validation.of(item.fit))]
     if not rivals:
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)

@@ -1,0 +1,87 @@
+"""Causes are judged in whole held-out runs where these tell, else in stretches; beside which parameters."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from expdesign.diagnosis import judgement
+from expdesign.diagnosis.fit.cross_validation import HeldOut
+from expdesign.diagnosis.judgement import _where_certain, errors_as_judged
+from expdesign.diagnosis.select.backward_elimination import improves_held_out
+from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.progress import silent
+from held_out_cases import errors, steps_of
+
+
+class Model(SimpleNamespace):
+    """A fit by name, all effects zero."""
+
+    def __init__(self, name: str, **others: object) -> None:
+        super().__init__(name=name, value=lambda _key: 0.0, **others)
+
+
+def whole_and_ahead(*pairs: tuple[np.ndarray | float, np.ndarray | float]) -> list[HeldOut]:
+    """Errors of models by their fits to whole runs and in short stretches."""
+    return [
+        replace(errors(whole), ahead=lambda short=short: replace(errors(short), in_stretches=True))
+        for whole, short in pairs
+    ]
+
+
+def test_a_later_cause_is_clear_in_stretches_where_whole_runs_leave_its_gain_open():
+    """More than a point and certain; runs that all gain decide by themselves, and of a first cause no gain is asked."""
+    found = steps_of("first", "later")
+    spread = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])  # 4 points on average, perhaps none
+    clear = TUNING.clear_gain_points
+    for later, ahead, kept in (
+        (70.0 + spread, 70.0 + 1.1 * clear, True),
+        (70.0 + spread, 70.0 + 0.9 * clear, False),
+        (70.0 + spread, 70.0 + spread, False),
+        (74.0, 70.0, True),
+    ):
+        held = whole_and_ahead((50.0, 50.0), (70.0, 70.0), (later, ahead))
+        assert improves_held_out(found, held, 0) == [True, kept]
+    held = whole_and_ahead((70.0, 70.0), (70.0 + spread.mean() + 0.5 * spread, 70.0))
+    assert improves_held_out(steps_of("first"), held, 0) == [True]
+
+
+def test_a_later_cause_judged_in_stretches_needs_a_clear_gain():
+    """Stretches of one run share its slow errors, so that intervals over them are too narrow."""
+    for gain, kept in ((0.9, False), (1.1, True)):
+        fits = (50.0, 70.0, 70.0 + gain * TUNING.clear_gain_points)
+        held = [replace(errors(value), in_stretches=True) for value in fits]
+        assert improves_held_out(steps_of("first", "later"), held, 0) == [True, kept]
+
+
+def test_causes_are_judged_in_stretches_where_only_these_tell_of_the_first_one():
+    """Stretches that do not tell either leave the runs."""
+    spread = np.array([[-9.0], [-9.0], [-9.0], [6.0], [6.0], [6.0]])
+    for ahead, in_stretches in ((75.0, True), (70.0 + spread, False), (65.0, False)):
+        held = _where_certain(whole_and_ahead((70.0, 70.0), (70.0 + spread, ahead)), 0)
+        assert all(item.in_stretches is in_stretches for item in held)
+
+
+def test_causes_are_fitted_beside_the_file_where_it_simulates_better_with_them_for_certain(monkeypatch):
+    """Parameters of the file are better without any cause in both cases: the cause decides."""
+    first = Model("first", keys=("theta:Y_v",), ship=None)
+    found = replace(steps_of("wind"), first=first, last=Model("re-estimated"))  # type: ignore[arg-type]
+    known = replace(found, last=Model("beside"), beside_stated=True)  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "beside_stated_parameters", lambda *_: known)
+    monkeypatch.setattr(judgement, "within_stated_std", lambda _fit: True)
+    monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
+    unclear = 75.0 + np.array([[-25.0], [-20.0], [-10.0], [15.0], [20.0], [20.0]])
+    for whole, ahead, chosen in (
+        (unclear, 74.0, known),
+        (74.0, unclear, known),
+        (unclear, unclear, found),
+        (unclear, 66.0, found),
+    ):
+        stated, before, after, by_file = whole_and_ahead((45.0, 45.0), (20.0, 20.0), (70.0, 70.0), (whole, ahead))
+        fits = {"first": before, "wind": after, "re-estimated": after, "beside": by_file}
+        validation = SimpleNamespace(
+            of=lambda one, *_, fits=fits: fits[getattr(one, "name", one)],
+            short_windows=lambda _ship: None,
+        )
+        kept, _ = errors_as_judged(found, stated, validation, None, silent, 0)  # type: ignore[arg-type]
+        assert kept is chosen
