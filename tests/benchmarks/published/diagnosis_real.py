@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from diagnosis_real_faults import AHEAD_S, FAULTS, error_ahead
 from expdesign.assessment import EstimateOptions, assess
 from expdesign.diagnosis import Diagnosis, diagnose
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.regression import AIR
 from expdesign.processes import as_finished
 from expdesign.records import load_records
@@ -208,7 +208,13 @@ def triple(data: Path, number: int, seed: int) -> dict[str, object]:
     """Three runs of the pond: is wind named first, and how do the others' errors ahead change by what is found?"""
     names = drawn_names(POND, data, WINDY, np.random.default_rng([seed, number]))
     record = runs(POND, data, names)
-    fitted = fitted_vessel(POND, record, wind=False)
+    try:
+        fitted = fitted_vessel(POND, record, wind=False)
+    except NotInformative as error:
+        return {
+            "number": number, "runs": names, "seconds": 0.0, "findings": [], "verdict": f"no model: {error}",
+            "ratio": None, "wind": None,
+        }  # fmt: skip
     found, seconds = timed(fitted, record, number)
     others = tuple(
         file.stem for file in sorted((data / POND.folder).glob("*.csv"))
@@ -242,13 +248,20 @@ def told_triples(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield "|---|---|---|---|---|---|"
     for row in rows:
         names = ", ".join(short(name) for name in row["runs"])
+        if row["ratio"] is None:
+            yield f"| {row['number']} | {names} | {row['verdict']} | | | |"
+            continue
         ratios = ["{:.2f} {:.2f} {:.2f}".format(*row[key]) for key in ("ratio", "wind")]
         yield f"| {row['number']} | {names} | {found_words(row)} | {' | '.join(ratios)} | {row['seconds']:.1f} s |"
-    first = sum(row["findings"][:1] != [] and row["findings"][0][0] == "wind" for row in rows)
-    sway = [row["ratio"][1] for row in rows]
-    yield f"Wind first in {first} of {len(rows)}; sway error ahead less in {sum(np.array(sway) < 1)}, " + (
-        f"median ratio {np.median(sway):.2f}; {seconds_words(rows)}."
-    )
+    fitted = [row for row in rows if row["ratio"] is not None]
+    windy = [row for row in fitted if row["findings"][:1] != [] and row["findings"][0][0] == "wind"]
+    yield f"Wind first in {len(windy)} of {len(rows)}, {len(rows) - len(fitted)} of which are no model."
+    if fitted:
+        sway = np.array([row["ratio"][1] for row in fitted])
+        yield (
+            f"Other causes beside it in {sum(len(row['findings']) > 1 for row in windy)}; sway error ahead less in "
+            f"{(sway < 1).sum()}, median ratio {np.median(sway):.2f}; {seconds_words(fitted)}."
+        )
 
 
 def told_faults(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
