@@ -9,21 +9,19 @@ import numpy as np
 import pytest
 
 from design_case import SCENARIOS
-from expdesign.dictionary import Primitive, build_dictionary
+from expdesign.dictionary import build_dictionary
 from expdesign.durations import Aim
 from expdesign.errors import InputError, NotInformative
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads, run_information
-from expdesign.roll import PARAMETERS, Case, Run, build_problem, coefficients, estimate_roll
+from expdesign.roll import coefficients
 from expdesign.scenario import load_cases, load_dictionary, load_repeats
 from expdesign.signals import AUXILIARY
 from expdesign.simulation import rudder_angle, simulate
-from expdesign.values import Array
 from expdesign.vessel import NOMINAL, Load, Sensors, Vessel
 from expdesign.workflows import roll_plan
-from rolling_ship import HIGH, ROLL_MODEL, UNDER_WAY, UNKNOWN, orders, roll_model, trial
+from rolling_ship import GUESS, HIGH, ROLL_MODEL, UNDER_WAY, error_and_bound, roll_model, steps
 
 SHIP = roll_model()
-GUESS = {"m": UNKNOWN.mass_kg, "z_m": UNKNOWN.z_m}
 LOW = Load(mass_kg=2.0, z_m=0.1)
 SCENARIO = SCENARIOS / "roll-trial.toml"
 CANDIDATES = SCENARIOS / "loads" / "roll-trial.toml"
@@ -33,19 +31,10 @@ def asked(*loads: Load | None, ship: Vessel = SHIP) -> Question:
     return build_question(ship, loads, known={}, guess=GUESS)
 
 
-def steps(samples: int = 1000, seed: int = 1) -> Primitive:
-    commands = orders(SHIP, samples, np.random.default_rng(seed))
-    sailed = simulate(SHIP, commands, velocity=UNDER_WAY)
-    return Primitive(
-        name=f"steps-{seed}", family="steps", settings={}, commands=commands, entry_inputs=commands.values[0],
-        trajectory=sailed,
-    )  # fmt: skip
-
-
 def test_information_under_white_equation_noise_is_that_of_least_squares() -> None:
     """With noise of the accelerometer alone the equation's noise is white: x^T x over its variance."""
     ship = replace(SHIP, sensors=Sensors(roll_rate_radps=1e-12, acceleration_mps2=0.01))
-    question, run = asked(NOMINAL, ship=ship), steps()
+    question, run = asked(NOMINAL, ship=ship), steps(SHIP)
     sailed = simulate(ship, run.commands, velocity=UNDER_WAY)
     assert sailed.auxiliary is not None
     rate, angle, reading = (
@@ -62,7 +51,7 @@ def test_information_under_white_equation_noise_is_that_of_least_squares() -> No
 
 def test_noise_that_is_twice_as_large_leaves_a_quarter_of_the_information() -> None:
     noisy = replace(SHIP.sensors, roll_rate_radps=0.004, acceleration_mps2=0.02, yaw_rate_radps=0.004)
-    question, run = asked(NOMINAL), steps()
+    question, run = asked(NOMINAL), steps(SHIP)
     one, other = (
         run_information(ship, question.theta, question.options[0], [run])[0]
         for ship in (SHIP, replace(SHIP, sensors=noisy))
@@ -75,8 +64,8 @@ def test_one_height_leaves_a_combination_open_and_it_is_named(second: Load | Non
     """Rank 8 of 9 with one known load, and with two at the same height; a weight low down is the cure."""
     loads = [load for load in (NOMINAL, HIGH, second) if load is not None]
     with pytest.raises(NotInformative, match=r"no candidate load tells 1 combination .* together: .*k .*; what would"):
-        choose_loads(asked(*loads, None), [steps()], total_s=100.0)
-    plan = choose_loads(asked(*loads, LOW, None), [steps()], total_s=100.0)
+        choose_loads(asked(*loads, None), [steps(SHIP)], total_s=100.0)
+    plan = choose_loads(asked(*loads, LOW, None), [steps(SHIP)], total_s=100.0)
     assert plan.chosen.smallest > 1e-3
 
 
@@ -109,7 +98,7 @@ def test_a_trial_that_is_planned_leaves_less_uncertainty_than_the_prior(plan: Lo
 
 
 def test_interest_in_the_load_tells_the_load_better() -> None:
-    runs, question = [steps(seed=1), steps(seed=2)], asked(NOMINAL, HIGH, LOW, None)
+    runs, question = [steps(SHIP, seed=1), steps(SHIP, seed=2)], asked(NOMINAL, HIGH, LOW, None)
     aim = Aim(criterion="D_s", interest=("m", "z_m"))
     volume, load = (choose_loads(question, runs, total_s=2000.0, aim=one) for one in (Aim(), aim))
 
@@ -165,39 +154,10 @@ def test_the_command_writes_what_plan_and_roll_read(tmp_path: Path) -> None:
         assert dict(zip(names, repeats, strict=True)) == {**dict.fromkeys(names, 0), **case["runs"]}
 
 
-def misses(seeds: range) -> Array:
-    """(n, p) errors of estimates with k known, over their bounds by the information."""
-    loads: tuple[Load | None, ...] = (NOMINAL, HIGH, None)
-    assert SHIP.pendulum is not None
-    k = SHIP.pendulum.parameters["k"]
-    question = build_question(SHIP, loads, known={"k": k}, guess=GUESS)
-    start = {name: value for name, value in SHIP.pendulum.parameters.items() if name != "k"}
-    result = []
-    for seed in seeds:
-        told, cases = np.zeros((len(PARAMETERS),) * 2), []
-        for place, option in enumerate(question.options):
-            number, load = 10 * seed + place, UNKNOWN if option.load is None else option.load
-            told += run_information(SHIP, question.theta, option, [steps(3000, number)])[0]
-            cases.append(Case(name=option.name, load=option.load, runs=(measured(load, number),)))
-        problem = build_problem(SHIP.pendulum.body, tuple(cases), beam_m=0.3, roll_hz=0.8, known={"k": k}, start=start)
-        scale = np.outer(question.size, question.size)
-        bound = np.sqrt(np.diag(np.linalg.inv(told[np.ix_(question.places, question.places)] * scale))) * question.size
-        error = estimate_roll(problem).theta - question.theta
-        result.append(error[question.places] / bound)
-    return np.array(result)
-
-
-def measured(load: Load, seed: int) -> Run:
-    told = trial(SHIP, load, seed, samples=3000)
-    rudder = rudder_angle(SHIP, orders(SHIP, 3000, np.random.default_rng(seed)))
-    signals = [told["roll_rate_radps"], -told["imu_lateral_mps2"], told["r_radps"], rudder]
-    return Run(step_s=SHIP.sample_time_s, signals=np.column_stack(signals))
-
-
 @pytest.mark.parametrize("seeds", [range(101, 103), pytest.param(range(201, 221), marks=pytest.mark.slow)])
 def test_estimates_scatter_no_less_than_the_bound(seeds: range) -> None:
     """Mean squares of p errors over n seeds are 1 or more, but for three standard errors sqrt(2 / (n p))."""
-    found = misses(seeds)
+    found = np.array([np.divide(*error_and_bound(SHIP, seed)) for seed in seeds])
     assert np.mean(found**2) > 1 - 3 * np.sqrt(2 / found.size)
     assert np.sqrt(np.mean(found**2)) < 5  # the estimate by instruments reaches a good part of the bound
 
