@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -94,13 +94,22 @@ class Delivered:
     Attributes:
         values: (k, s, m) means of the inputs over each part of a sample.
         shares: (s,) of the sample that the parts take.
+        times: names of dead times and lags of the actuators that are not known exactly, as in `vessel.std_keys`.
+        values_by_time: (k, s, m, u) derivatives of the values by them [1/s].
+        shares_by_time: (s, u) those of the shares [1/s].
     """
 
     values: Array
     shares: Array
+    times: tuple[str, ...] = ()
+    values_by_time: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    shares_by_time: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
-        seal(self, values="k s m", shares="s")
+        if not self.times:
+            seal(self, values="k s m", shares="s", values_by_time="a b c d", shares_by_time="e f")
+            return
+        seal(self, values="k s m", shares="s", values_by_time="k s m u", shares_by_time="s u")
 
     @property
     def mean(self) -> Array:
@@ -109,7 +118,17 @@ class Delivered:
 
     def cut(self, part: slice) -> Delivered:
         """Consecutive samples."""
-        return replace(self, values=self.values[part])
+        slopes = self.values_by_time[part] if self.times else self.values_by_time
+        return replace(self, values=self.values[part], values_by_time=slopes)
+
+    def moved(self, name: str, change_s: float) -> Delivered:
+        """With another value of an uncertain time, to first order."""
+        place = self.times.index(name)
+        return replace(
+            self,
+            values=self.values + change_s * self.values_by_time[..., place],
+            shares=self.shares + change_s * self.shares_by_time[:, place],
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

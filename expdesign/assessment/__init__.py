@@ -1,6 +1,6 @@
 """Assessment: estimates are validated on their estimation runs and on test runs."""
 
-from expdesign.assessment.assess import NO_TESTS, EstimateOptions, assess, default_methods
+from expdesign.assessment.assess import NO_TESTS, EstimateOptions, assess, default_methods, settled
 from expdesign.assessment.limits import Limits, decomposed, sentence
 from expdesign.assessment.residuals import OneStep, one_step
 from expdesign.assessment.runs import RunCheck, check_run
@@ -21,4 +21,5 @@ __all__ = [
     "default_methods",
     "one_step",
     "sentence",
+    "settled",
 ]

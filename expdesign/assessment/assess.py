@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from expdesign.assessment.actuator_times import considered, delivered_anew, found_times, known_times, told, with_times
 from expdesign.assessment.limits import Limits, decomposed
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
@@ -15,12 +16,14 @@ from expdesign.estimation.disturbance import current_moments, felt_moments, meas
 from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import Method, estimate, method_named
+from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.regression import CURRENT, MEANS, PREDICTORS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.settings import STARTS, Settings
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
+from expdesign.reduction import reduced
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Vessel
@@ -100,12 +103,44 @@ def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
     return ("ls", "iv")
 
 
+def settled(
+    vessel: Vessel, raw: Record, options: EstimateOptions, *, smoothed: bool = False, progress: Progress = silent
+) -> tuple[Vessel, Record]:
+    """The vessel with dead times and lags as its data show them, and the data that it delivers.
+
+    Times are those that the first requested method of output error finds, where the vessel's file states a standard
+    deviation of one; else they are the file's.
+
+    Args:
+        vessel: as its file states it.
+        raw: with commands as inputs.
+        options: methods and settings.
+        smoothed: whether velocities from the pose are smoothed, as in `reduced`.
+        progress: of the estimates.
+
+    Raises:
+        InputError, NoAnswer: as of `assess`.
+    """
+    methods = [method for name in options.methods if (method := method_named(name)).solver == "oe"]
+    if not methods:
+        return vessel, reduced(raw, vessel, smoothed=smoothed)
+
+    def attempt(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
+        return attempted(ship, record, methods[0], options, times=times, progress=progress)
+
+    try:
+        return delivered_anew(raw, vessel, attempt, smoothed=smoothed)
+    except (InputError, NoAnswer) as error:
+        raise _prefixed(error, methods[0]) from None
+
+
 def assess(
     vessel: Vessel,
     record: Record,
     options: EstimateOptions | None = None,
     *,
     tests: Record = NO_TESTS,
+    stated: Vessel | None = None,
     progress: Progress = silent,
 ) -> Assessment:
     """Estimate by every method and simulate every run with every estimate.
@@ -118,6 +153,7 @@ def assess(
         record: estimation data.
         options: methods, fixed parameters and settings.
         tests: runs that are simulated but not used.
+        stated: as the vessel's file has it, where `vessel` has dead times or lags that were found since.
         progress: of the assessment.
 
     Raises:
@@ -134,7 +170,7 @@ def assess(
     for method, own in zip(chosen, each, strict=False):
         own(f"estimating by {method.title}", 0.0)
         try:
-            done.append(_assessed(vessel, record, tests, method, options, own))
+            done.append(_assessed(vessel, stated or vessel, record, tests, method, options, own))
         except (InputError, NoAnswer) as error:
             spare = USES_WIND[method.predictor] or isinstance(error, Diverged)
             if named or not spare or (method is chosen[-1] and not done):
@@ -186,11 +222,19 @@ def _prefixed(error: InputError | NoAnswer, method: Method) -> InputError | NoAn
 
 
 def _assessed(
-    vessel: Vessel, record: Record, tests: Record, method: Method, options: EstimateOptions, progress: Progress
+    vessel: Vessel,
+    stated: Vessel,
+    record: Record,
+    tests: Record,
+    method: Method,
+    options: EstimateOptions,
+    progress: Progress,
 ) -> Assessed:
-    found, start = _estimated(vessel, record, method, options, progress)
+    found, start = _estimated(vessel, stated, record, method, options, progress)
     wind = USES_WIND[method.predictor]
-    model = found.model(vessel.model)
+    now = with_times(vessel, found_times(found, vessel))
+    found = told(found, record, stated, vessel)
+    model = found.model(now.model)
     runs = [
         check_run(model, batch, use=use, wind=wind, integration=options.integration)
         for use, part in ((ESTIMATION, record), (TEST, tests))
@@ -208,6 +252,7 @@ def _assessed(
         one_step=one_step(record, vessel.model, found, fixed=options.fixed, quadrature=options.quadrature),
         breaches=breaches,
         disturbances=_disturbances(found, record, vessel, method),
+        std=now.std,
     )
 
 
@@ -221,25 +266,28 @@ def _disturbances(found: Estimate, record: Record, vessel: Vessel, method: Metho
 
 
 def _estimated(
-    vessel: Vessel, record: Record, method: Method, options: EstimateOptions, progress: Progress
+    vessel: Vessel, stated: Vessel, record: Record, method: Method, options: EstimateOptions, progress: Progress
 ) -> tuple[Estimate, str]:
-    """The estimate, and the start of its first instruments: the vessel's values, or least squares where they fail."""
+    """The estimate, and the start of its first instruments: the vessel's values, or least squares where they fail.
+
+    Its covariance counts errors of dead times and lags, which output error estimates too.
+    """
+    if method.solver == "oe":
+        times = known_times(stated, vessel, record)
+        return attempted(vessel, record, method, options, times=times, progress=progress), ""
+    found, start = _started(vessel, record, method, options)
+
+    def again(other: Record) -> Estimate:
+        return attempted(vessel, other, method, options, start=start or STARTS[0])
+
+    return considered(found, record, vessel, again), start
+
+
+def _started(vessel: Vessel, record: Record, method: Method, options: EstimateOptions) -> tuple[Estimate, str]:
+    """As `_estimated`, with times as they are."""
 
     def attempt(start: str) -> Estimate:
-        weighting = Weighting(mean=options.mean, blocks=options.blocks)
-        settings = Settings(
-            fixed=options.fixed,
-            weighting=weighting,
-            start=start,
-            integration=options.integration,
-            quadrature=options.quadrature,
-            horizon_s=options.horizon_s,
-            constant=options.constant,
-            steered=options.steered,
-            samples=options.samples,
-            worst=worst_case(vessel.sensors, current_mps=options.offset_mps, wind_mps=options.offset_mps),
-        )
-        return estimate(record, vessel.model, method=method.name, settings=settings, progress=progress)
+        return attempted(vessel, record, method, options, start=start)
 
     nominal, ls = STARTS
     if not method.name.startswith(INSTRUMENTAL):
@@ -253,6 +301,34 @@ def _estimated(
     except (Diverged, NotInformative) as error:
         why = f"those of the vessel file fail: {error}"
     return _noted(attempt(ls), why), ls
+
+
+def attempted(
+    vessel: Vessel,
+    record: Record,
+    method: Method,
+    options: EstimateOptions,
+    *,
+    start: str = STARTS[0],
+    times: tuple[ActuatorTime, ...] = (),
+    progress: Progress = silent,
+) -> Estimate:
+    """One estimate; errors as of `assess`."""
+    weighting = Weighting(mean=options.mean, blocks=options.blocks)
+    settings = Settings(
+        fixed=options.fixed,
+        weighting=weighting,
+        start=start,
+        integration=options.integration,
+        quadrature=options.quadrature,
+        horizon_s=options.horizon_s,
+        constant=options.constant,
+        steered=options.steered,
+        samples=options.samples,
+        worst=worst_case(vessel.sensors, current_mps=options.offset_mps, wind_mps=options.offset_mps),
+        times=times,
+    )
+    return estimate(record, vessel.model, method=method.name, settings=settings, progress=progress)
 
 
 def _noted(found: Estimate, why: str) -> Estimate:

@@ -18,6 +18,9 @@ class Tuning:
             meaning.
         method_work, decomposition_work: how long one method takes to how long the decomposition does, for the progress
             told.
+        most_deliveries: how often data are delivered with new dead times and lags, at most.
+        settled_change: change of such a time, in its standard deviations, below which it is not delivered again.
+        time_change: of a time, for derivatives, in samples.
     """
 
     lags: int = 60
@@ -27,6 +30,9 @@ class Tuning:
     cancelling_share: float = 2.0
     method_work: float = 0.9
     decomposition_work: float = 0.1
+    most_deliveries: int = 5
+    settled_change: float = 0.5
+    time_change: float = 0.1
 
 
 TUNING = Tuning()

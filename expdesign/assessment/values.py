@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from expdesign.assessment.limits import Limits
@@ -46,6 +47,7 @@ class Assessed:
         one_step: its residuals.
         breaches: where the data break the excitation condition, for the signals this method uses.
         disturbances: current and wind, from the nuisance parameters and from the measured wind.
+        std: as of `Vessel.std`, with those of dead times and lags that were estimated.
     """
 
     method: Method
@@ -56,6 +58,7 @@ class Assessed:
     one_step: OneStep
     breaches: tuple[Breach, ...]
     disturbances: Disturbances
+    std: Mapping[str, float]
 
     @property
     def uses_instruments(self) -> bool:

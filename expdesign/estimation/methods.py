@@ -201,7 +201,9 @@ def _steered_notes(steered: Steered, method: Method) -> tuple[str, ...]:
 
 
 def _fitting(choices: Settings) -> Fitting:
-    return Fitting(integration=choices.integration, horizon_s=choices.horizon_s, constant=choices.constant)
+    return Fitting(
+        integration=choices.integration, horizon_s=choices.horizon_s, constant=choices.constant, times=choices.times
+    )
 
 
 def _whole(regression: Regression) -> Integers | slice:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from expdesign.errors import UnknownName
 from expdesign.estimation.equation_wise import ALL, SAMPLES
 from expdesign.estimation.excitation import WorstCase
+from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.estimation.tuning import TUNING
@@ -34,6 +35,7 @@ class Settings:
             inputs as planned, or "auto", see `replay.treatment_of`.
         samples: "all", or "equation-wise", see `equation_wise`; output error uses all.
         worst: what signals inside a modulus must exceed in equation-wise samples.
+        times: dead times and lags that output error estimates beside the parameters.
     """
 
     fixed: tuple[str, ...] = ()
@@ -49,6 +51,7 @@ class Settings:
     steered: str = "auto"
     samples: str = ALL
     worst: WorstCase = field(default_factory=WorstCase)
+    times: tuple[ActuatorTime, ...] = ()
 
     def __post_init__(self) -> None:
         if self.steered not in STEERED:

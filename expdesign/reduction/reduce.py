@@ -15,11 +15,14 @@ from expdesign.reduction.remarks import remarks
 from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
 from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch, Delivered, Record
-from expdesign.simulation import deliver, step_shares
+from expdesign.simulation import TIMES, UncertainTime, deliver, delivered_with_slopes, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
 from expdesign.vessel.sensors import NOISE
+
+KNOWN: Mapping[str, float] = {}
+"""Of what is known exactly."""
 
 
 def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
@@ -39,7 +42,7 @@ def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     Raises:
         InputError: no batch is left.
     """
-    delivered = with_delivered_inputs(record, vessel.model)
+    delivered = with_delivered_inputs(record, vessel.model, std=vessel.std)
     delivered = delivered if smoothed else with_averaged_inputs(delivered)
     return _in_stated_weather(at_reference_point(delivered, vessel.sensors, smoothed=smoothed), vessel)
 
@@ -92,7 +95,9 @@ def _blown(batch: Batch, wind_to: Array) -> Batch:
     return replace(batch, wind=batch.velocity[:, :2] - wind)
 
 
-def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array | None = None) -> Record:
+def with_delivered_inputs(
+    record: Record, model: VesselModel, *, standing: Array | None = None, std: Mapping[str, float] = KNOWN
+) -> Record:
     """The record with the mean delivered value of every input over each sample, and over each integrator step in it.
 
     Inputs that are no commands of the model's actuators stay as they are.
@@ -101,12 +106,14 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
         record: with commands as inputs.
         model: whose actuators respond.
         standing: (m,) commands held for long before each batch; None for its first ones.
+        std: standard deviations of what the vessel file states, as in `Vessel.std`; derivatives by dead times and lags
+            that have one come with what is delivered.
     """
     responses = {
         signal: response
         for actuator in model.actuators
         for signal, response in zip(actuator.signals, actuator.responses, strict=True)
-        if response != IDEAL
+        if response != IDEAL or any(std.get(f"{signal}_{quantity}", 0.0) > 0 for quantity in TIMES)
     }
     if not responses or not record.batches:
         return record
@@ -114,7 +121,7 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
     if not names:
         note = "The inputs in the data are forces; the responses that the vessel file states are of other signals."
         return replace(record, notes=(*record.notes, note))
-    batches = tuple(_delivered(batch, responses, standing) for batch in record.batches)
+    batches = tuple(_delivered(batch, responses, standing, std) for batch in record.batches)
     note = (
         f"As the vessel file states, {', '.join(names)} answer commands with lags, dead times, dead bands or offsets; "
         "what they deliver is used."
@@ -122,14 +129,34 @@ def with_delivered_inputs(record: Record, model: VesselModel, *, standing: Array
     return replace(record, batches=batches, notes=(*record.notes, note))
 
 
-def _delivered(batch: Batch, responses: Mapping[str, Response], standing: Array | None) -> Batch:
+def _delivered(
+    batch: Batch, responses: Mapping[str, Response], standing: Array | None, std: Mapping[str, float]
+) -> Batch:
     own = [responses.get(name, IDEAL) for name in batch.input_names]
     time_s, planned = batch.sample_time_s, batch.planned
-    shares = step_shares(own, sample_time_s=time_s, substeps=SUBSTEPS)
-    values = deliver(own, batch.inputs, sample_time_s=time_s, substeps=shares, standing=standing)
     if planned is not None:
         planned = deliver(own[: planned.shape[1]], planned, sample_time_s=time_s)[:, 0]
-    steps = Delivered(values=values, shares=shares)
+    uncertain = {
+        f"{name}_{quantity}": UncertainTime(column=column, quantity=quantity)
+        for column, name in enumerate(batch.input_names)
+        for quantity in TIMES
+        if std.get(f"{name}_{quantity}", 0.0) > 0 and name in responses
+    }
+    if uncertain:
+        (values, shares), (by_values, by_shares) = delivered_with_slopes(
+            own, batch.inputs, tuple(uncertain.values()), sample_time_s=time_s, substeps=SUBSTEPS, standing=standing
+        )
+        steps = Delivered(
+            values=values,
+            shares=shares,
+            times=tuple(uncertain),
+            values_by_time=np.moveaxis(by_values, 0, -1),
+            shares_by_time=by_shares.T,
+        )
+    else:
+        shares = step_shares(own, sample_time_s=time_s, substeps=SUBSTEPS)
+        values = deliver(own, batch.inputs, sample_time_s=time_s, substeps=shares, standing=standing)
+        steps = Delivered(values=values, shares=shares)
     return replace(batch, inputs=steps.mean, delivered=steps, planned=planned)
 
 

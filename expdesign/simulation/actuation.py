@@ -78,14 +78,26 @@ def sample_map(response: Response, *, sample_time_s: float, substeps: int | Arra
     change_s = max(0.0, response.delay_s - lateness * sample_time_s)
     steps_s = step_times(substeps, sample_time_s)
     begins_s = np.cumsum(steps_s) - steps_s
+    early_s = np.clip(change_s - begins_s, 0.0, steps_s)
+    pieces = [
+        [(1, early), (2, rest)] for early, rest in zip(early_s.tolist(), (steps_s - early_s).tolist(), strict=True)
+    ]
+    return mapped(response, lateness, pieces)
+
+
+def mapped(response: Response, lateness: int, pieces: Sequence[Sequence[tuple[int, float]]]) -> SampleMap:
+    """The map where steps consist of pieces: 1 for the earlier command or 2 for the later one, and a time [s].
+
+    The mean over a step of no length is its limit.
+    """
     value, means = np.array([1.0, 0.0, 0.0]), []
-    for begin_s, step_s in zip(begins_s.tolist(), steps_s.tolist(), strict=True):
-        early_s = min(max(change_s - begin_s, 0.0), step_s)
-        total = np.zeros(3)
-        for command, time_s in ((1, early_s), (2, step_s - early_s)):
+    for step in pieces:
+        total, step_s = np.zeros(3), sum(time_s for _, time_s in step)
+        for command, time_s in step:
             area, value = _towards(value, np.eye(3)[command], response.lag_s, time_s)
             total += area
-        means.append(total / step_s)
+        acting = value if response.lag_s > 0 else np.eye(3)[step[-1][0]]
+        means.append(total / step_s if step_s else acting)
     return SampleMap(
         means=np.array(means), end=value, lateness=lateness, deadband=response.deadband, offset=response.offset
     )
@@ -100,7 +112,7 @@ def step_times(substeps: int | Array, sample_time_s: float) -> Array:
 
 def _towards(value: Array, target: Array, lag_s: float, time_s: float) -> tuple[Array, Array]:
     """Time integral and last value of an approach to a held target."""
-    if time_s <= 0:
+    if time_s == 0:
         return np.zeros(3), value
     if lag_s <= 0:
         return time_s * target, target
@@ -136,11 +148,21 @@ def deliver(
     if all(response == IDEAL for response in responses):
         return commands[:, None]
     count = substeps if isinstance(substeps, int) else len(substeps)
-    result = np.repeat(commands[:, None], count, axis=1)
-    for column, response in enumerate(responses):
-        if response == IDEAL:
+    maps = [
+        None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
+        for response in responses
+    ]
+    return deliver_through(maps, commands, count, standing=standing)
+
+
+def deliver_through(
+    maps: Sequence[SampleMap | None], commands: Array, substeps: int, *, standing: Array | None = None
+) -> Array:
+    """(k, substeps, m, ...) by the map of each signal over a sample, None where its response is ideal."""
+    result = np.repeat(commands[:, None], substeps, axis=1)
+    for column, through in enumerate(maps):
+        if through is None:
             continue
-        through = sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
         before = commands[0, column] if standing is None else standing[column]
         start, early, late = _signals(through, commands[:, column], before)
         for step, (of_start, of_early, of_late) in enumerate(through.means.tolist()):

@@ -28,7 +28,7 @@ from expdesign.errors import InputError, NotInformative
 from expdesign.step_trials.holds import Controls
 from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Vessel, VesselModel
+from expdesign.vessel import Vessel, VesselModel, with_response_values
 
 HALVINGS = 24
 DRIFT, MOST_DRIFT = 0.999, 0.99
@@ -362,15 +362,7 @@ def with_delays(vessel: Vessel, controls: Controls, delays: Sequence[tuple[float
     """The vessel with dead times of throttle and rudder (value and standard error) in its file."""
     found: dict[str, tuple[float, float]] = {}
     for names, delay in zip((controls.throttle, controls.rudder), delays, strict=True):
-        found |= {name: delay for name in names if delay is not None}
-    std = {**vessel.std, **{f"{name}_delay_s": delay[1] for name, delay in found.items() if delay[0] > 0}}
-    actuators = tuple(_delayed(actuator, found) for actuator in vessel.actuators)
+        found |= {f"{name}_delay_s": delay for name in names if delay is not None}
+    std = {**vessel.std, **{name: delay[1] for name, delay in found.items() if delay[0] > 0}}
+    actuators = with_response_values(vessel.actuators, {name: delay[0] for name, delay in found.items()})
     return replace(vessel, model=replace(vessel.model, actuators=actuators), std=std)
-
-
-def _delayed(actuator: Actuator, delays: dict[str, tuple[float, float]]) -> Actuator:
-    responses = tuple(
-        replace(response, delay_s=delays[name][0]) if name in delays else response
-        for name, response in zip(actuator.signals, actuator.responses, strict=True)
-    )
-    return replace(actuator, responses=responses)

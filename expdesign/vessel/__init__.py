@@ -28,7 +28,7 @@ from expdesign.vessel.model import VesselModel
 from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
-from expdesign.vessel.vessel import Vessel, std_keys
+from expdesign.vessel.vessel import Vessel, response_values, std_keys, with_response_values
 
 __all__ = [
     "CALM",
@@ -70,8 +70,10 @@ __all__ = [
     "limit_keys",
     "required_force",
     "response_keys",
+    "response_values",
     "std_keys",
     "stem",
     "structure_terms",
+    "with_response_values",
     "within_limits",
 ]

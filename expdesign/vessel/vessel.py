@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -20,6 +20,28 @@ def std_keys(actuators: Sequence[Actuator]) -> tuple[str, ...]:
     """Names of what may have a standard deviation: the faults of sensors, and e.g. "n1_lag_s" of actuator signals."""
     signals = [signal for actuator in actuators for signal in actuator.signals]
     return (*FAULTS, *(f"{signal}_{field.name}" for signal in signals for field in fields(Response)))
+
+
+def response_values(actuators: Sequence[Actuator]) -> dict[str, float]:
+    """What actuators state of their responses, by the names of `std_keys`."""
+    return {
+        f"{signal}_{field.name}": getattr(response, field.name)
+        for actuator in actuators
+        for signal, response in zip(actuator.signals, actuator.responses, strict=True)
+        for field in fields(Response)
+    }
+
+
+def with_response_values(actuators: Sequence[Actuator], values: Mapping[str, float]) -> tuple[Actuator, ...]:
+    """The actuators with other values of their responses, by the names of `std_keys`."""
+
+    def changed(signal: str, response: Response) -> Response:
+        own = {field.name: values.get(f"{signal}_{field.name}") for field in fields(Response)}
+        return replace(response, **{name: value for name, value in own.items() if value is not None})
+
+    return tuple(
+        replace(actuator, responses=tuple(map(changed, actuator.signals, actuator.responses))) for actuator in actuators
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ without any share of the first error, as the first velocities are estimated: lam
 estimate by instruments lambda, and its covariance that of such an estimate: exact for noise of sensors and for forces,
 white or slow, with the variances that explain eps best. Standard deviations grow where the variance changes, and by
 Student's t, as in `solve.sandwich`. Where the parts do not explain eps, they are those that a kernel finds in r where
-these are larger.
+these are larger. What is known of actuators' times beforehand, with precision L in units of the cost,
+adds to G, and its own errors of variance S add G^-1 L S L G^-1.
 
 Source: the adjoint after A. E. Bryson and Y.-C. Ho, Applied Optimal Control (1975), 2.2.
 """
@@ -33,6 +34,9 @@ from expdesign.estimation.solve import Solution, Weighting, changing_variance, m
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Record
 from expdesign.values import Array
+
+EVERY = -1
+"""In place of an output: all of them."""
 
 
 def with_covariance(
@@ -55,16 +59,36 @@ def with_covariance(
         outputs=layout.model.outputs,
     )
     weighting = Weighting(output_weights=tuple(problem.weights / problem.weights.max()), covariance="hc0")
-    last = solve_ls(regression, weighting)
+    whole = _with_known(regression, problem, values)
+    last = solve_ls(whole, weighting)
     P, misfit = _propagated(problem, layout, record, simulated)
     if (misfit > TUNING.spectrum_misfit).any():
-        robust = solve_ls(regression, replace(weighting, covariance="hac"))
+        robust = solve_ls(whole, replace(weighting, covariance="hac"))
         own, other = np.diag(P), np.diag(robust.covariance)
         scale = np.sqrt(np.divide(np.maximum(own, other), own, out=np.ones_like(own), where=own > 0))
         P = P * np.outer(scale, scale)
         note = misfit_note(regression.outputs, misfit)
         last = replace(last, lags=robust.lags, warnings=(*last.warnings, note))
-    return replace(last, values=values[: len(names)] + last.values, covariance=P), regression
+    last = replace(last, values=values[: len(names)] + last.values, residuals=last.residuals[: len(regression)])
+    return replace(last, covariance=P), regression
+
+
+def _with_known(regression: Regression, problem: Problem, values: Array) -> Regression:
+    """The regression with what is known of times beforehand as more rows, in a batch of their own."""
+    count, first = problem.beyond, problem.parameters - problem.beyond
+    if not count:
+        return regression
+    root = np.sqrt(problem.precision[first:] / problem.weights[0])
+    Phi, y = np.zeros((count, *regression.Phi.shape[1:])), np.zeros((count, regression.y.shape[1]))
+    Phi[np.arange(count), 0, first + np.arange(count)] = root
+    y[:, 0] = -root * problem.departure(values)[first:]
+    return replace(
+        regression,
+        Phi=np.concatenate([regression.Phi, Phi]),
+        y=np.concatenate([regression.y, y]),
+        batch=np.append(regression.batch_of, np.full(count, regression.batch_of[-1] + 1)),
+        step=np.append(regression.step_of, np.arange(count)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +141,9 @@ def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Li
     A, slopes = simulated.steps, _columns(simulated.slopes, problem, layout)[0]
     lead = slopes * np.where(np.isfinite(problem.measured), problem.weights, 0.0)[..., None]
     sensed = np.einsum("lwna,lwnb->nab", lead, lead, optimize=True)
-    G = _inverse(np.tensordot(1.0 / problem.weights, sensed, 1))
+    known = np.zeros((2, slopes.shape[-1]))
+    known[:, : problem.parameters] = problem.precision, problem.precision * problem.spread
+    G = _inverse(np.tensordot(1.0 / problem.weights, sensed, 1) + np.diag(known[0]))
     for sample in range(len(lead) - 2, -1, -1):  # summed backwards to lambda, in place
         lead[sample] += A[sample].swapaxes(1, 2) @ lead[sample + 1]
     rows, errors, owner = _steps_of(problem, record), simulated.errors, _owners(problem, layout)
@@ -126,14 +152,15 @@ def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Li
     eps = rows.of(errors[1:] - np.einsum("lwab,lwb->lwa", A, errors[:-1]))
     by = []
     for output in range(len(layout.model.outputs)):
-        own = np.flatnonzero(owner == output)
+        own = np.flatnonzero((owner == output) | (owner == EVERY))
         Phi = slopes[1:, :, output, own] - np.einsum("lwb,lwbp->lwp", A[:, :, output], slopes[:-1, :, :, own])
         by.append(Fitted(rows.of(Phi), W[:, output, own]))
     found = fit_coupled(eps, rows.of(A), rows.parts, by)
     P, doubt = coupled_covariance(W, G @ sensed @ G, found, rows.parts)
     changing = changing_variance(W, eps, rows.batch, rows.step)
     scale = changing * widening(np.diag(P), doubt)
-    return P * np.outer(scale, scale), found.misfit
+    beforehand = G * known[1]
+    return P * np.outer(scale, scale) + beforehand @ beforehand.T, found.misfit
 
 
 def _inverse(information: Array) -> Array:
@@ -142,12 +169,12 @@ def _inverse(information: Array) -> Array:
 
 
 def _owners(problem: Problem, layout: Layout) -> Integers:
-    """(p,) the output in whose equation each parameter stands, and each constant."""
+    """(p,) the output in whose equation each parameter and each constant stands; times act in every one."""
     model = layout.model
     equations = [model.terms[model.names.index(name)].equation for name in layout.parameters]
     found = [model.outputs.index(name) for name in equations]
     runs = int(problem.batch.max()) + 1 if problem.constant else 0
-    return np.array([*found, *(list(range(len(model.outputs))) * runs)])
+    return np.array([*found, *([EVERY] * problem.beyond), *(list(range(len(model.outputs))) * runs)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,12 +218,13 @@ def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
 
 
 def _columns(slopes: Array, problem: Problem, layout: Layout) -> tuple[Array, tuple[str, ...]]:
-    """Parameters, then the constants of each run."""
+    """Parameters and times, then the constants of each run."""
     p, outputs = problem.parameters, layout.model.outputs
+    sought = (*layout.parameters, *problem.compiled.stretches.times)
     if not problem.constant:
-        return slopes, layout.parameters
+        return slopes, sought
     runs = int(problem.batch.max()) + 1
     member = (problem.batch[:, None] == np.arange(runs)).astype(float)
     own = np.einsum("lwns,wb->lwnbs", slopes[..., p:], member).reshape(*slopes.shape[:3], -1)
     names = [f"constant d{name}/dt of run {number + 1}" for number in range(runs) for name in outputs]
-    return np.concatenate([slopes[..., :p], own], axis=3), (*layout.parameters, *names)
+    return np.concatenate([slopes[..., :p], own], axis=3), (*sought, *names)

@@ -16,8 +16,9 @@ from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 
-def _cost(problem: Problem, residuals: Array) -> float:
+def _cost(problem: Problem, values: Array, residuals: Array) -> float:
     cost = float(np.einsum("lwn,n->", residuals**2, problem.weights))
+    cost += float(problem.precision @ problem.departure(values) ** 2)
     return cost if np.isfinite(cost) else np.inf
 
 
@@ -46,7 +47,7 @@ def minimised(
         if not np.isfinite(point.cost):
             raise NoAnswer(_RUNS_AWAY.format(seconds=len(point.states) * problem.compiled.stretches.sample_time_s))
         for _ in range(TUNING.most_steps):
-            normal, least = _normal(problem, point.values, point.states), settled * _unit(problem, point.states)
+            normal, least = _normal(problem, point.values, point.states), settled * unit(problem, point.states)
             newer = None
             while newer is None:
                 move = _step(normal, damping)
@@ -88,7 +89,7 @@ class Move:
 
 def _point(problem: Problem, values: Array, starts: Array) -> Point:
     states = problem.states(values, starts)
-    return Point(values, starts, states, _cost(problem, problem.residuals(states)))
+    return Point(values, starts, states, _cost(problem, values, problem.residuals(states)))
 
 
 def _lower(problem: Problem, point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> Point | None:
@@ -119,7 +120,7 @@ def _mixed(point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> tu
     return values, starts
 
 
-def _unit(problem: Problem, states: Array) -> float:
+def unit(problem: Problem, states: Array) -> float:
     """The cost of a squared standard deviation of the estimate; 1 for white residuals of the variance of the weights.
 
     Residuals with correlation rho from sample to sample tell (1 - rho) / (1 + rho) as much as white ones: errors of a
@@ -170,8 +171,9 @@ def _normal(problem: Problem, values: Array, states: Array) -> Normal:
             rows, misfit = by_v[own].reshape(-1, q), left[own].reshape(-1)
             V_b[number or 0] += rows.T @ rows
             g_b[number or 0] += rows.T @ misfit
+    known, towards = np.diag(problem.precision), -problem.precision * problem.departure(values)
     if not problem.constant:
-        return Normal(S=S, C=near, V=V_b[0], gradient_s=g_s, gradient_v=g_b[0])
+        return Normal(S=S, C=near, V=V_b[0] + known, gradient_s=g_s, gradient_v=g_b[0] + towards)
     C, V, g = np.zeros((count, n, len(values))), np.zeros((len(values),) * 2), np.zeros(len(values))
     for number in range(runs):
         places = np.concatenate([np.arange(p), p + number * n + np.arange(n)])
@@ -179,6 +181,8 @@ def _normal(problem: Problem, values: Array, states: Array) -> Normal:
         C[np.ix_(own, np.arange(n), places)] = near[own]
         V[np.ix_(places, places)] += V_b[number]
         g[places] += g_b[number]
+    V[:p, :p] += known
+    g[:p] += towards
     return Normal(S=S, C=C, V=V, gradient_s=g_s, gradient_v=g)
 
 

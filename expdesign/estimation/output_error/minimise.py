@@ -7,6 +7,9 @@ of IV. Unmodelled forces accumulate in a simulation, and simulations of course-u
 motion; a shorter horizon limits both. Optionally each run has a constant acceleration, for steady unmodelled forces.
 Measured wind acts through the b-frame velocity of the air, ship velocity minus relative wind, without a heading.
 
+Dead times and lags of actuators that are not known exactly are estimated beside the parameters. What is known of them
+beforehand counts as one more measurement, and their errors are in the covariance.
+
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
 samples. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
@@ -18,13 +21,13 @@ Systems (1981), 102-125, for the stretches.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.output_error.covariance import with_covariance
-from expdesign.estimation.output_error.gauss_newton import minimised
+from expdesign.estimation.output_error.gauss_newton import minimised, unit
 from expdesign.estimation.output_error.problem import (
     Excerpt,
     Fitting,
@@ -64,7 +67,10 @@ def minimise_output_error(
     """
     weights = 1.0 / _at_least(start.residuals.var(axis=0), record, layout)
     values = np.concatenate(
-        [start.values[: len(layout.parameters)], np.zeros(len(record.batches) * len(layout.model.outputs))]
+        [
+            start.values[: len(layout.parameters)],
+            np.zeros(len(fitting.times) + len(record.batches) * len(layout.model.outputs)),
+        ]
     )
     stages = _stages(record, fitting)
     steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
@@ -72,13 +78,22 @@ def minimise_output_error(
     for stage in stages:
         problem = build_problem(layout, record, fitting, stage.excerpt, weights)
         steps.begin()
-        values, starts = minimised(
-            problem, values, first_states(problem, found), settled=stage.settled, told=steps.told
-        )
+        starts = first_states(problem, found)
+        problem = _weighed(problem, values, starts)
+        values, starts = minimised(problem, values, starts, settled=stage.settled, told=steps.told)
         found = dict(zip(problem.places, starts, strict=True))
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
     steps.end()
     return with_covariance(problem, layout, record, values, starts)
+
+
+def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:
+    """With what is known beforehand in units of the cost, whose residuals count as white."""
+    if not problem.beyond:
+        return problem
+    with np.errstate(over="ignore", invalid="ignore"):
+        own = unit(problem, problem.states(values, starts))
+    return replace(problem, precision=problem.precision * own)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,21 @@ from expdesign.values import Array
 
 
 @dataclass(frozen=True, kw_only=True)
+class ActuatorTime:
+    """What is known beforehand of a dead time or a lag.
+
+    Attributes:
+        name: as in `vessel.std_keys`.
+        change_s: expected value less the one that the data are delivered with [s].
+        std_s: standard deviation [s].
+    """
+
+    name: str
+    change_s: float
+    std_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Fitting:
     """How simulations are compared with the data.
 
@@ -23,11 +38,13 @@ class Fitting:
         integration: how the model is simulated.
         horizon_s: length of a stretch [s], None for whole runs.
         constant: whether each run has a constant acceleration of its own.
+        times: dead times and lags that are estimated too.
     """
 
     integration: Integration
     horizon_s: float | None = None
     constant: bool = False
+    times: tuple[ActuatorTime, ...] = ()
 
     def __post_init__(self) -> None:
         if self.horizon_s is not None and not 0 < self.horizon_s < np.inf:
@@ -49,6 +66,9 @@ class Problem:
         batch: (W,) number of the run.
         first: (W,) sample of the run at which each stretch begins.
         constant: whether constants are estimated.
+        expected: (p,) values known beforehand; of parameters, which count as unknown, zero.
+        precision: (p,) what the cost adds for squared differences from these; of parameters zero.
+        spread: (p,) standard deviations of these; of parameters zero.
     """
 
     compiled: Compiled
@@ -57,11 +77,23 @@ class Problem:
     batch: Integers
     first: Integers
     constant: bool
+    expected: Array
+    precision: Array
+    spread: Array
 
     @property
     def parameters(self) -> int:
-        """Number of estimated parameters, without constants."""
-        return len(self.compiled.stretches.sought)
+        """Number p of estimated parameters and times, without constants."""
+        return self.compiled.stretches.values
+
+    @property
+    def beyond(self) -> int:
+        """Number of times among these, the last ones."""
+        return len(self.compiled.stretches.times)
+
+    def departure(self, values: Array) -> Array:
+        """(p,) values less those known beforehand."""
+        return np.asarray(values[: self.parameters] - self.expected)
 
     @property
     def places(self) -> list[Place]:
@@ -116,7 +148,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
     model, time_s, samples = layout.model, excerpt.every * sample_time(record), excerpt.samples
     states = tuple(OUTPUTS.index(name) for name in model.outputs)
     read = [_read(batch)[:: excerpt.every, states] for batch in record.batches]
-    drives = [_means(_drive(layout, batch, fitting.integration.substeps), excerpt.every) for batch in record.batches]
+    drives = [_means(_drive(layout, batch, fitting), excerpt.every) for batch in record.batches]
     cuts = [(number, first) for number, rows in enumerate(read) for first in _firsts(len(rows), samples)]
     cuts = cuts[:: max(1, int(sum(map(len, read)) / excerpt.most))]
     ends = [_end(first, samples, len(read[number])) for number, first in cuts]
@@ -139,6 +171,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
                 integrator=fitting.integration.integrator,
                 substeps=fitting.integration.substeps,
                 parts=parts_of(record.batches[0], substeps=fitting.integration.substeps),
+                times=tuple(time.name for time in fitting.times),
                 counts=np.array([end - first for (_, first), end in zip(cuts, ends, strict=True)]),
             )
         ),
@@ -147,6 +180,9 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
         batch=np.array([number for number, _ in cuts]),
         first=np.array([first for _, first in cuts]),
         constant=fitting.constant,
+        expected=np.array([0.0] * len(layout.parameters) + [time.change_s for time in fitting.times]),
+        precision=np.array([0.0] * len(layout.parameters) + [time.std_s**-2 for time in fitting.times]),
+        spread=np.array([0.0] * len(layout.parameters) + [time.std_s for time in fitting.times]),
     )
 
 
@@ -171,9 +207,10 @@ def _read(batch: Batch) -> Array:
     return batch.velocity if batch.interpolated is None else np.where(batch.interpolated > 0, np.nan, batch.velocity)
 
 
-def _drive(layout: Layout, batch: Batch, substeps: int) -> Array:
+def _drive(layout: Layout, batch: Batch, fitting: Fitting) -> Array:
     """(k, c) as of `drive_of`, and the b-frame wind where it is used; missing wind takes the last known value."""
-    inputs = drive_of(layout.model, batch, substeps=substeps)
+    names = tuple(time.name for time in fitting.times)
+    inputs = drive_of(layout.model, batch, substeps=fitting.integration.substeps, times=names)
     if not np.isfinite(inputs).all():
         raise InputError(f"{batch.name}: output error needs inputs at every sample; some are not numbers")
     if not layout.predictor.wind:

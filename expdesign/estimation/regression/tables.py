@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -71,19 +72,28 @@ def inputs_of(model: VesselModel, batch: Batch) -> Array:
     return batch.inputs[:, [batch.input_names.index(name) for name in model.inputs]]
 
 
-def drive_of(model: VesselModel, batch: Batch, *, substeps: int) -> Array:
-    """(k, m) inputs held over each sample, or (k, s m + s) those of its s parts, and their shares of it.
+def drive_of(model: VesselModel, batch: Batch, *, substeps: int, times: Sequence[str] = ()) -> Array:
+    """(k, c) inputs held over each sample, c = m, or those of its s parts and their shares of it, c = s m + s.
 
     Args:
         model: gives the order of inputs.
         batch: recorded, or with delivered inputs.
         substeps: integrator steps per sample; a single one takes the mean over it.
+        times: names of uncertain times of the actuators; derivatives by each follow in c columns [1/s].
     """
-    if parts_of(batch, substeps=substeps) == 1:
+    steps, held = batch.delivered, parts_of(batch, substeps=substeps) == 1
+    if steps is None:
         return inputs_of(model, batch)
-    assert batch.delivered is not None  # as it has parts
-    values, count = _delivered(model, batch), len(batch)
-    return np.hstack([values.reshape(count, -1), np.tile(batch.delivered.shares, (count, 1))])
+    order, count = [batch.input_names.index(name) for name in model.inputs], len(batch)
+    places = [steps.times.index(name) for name in times]
+    values, shares = steps.values[:, :, order], steps.shares
+    pairs = [(values, shares)]
+    for place in places:
+        pairs.append((steps.values_by_time[:, :, order, place], steps.shares_by_time[:, place]))
+    if not held:
+        return np.hstack([x for v, s in pairs for x in (v.reshape(count, -1), np.tile(s, (count, 1)))])
+    moved = [np.einsum("ksm,s->km", v, shares) + np.einsum("ksm,s->km", values, s) for v, s in pairs[1:]]
+    return np.hstack([inputs_of(model, batch), *moved])
 
 
 def drive_width(inputs: int, parts: int) -> int:

@@ -92,7 +92,7 @@ def stretch_functions(
     """
     m, n = stretches.drive.shape[2], len(stretches.states)
     step = velocity_step(stretches)
-    x, u, values = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("t", len(stretches.sought) + n)
+    x, u, values = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("t", stretches.values + n)
     after = step(x, u, values)
     # reverse mode: there are three outputs and some thirty values
     reverse = {"helper_options": {"ad_weight": 1}}
@@ -132,10 +132,13 @@ def called(function: ca.Function, shapes: tuple[tuple[int, ...], ...]) -> Called
 
 
 def velocity_step(problem: Stretches) -> ca.Function:
-    """One sample of the modelled velocities: (state (n,), drive (m,), values (p + n,)) -> state."""
-    model, n, p = problem.model, len(problem.states), len(problem.sought)
+    """One sample of the modelled velocities: (state (n,), drive (c,), values (p + n,)) -> state.
+
+    Values are parameters, changes of times, and accelerations.
+    """
+    model, n, p = problem.model, len(problem.states), problem.values
     x, drive, values = ca.SX.sym("x", n), ca.SX.sym("i", problem.drive.shape[2]), ca.SX.sym("p", p + n)
-    held, wind = _split(drive, len(model.inputs), problem.parts, problem.windy)
+    held, wind = _split(_at_times(problem, drive, values), len(model.inputs), problem.parts, problem.windy)
     theta = ca.SX(model.parameters)
     for index, place in enumerate(problem.sought):
         theta[place] = values[index]
@@ -150,6 +153,15 @@ def velocity_step(problem: Stretches) -> ca.Function:
 
     after = _stepped(rates, x, held, problem.sample_time_s, problem.integrator, problem.substeps)
     return ca.Function("velocities", [x, drive, values], [after], {"cse": True})
+
+
+def _at_times(problem: Stretches, drive: ca.SX, values: ca.SX) -> ca.SX:
+    """What acts after the changes of times, without the derivatives by them."""
+    width, first = drive_width(len(problem.model.inputs), problem.parts), len(problem.sought)
+    acting, wind = drive[:width], drive[width * (1 + len(problem.times)) :]
+    for index in range(len(problem.times)):
+        acting += values[first + index] * drive[width * (1 + index) : width * (2 + index)]
+    return ca.vertcat(acting, wind)
 
 
 Held = list[tuple[Any, list[ca.SX]]]

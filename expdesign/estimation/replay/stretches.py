@@ -29,11 +29,13 @@ class Stretches:
         model: structure; gives the values of parameters not sought.
         sought: (p,) places of the parameters to find, among the model's.
         states: (n,) places of the velocities that have an equation, among u, v, r.
-        drive: (L, W, c) inputs as of `drive_of`; two columns more, the wind's velocity in the b-frame, where `windy`.
+        drive: (L, W, c) inputs as of `drive_of` with these times; two columns more, the wind's velocity in the b-frame,
+            where `windy`.
         windy: whether air velocities are those of that wind.
         sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.
         parts: of a sample, with inputs of their own.
+        times: (u,) names of uncertain times of actuators, whose changes [s] are sought too, after the parameters.
         counts: (W,) samples of each stretch; L for all when left out.
     """
 
@@ -46,12 +48,18 @@ class Stretches:
     integrator: str
     substeps: int
     parts: int = 1
+    times: tuple[str, ...] = ()
     counts: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         length, count = self.drive.shape[:2]
         if len(self.counts) != count:
             frozen_set(self, "counts", np.full(count, length))
+
+    @property
+    def values(self) -> int:
+        """Number of values sought: parameters and changes of times."""
+        return len(self.sought) + len(self.times)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -84,9 +84,10 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
         "estimate.json. parameter_std holds the standard deviations of the estimates.",
         motion_words(found),
         *([f"Fixed parameters, without standard deviation: {held}."] if held else []),
+        *(["Dead times and lags in [std] are those that output error found."] if best.std != vessel.std else []),
         f"Made by: {command}",
     ]
-    return vessel_toml(replace(vessel, model=best.model), comments=comments)
+    return vessel_toml(replace(vessel, model=best.model, std=best.std), comments=comments)
 
 
 def limit_entries(found: Assessment) -> dict[str, Any]:

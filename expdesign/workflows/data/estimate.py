@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess
+from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess, settled
 from expdesign.errors import InputError
 from expdesign.export import (
     disturbance_table,
@@ -28,7 +28,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
-from expdesign.workflows.steps.measured import reduced_data
+from expdesign.workflows.steps.measured import measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
@@ -75,10 +75,12 @@ def estimate(
         samples=samples,
         offset_mps=offset_mps,
     )
-    record = reduced_data(data, ship, velocity=velocity)
-    apart = reduced_data(tests, ship, velocity=velocity) if tests else NO_TESTS
+    raw = measured(data, ship, velocity=velocity)
     with workers(0, load=None):
-        found = assess(ship, record, options, tests=apart, progress=within(progress, 0.01, 0.7))
+        now, record = settled(ship, raw, options, smoothed=velocity == "smoothed", progress=within(progress, 0.01, 0.4))
+        apart = reduced_data(tests, now, velocity=velocity) if tests else NO_TESTS
+        begun = 0.01 if now is ship else 0.4
+        found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
     command = command_text(
         "estimate",

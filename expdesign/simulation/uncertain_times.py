@@ -1,0 +1,137 @@
+"""What actuators deliver, and its derivatives by their dead times and lags.
+
+Samples are divided where commands arrive. A later arrival lengthens the part before it and shortens the part after it:
+what acts in the parts stays, so that simulated motion is smooth in dead times. Parts may have no length, where commands
+arrive together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.simulation.actuation import SampleMap, deliver_through, mapped
+from expdesign.values import Array
+from expdesign.vessel import IDEAL, Response
+
+SMALL = 1e-4
+"""Change of a time that derivatives are taken by, in samples."""
+TIMES = ("delay_s", "lag_s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertainTime:
+    """A time of an actuator signal that is not known exactly.
+
+    Attributes:
+        column: of the signal, among the inputs.
+        quantity: one of `TIMES`.
+    """
+
+    column: int
+    quantity: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Division:
+    """Which commands act in which parts of a sample.
+
+    Attributes:
+        begins: shares of the sample at which equal parts begin.
+        arriving: columns of the signals whose arrivals divide it, in the order of `places`.
+        places: of these arrivals among all begins of parts.
+        lateness: whole samples of each signal's dead time.
+    """
+
+    begins: tuple[float, ...]
+    arriving: tuple[int, ...]
+    places: tuple[int, ...]
+    lateness: tuple[int, ...]
+
+    def shares(self, responses: Sequence[Response], sample_time_s: float) -> Array:
+        """(s,) of the sample, which parts take; responses may differ a little from those that it is made for."""
+        begins = np.full(len(self.begins) + len(self.arriving), np.nan)
+        begins[list(self.places)] = [
+            responses[column].delay_s / sample_time_s - self.lateness[column] for column in self.arriving
+        ]
+        begins[np.isnan(begins)] = self.begins
+        return np.diff(np.append(begins, 1.0))
+
+    def maps(self, responses: Sequence[Response], sample_time_s: float) -> list[SampleMap | None]:
+        """Of each signal over a sample."""
+        steps_s, first = sample_time_s * self.shares(responses, sample_time_s), dict.fromkeys(range(len(responses)), 0)
+        first |= dict(zip(self.arriving, self.places, strict=True))
+        return [
+            mapped(
+                response,
+                self.lateness[column],
+                [[(1 if part < first[column] else 2, step_s)] for part, step_s in enumerate(steps_s.tolist())],
+            )
+            for column, response in enumerate(responses)
+        ]
+
+
+def division(
+    responses: Sequence[Response], times: Sequence[UncertainTime], *, sample_time_s: float, substeps: int
+) -> Division:
+    """A sample divided into equal parts, and where late commands arrive or may."""
+    late = [response.delay_s / sample_time_s for response in responses]
+    lateness = tuple(math.floor(share + 1e-9) for share in late)
+    moving = {time.column for time in times if time.quantity == "delay_s"}
+    arriving = [column for column, share in enumerate(late) if share > 0 or column in moving]
+    begins = [part / substeps for part in range(substeps)]
+    order = np.argsort([*begins, *(max(late[column] - lateness[column], 0.0) for column in arriving)], kind="stable")
+    places = {index - substeps: place for place, index in enumerate(order.tolist()) if index >= substeps}
+    return Division(
+        begins=tuple(begins),
+        arriving=tuple(arriving),
+        places=tuple(places[index] for index in range(len(arriving))),
+        lateness=lateness,
+    )
+
+
+def delivered_with_slopes(
+    responses: Sequence[Response],
+    commands: Array,
+    times: Sequence[UncertainTime],
+    *,
+    sample_time_s: float,
+    substeps: int,
+    standing: Array | None = None,
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Delivered values (k, s, m) and shares (s,) of parts of samples, and both by the times (u, k, s, m), (u, s) [1/s].
+
+    Args:
+        responses: one for each signal.
+        commands: (k, m) held.
+        times: to take derivatives by.
+        sample_time_s: time between samples [s].
+        substeps: equal parts that are divided.
+        standing: (m,) commands that stood before the first sample; None for those of the first sample.
+    """
+    parts = division(responses, times, sample_time_s=sample_time_s, substeps=substeps)
+
+    def given(own: Sequence[Response]) -> tuple[Array, Array]:
+        shares = parts.shares(own, sample_time_s)
+        maps: list[SampleMap | None] = [
+            None if responses[column] == IDEAL and column not in moved else through
+            for column, through in enumerate(parts.maps(own, sample_time_s))
+        ]
+        return deliver_through(maps, commands, len(shares), standing=standing), shares
+
+    moved, slopes = {time.column for time in times}, []
+    for time in times:
+        was, own = getattr(responses[time.column], time.quantity), list(responses)
+        ends = was + SMALL * sample_time_s, max(was - SMALL * sample_time_s, 0.0)
+        found = []
+        for value in ends:
+            own[time.column] = replace(responses[time.column], **{time.quantity: value})
+            found.append(given(own))
+        (values, shares), (values_before, shares_before) = found
+        step_s = ends[0] - ends[1]
+        slopes.append(((values - values_before) / step_s, (shares - shares_before) / step_s))
+    by_time = np.stack([by for by, _ in slopes]), np.stack([by for _, by in slopes])
+    return given(responses), by_time
