@@ -21,6 +21,7 @@ from expdesign.estimation.values import Estimate
 from expdesign.reduction import reduced
 from expdesign.signals import Batch, Record
 from expdesign.simulation import TIMES
+from expdesign.values import Array
 from expdesign.vessel import Vessel, response_values, with_response_values
 
 Attempt = Callable[[Vessel, Record, tuple[ActuatorTime, ...]], Estimate]
@@ -99,14 +100,22 @@ def considered(found: Estimate, record: Record, vessel: Vessel, again: Callable[
     names = uncertain(record)
     if not names:
         return found
-    joint, columns = np.concatenate([found.values, found.nuisance_values]), []
+    columns = []
     for name in names:
         step_s = min(vessel.std[name], TUNING.time_change * record.batches[0].sample_time_s)
-        other = again(replace(record, batches=tuple(_moved(batch, name, step_s) for batch in record.batches)))
-        columns.append((np.concatenate([other.values, other.nuisance_values]) - joint) * vessel.std[name] / step_s)
+        later, sooner = (
+            again(replace(record, batches=tuple(_moved(batch, name, change_s) for batch in record.batches)))
+            for change_s in (step_s, -step_s)
+        )
+        columns.append((_joint(later) - _joint(sooner)) * vessel.std[name] / (2 * step_s))
     grown = found.joint_covariance + np.array(columns).T @ np.array(columns)
     p = len(found.names)
     return replace(found, covariance=grown[:p, :p], joint_covariance=grown)
+
+
+def _joint(found: Estimate) -> Array:
+    """(p + q,) parameters, then nuisance parameters."""
+    return np.concatenate([found.values, found.nuisance_values])
 
 
 def _moved(batch: Batch, name: str, change_s: float) -> Batch:
