@@ -18,9 +18,8 @@ import numpy as np
 from expdesign.assessment.tuning import TUNING
 from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.values import Estimate
-from expdesign.reduction import reduced
+from expdesign.reduction import TIMES, reduced
 from expdesign.signals import Batch, Record
-from expdesign.simulation import TIMES
 from expdesign.values import Array
 from expdesign.vessel import Vessel, response_values, with_response_values
 

@@ -14,5 +14,6 @@ from expdesign.reduction.reduce import (
     with_delivered_inputs,
     with_reduced_wind,
 )
+from expdesign.reduction.uncertain_times import TIMES
 
-__all__ = ["at_reference_point", "reduced", "with_delivered_inputs", "with_reduced_wind"]
+__all__ = ["TIMES", "at_reference_point", "reduced", "with_delivered_inputs", "with_reduced_wind"]

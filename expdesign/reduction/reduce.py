@@ -14,8 +14,9 @@ from expdesign.errors import InputError
 from expdesign.reduction.remarks import remarks
 from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
 from expdesign.reduction.tuning import TUNING
+from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 from expdesign.signals import Batch, Delivered, Record
-from expdesign.simulation import TIMES, UncertainTime, deliver, delivered_with_slopes, step_shares
+from expdesign.simulation import deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel

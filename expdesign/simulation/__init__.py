@@ -4,8 +4,10 @@ from expdesign.simulation.actuation import (
     ActuatorState,
     SampleMap,
     deliver,
+    deliver_through,
     delivered,
     delivered_at_samples,
+    mapped,
     past_deadband,
     sample_map,
     step_shares,
@@ -26,12 +28,10 @@ from expdesign.simulation.rolling import rudder_angle, steering_signals
 from expdesign.simulation.run import integrate_motion, simulate, simulate_many
 from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
-from expdesign.simulation.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 
 __all__ = [
     "CALM",
     "STEADY",
-    "TIMES",
     "ActuatorState",
     "Approach",
     "Conduct",
@@ -39,17 +39,17 @@ __all__ = [
     "Environment",
     "Helm",
     "SampleMap",
-    "UncertainTime",
     "Variation",
     "WeatherSeries",
     "deliver",
+    "deliver_through",
     "delivered",
     "delivered_at_samples",
-    "delivered_with_slopes",
     "draw_environment",
     "draw_weather",
     "euler_step",
     "integrate_motion",
+    "mapped",
     "mean_weather",
     "measure",
     "motion_rates",

@@ -2,8 +2,9 @@
 
 ``python tests/benchmarks/uncertain_times.py [--trials N] [--seed S]``: three runs of a minute, a zig-zag, waves and a
 pull-out of `dictionaries/fast-8m.toml`, are sailed by `fast-8m-true.toml` with noise, in waves that move it by 0.1 m/s,
-with dead times of 0.5 s. The vessel file states dead times that are drawn around these with 0.15 s. Errors are root mean
-squares over parameters of the error over the builder's standard deviation, stated ones the same of standard deviations.
+with dead times of 0.5 s. The vessel file states dead times that are drawn around these with 0.15 s. Errors are root
+mean squares over parameters of the error over the builder's standard deviation, stated ones the same of standard
+deviations.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.simulation.actuation import SampleMap, deliver_through, mapped
+from expdesign.simulation import SampleMap, deliver_through, mapped
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Response
 
