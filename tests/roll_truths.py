@@ -16,6 +16,8 @@ MODEL_SHIP_TRUTH = parameters(
     k=9.0, A_x=0.157, d=0.267, K_r=-2.0, K_vd=0.95, K_delta=-0.45, z_f=-0.0294, m=0.4, z_m=-0.268
 )
 """Near the estimates of the thesis's model ship (its tables of chapter 6)."""
+System = tuple[Array, Array, Array, Array]
+Helm = tuple[float, float, float]
 SERVO_S = 0.1
 """Lag of the rudder behind its orders."""
 
@@ -64,7 +66,7 @@ def pendulum_run(
     B = np.array([[0.0, 0.0], [0.0, 1.0 / inertia], [1.0 / lag_s, 0.0]])
     sensed = body.z_s * A[1] + [9.81, 0.0, -1.0], body.z_s * B[1]
     C, D = np.array([[0, 1.0, 0], sensed[0], [0, 0, 0]]), np.array([[0, 0], sensed[1], [0, 0]])
-    return _measured((A, B, C, D), rudder, sea, step_s, rng)
+    return _measured(_steered((A, B, C, D)), rudder, sea, step_s, rng)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +81,7 @@ class Hull:
     sway_by_roll_acceleration: float = 0.3
 
 
-def ship_system(theta: Array, body: Body, load: Load, hull: Hull = Hull()) -> tuple[Array, Array, Array, Array]:
+def ship_system(theta: Array, body: Body, load: Load, hull: Hull = Hull()) -> System:
     """Matrices of the ship with states (roll, v, roll rate, r), inputs (rudder, roll moment), outputs as in `Run`."""
     values = named(theta)
     z_f, U = values["z_f"], hull.speed
@@ -104,9 +106,19 @@ def ship_system(theta: Array, body: Body, load: Load, hull: Hull = Hull()) -> tu
 def ship_run(
     load: Load, rudder: Array, sea: Sea, rng: np.random.Generator, *, step_s: float = 0.02,
     theta: Array = MODEL_SHIP_TRUTH, body: Body = MODEL_SHIP, hull: Hull = Hull(),
+    helm: Helm = (0.0, 0.0, 0.0),
 ) -> Run:  # fmt: skip
-    """A free run of the ship."""
-    return _measured(ship_system(theta, body, load, hull), rudder, sea, step_s, rng)
+    """A run of the ship; helm is the rudder that an autopilot adds per heading, yaw and roll rate."""
+    system = _on_course(_steered(ship_system(theta, body, load, hull)), helm)
+    return _measured(system, rudder, sea, step_s, rng)
+
+
+def _on_course(system: System, helm: Helm, lag_s: float = SERVO_S) -> System:
+    """With the heading as last state, which an autopilot holds; yaw rate and rudder are states 3 and 4."""
+    A, B, C, D = system
+    A = np.block([[A, np.zeros((5, 1))], [np.eye(5)[3], np.zeros(1)]])
+    A[4, [5, 3, 2]] += np.array(helm) / lag_s
+    return A, np.vstack([B, np.zeros((1, 2))]), np.column_stack([C, np.zeros(4)]), D
 
 
 def unknown_load(theta: Array = MODEL_SHIP_TRUTH) -> Load:
@@ -120,16 +132,14 @@ def quiet(sea: Sea) -> Sea:
     return replace(sea, roll_rate=0.0, sensed=0.0, yaw_rate=0.0)
 
 
-def _measured(
-    system: tuple[Array, Array, Array, Array], orders: Array, sea: Sea, step_s: float, rng: np.random.Generator
-) -> Run:
+def _measured(system: System, orders: Array, sea: Sea, step_s: float, rng: np.random.Generator) -> Run:
     moment = shaped(len(orders), sea, step_s, rng)
-    outputs = held_response(_steered(system), np.column_stack([orders, moment]), step_s)
+    outputs = held_response(system, np.column_stack([orders, moment]), step_s)
     noise = np.array([sea.roll_rate, sea.sensed, sea.yaw_rate, 0.0]) * rng.standard_normal((len(orders), 4))
     return Run(step_s=step_s, signals=outputs + noise)
 
 
-def _steered(system: tuple[Array, Array, Array, Array], lag_s: float = SERVO_S) -> tuple[Array, Array, Array, Array]:
+def _steered(system: System, lag_s: float = SERVO_S) -> System:
     """With a rudder that follows its orders with a lag; its angle is the last output."""
     A, B, C, D = system
     n, turn, steady = len(A), 1.0 / lag_s, np.zeros((1, 2))
@@ -140,7 +150,7 @@ def _steered(system: tuple[Array, Array, Array, Array], lag_s: float = SERVO_S) 
     return A, B, C, D
 
 
-def held_response(system: tuple[Array, Array, Array, Array], inputs: Array, step_s: float) -> Array:
+def held_response(system: System, inputs: Array, step_s: float) -> Array:
     """Outputs (k, n) at the samples, inputs (k, m) held between them."""
     A, B, C, D, _ = scipy.signal.cont2discrete(system, step_s)
     poles, modes = np.linalg.eig(A)

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scipy
 
 from expdesign.errors import InputError, NotInformative
 from expdesign.roll import (
@@ -27,6 +28,8 @@ from expdesign.roll import (
     roll_frequency,
     stiffness,
 )
+from expdesign.roll.instruments import folds
+from expdesign.roll.regression import Spectrum
 from expdesign.values import Array
 from roll_truths import (
     MODEL_SHIP,
@@ -190,19 +193,65 @@ def test_three_parameters_of_a_pendulum_come_from_one_data_set() -> None:
         assert abs(found.values[name] - PENDULUM_TRUTH[PARAMETERS.index(name)]) < 4.0 * std, name
 
 
-def test_least_squares_misses_inertia_under_a_roll_moment_in_every_run_and_instruments_miss_to_both_sides() -> None:
-    """Runs whose inertia is too large; a median at the truth gives half of them, within 3 binomial deviations."""
-    sea, runs = Sea(moment=0.1, frequency_hz=1.0, damping=0.1), 12
-    place = PARAMETERS.index("A_x")
-    above = dict.fromkeys(("ls", "iv"), 0)
+def squared_deviations(runs: int, seed: int, method: str) -> Array:
+    """(runs, 2) of inertia and damping from the truth, over their told variances, under a narrow-band roll moment."""
+    sea, places = Sea(moment=0.1, frequency_hz=1.0, damping=0.1), [PARAMETERS.index(name) for name in ("A_x", "d")]
+    result = []
     for number in range(runs):
-        case = pendulum_case(NOMINAL, sea, np.random.default_rng([4, number]))
-        for method in above:
-            one = estimate_roll(pendulum_problem(("A_x", "d"), (case,)), method=method)
-            sure = method == "iv" or one.theta[place] - PENDULUM_TRUTH[place] > 1.96 * one.std["A_x"]
-            above[method] += bool(one.theta[place] > PENDULUM_TRUTH[place] and sure)
-    assert above["ls"] == runs
-    assert abs(above["iv"] - runs / 2) <= 3.0 * np.sqrt(runs) / 2
+        case = pendulum_case(NOMINAL, sea, np.random.default_rng([seed, number]), samples=9000)
+        one = estimate_roll(pendulum_problem(("A_x", "d"), (case,)), method=method)
+        result.append((one.theta - PENDULUM_TRUTH)[places] ** 2 / np.diag(one.covariance))
+    return np.array(result)
+
+
+def test_intervals_hold_under_a_narrow_band_moment_that_makes_least_squares_sure_of_wrong_values() -> None:
+    """Mean of squares that are 1 on average, within 3 of its standard deviations if the two were one and the same."""
+    runs = 8
+    assert squared_deviations(runs, 14, "iv").mean() < 1.0 + 3.0 * np.sqrt(2.0 / runs)
+    assert squared_deviations(runs, 14, "ls").mean() > 10.0 * (1.0 + 3.0 * np.sqrt(2.0 / runs))
+
+
+@pytest.mark.slow
+def test_of_many_intervals_under_a_narrow_band_moment_no_fewer_hold_than_they_say() -> None:
+    """Runs are independent, the two intervals of one are not: 3 binomial deviations of as many intervals as runs."""
+    runs = 60
+    held = (squared_deviations(runs, 15, "iv") < 1.96**2).mean()
+    assert held > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / runs)
+
+
+def test_a_moment_that_hides_the_rudder_is_noticed() -> None:
+    def weak(moment: float, number: int) -> bool:
+        sea = Sea(moment=moment, frequency_hz=1.0, damping=0.03)
+        case = pendulum_case(NOMINAL, sea, np.random.default_rng([16, number]))
+        return estimate_roll(pendulum_problem(("A_x", "d"), (case,))).weak
+
+    assert [weak(0.5, number) for number in range(3)] == [True] * 3
+    assert not any(weak(0.01, number) for number in range(3))
+
+
+def test_instruments_of_a_part_of_the_record_do_not_depend_on_its_noise() -> None:
+    run = pendulum_case(NOMINAL, Sea(roll_rate=0.01), np.random.default_rng(17)).runs[0]
+    other = run.signals.copy()
+    here = folds([run])[0][1].part
+    other[here, :3] += 0.1 * np.random.default_rng(18).standard_normal((here.stop - here.start, 3))
+    before, after = (folds([one])[0] for one in (run, Run(step_s=run.step_s, signals=other)))
+    changed = [np.abs(new.columns - old.columns).max() for old, new in zip(before, after, strict=True)]
+    assert changed[1] < 1e-2 * min(changed[0], changed[2])
+
+
+def test_the_covariance_of_moments_is_that_of_draws() -> None:
+    """A narrow band of noise on given instruments, with its own spectrum; draws within 4 standard errors."""
+    rng, count = np.random.default_rng(19), 400
+    Z = np.cumsum(rng.standard_normal((count, 2)), axis=0)
+    below = [1.0, -1.9, 0.95]
+    length = 2048
+    density = 1.0 / np.abs(np.fft.rfft(below, length)) ** 2
+    wanted = Spectrum(density=density, length=length, freedom=np.inf).covariance([Z])
+    noise = scipy.signal.lfilter([1.0], below, rng.standard_normal((4000, count + 400)))[:, 400:]
+    sums = noise @ Z
+    found = sums.T @ sums / len(sums)
+    error = np.sqrt((np.outer(np.diag(wanted), np.diag(wanted)) + wanted**2) / len(sums))
+    assert (np.abs(found - wanted) < 4.0 * error).all()
 
 
 def test_a_parameter_at_a_bound_of_the_search_is_named_and_its_interval_not_trusted() -> None:

@@ -20,9 +20,9 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.roll.instruments import Fold, folds, weighted_columns
+from expdesign.roll.instruments import Weighted, folds, weighted_equations
 from expdesign.roll.model import PARAMETERS, discrete, named, parameters, relative_sensitivity
-from expdesign.roll.regression import WHITE, Rows, Spectrum, build_rows, flat_spectrum, noise_model, spectrum
+from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
@@ -131,6 +131,8 @@ class RollEstimate:
         rounds: (r, 9) parameters after each round of spectra.
         settled: whether the last round changed little.
         residual_std: (c,) of each case [rad/s].
+        leaning: (p,) bias of each free parameter towards least squares, in its standard deviations, by instruments that
+            the noise hides; of the held ones zero.
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
     """
 
@@ -143,10 +145,11 @@ class RollEstimate:
     rounds: Array
     settled: bool
     residual_std: Array
+    leaning: Array
     surprise: float
 
     def __post_init__(self) -> None:
-        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c")
+        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c", leaning="p")
 
     @property
     def std(self) -> dict[str, float]:
@@ -168,24 +171,13 @@ class RollEstimate:
 
     @property
     def trusted(self) -> bool:
-        """Whether intervals may be believed: rounds settled, no bound was reached, residuals are free of the rudder."""
-        return self.settled and not self.reached and not self.surprise > TUNING.most_surprise
+        """Whether intervals may be believed: rounds settled, no bound reached, nothing left of the rudder, no bias."""
+        return self.settled and not self.reached and not self.surprise > TUNING.most_surprise and not self.weak
 
-
-@dataclass(frozen=True, eq=False)
-class _Weighted:
-    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations.
-
-    Attributes:
-        rows: of each run.
-        basis: (n, q) of each run, whose sum of products with the noise has unit covariance.
-        top, slope: sums of its products with y and X, (q,) and (q, 5).
-    """
-
-    rows: tuple[Rows, ...]
-    basis: tuple[Array, ...]
-    top: Array
-    slope: Array
+    @property
+    def weak(self) -> bool:
+        """Whether noise hides what the rudder does, so that the estimate leans towards least squares."""
+        return bool(np.abs(self.leaning).max() > TUNING.most_leaning)
 
 
 def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
@@ -199,7 +191,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
     held = _held(problem)
     instruments = [folds(case.runs) if method == "iv" else None for case in problem.cases]
     theta, history, settled = np.array(problem.start), [], False
-    weighted = [_weighted(case, own, None) for case, own in zip(problem.cases, instruments, strict=True)]
+    weighted = [weighted_equations(case, own, None) for case, own in zip(problem.cases, instruments, strict=True)]
     while True:
         before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
         history.append(theta)
@@ -207,17 +199,19 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         if settled or len(history) == TUNING.most_rounds:
             break
         parts = zip(problem.cases, instruments, _sampled(problem, theta), strict=True)
-        weighted = [_weighted(case, own, values) for case, own, values in parts]
+        weighted = [weighted_equations(case, own, values) for case, own, values in parts]
+    covariance = _covariance(problem, weighted, theta, sensed, held, method)
     return RollEstimate(
         problem=problem,
         method=method,
         theta=theta,
-        covariance=_covariance(problem, weighted, theta, sensed, held, method),
+        covariance=covariance,
         held=held,
         sensed=sensed,
         rounds=np.array(history),
         settled=settled,
         residual_std=np.array([np.std(np.concatenate(e)) for e in _noise(problem, weighted, theta)]),
+        leaning=_leaning(problem, weighted, theta, sensed, covariance),
         surprise=_surprise(left, len(problem.free) - len(held)),
     )
 
@@ -248,46 +242,14 @@ def _sampled(problem: RollProblem, theta: Array) -> list[Array]:
     return [discrete(theta, problem.body, case.load, problem.step_s).values for case in problem.cases]
 
 
-def _noise(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> list[list[Array]]:
+def _noise(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> list[list[Array]]:
     """Residuals (n,) of each run of each case."""
     by = zip(weighted, _sampled(problem, theta), strict=True)
     return [[rows.residuals(values) for rows in part.rows] for part, values in by]
 
 
-def _weighted(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> _Weighted:
-    """Of sampled coefficients (5,); before there are any, as if noise were white, as least squares always does."""
-    plain = tuple(build_rows(run, WHITE) for run in case.runs)
-    if values is None:
-        model, rows, left = WHITE, plain, flat_spectrum([one.y for one in plain])
-    elif instruments is None:
-        model, rows, left = WHITE, plain, flat_spectrum([one.residuals(values) for one in plain])
-    else:
-        model = noise_model([one.residuals(values) for one in plain], values[:2], TUNING.noise_order)
-        rows = tuple(build_rows(run, model) for run in case.runs)
-        left = spectrum([one.residuals(values) for one in rows])
-    by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
-    basis = _basis(by, left)
-    parts = list(zip(basis, rows, strict=True))
-    return _Weighted(
-        rows,
-        basis,
-        np.sum([B.T @ one.y for B, one in parts], axis=0),
-        np.sum([B.T @ one.X for B, one in parts], axis=0),
-    )
-
-
-def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
-    """(n, q) combinations of the columns of each run whose sums of products with the noise have unit covariance."""
-    power = noise.covariance(columns)
-    there = np.diag(power) > 0
-    size = np.sqrt(np.diag(power)[there])
-    powers, axes = np.linalg.eigh(power[np.ix_(there, there)] / np.outer(size, size))
-    kept = powers > TUNING.repeated * powers[-1:]
-    return tuple(Z[:, there] / size @ (axes[:, kept] / np.sqrt(powers[kept])) for Z in columns)
-
-
 def _solved(
-    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, held: Sequence[str]
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str]
 ) -> tuple[Array, Array, Array]:
     """Parameters (9,), derivatives (q, p) of the weighted residuals by the free ones, and these residuals (q,)."""
     places = [PARAMETERS.index(name) for name in problem.free if name not in held]
@@ -312,13 +274,13 @@ def _solved(
     return full(found.x), _slopes(problem, weighted, full(found.x))[:, problem.places], np.asarray(found.fun)
 
 
-def _residuals(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> Array:
+def _residuals(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
     return np.concatenate(
         [part.top - part.slope @ c for part, c in zip(weighted, _sampled(problem, theta), strict=True)]
     )
 
 
-def _slopes(problem: RollProblem, weighted: Sequence[_Weighted], theta: Array) -> Array:
+def _slopes(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
     """(q, 9) derivatives of the residuals."""
     by = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
     return -np.concatenate([part.slope @ rows for part, rows in zip(weighted, by, strict=True)])
@@ -330,7 +292,7 @@ def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
 
 
 def _covariance(
-    problem: RollProblem, weighted: Sequence[_Weighted], theta: Array, sensed: Array, held: Sequence[str], method: str
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, held: Sequence[str], method: str
 ) -> Array:
     """(p, p) with the spectra of the last residuals, flat ones for least squares; zero for what is held.
 
@@ -348,3 +310,24 @@ def _covariance(
         middle += change @ noise.covariance(part.basis) @ change.T / (1.0 - 2.0 / noise.freedom) ** 2
         first = last
     return np.asarray(middle * np.outer(scale, scale))
+
+
+def _leaning(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, covariance: Array
+) -> Array:
+    """(p,) bias in standard deviations: the noise of the regressors follows that of the equation at each instrument.
+
+    Source: A. L. Nagar, Econometrica 27 (1959), 575-595, with spectra in place of variances.
+    """
+    std = np.sqrt(np.diag(covariance))
+    found = std > 0
+    follows, fitted = np.zeros(len(std)), np.count_nonzero(found)
+    by = zip(problem.cases, weighted, _noise(problem, weighted, theta), strict=True)
+    for case, part, residuals in by:
+        power = flat_spectrum(residuals).power(part.basis)
+        crossed = [cross_spectrum([rows.X[:, j] for rows in part.rows], residuals).real @ power for j in range(5)]
+        follows += crossed @ discrete(theta, problem.body, case.load, problem.step_s).jacobian[:, problem.places]
+    slopes = sensed[:, found] * std[found]
+    result = np.zeros(len(std))
+    result[found] = np.linalg.pinv(slopes.T @ slopes) @ (follows[found] * std[found]) * (1.0 - fitted / len(sensed))
+    return result

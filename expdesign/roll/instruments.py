@@ -18,8 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll.regression import NoiseModel, Spectrum, delayed, difference, inside, without_start
-from expdesign.roll.runs import Run
+from expdesign.roll.regression import (
+    WHITE,
+    NoiseModel,
+    Rows,
+    Spectrum,
+    build_rows,
+    delayed,
+    difference,
+    flat_spectrum,
+    inside,
+    noise_model,
+    spectrum,
+    without_start,
+)
+from expdesign.roll.runs import Case, Run
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array
 
@@ -68,7 +81,8 @@ def _boxes(
     for u, y, own in zip(inputs, outputs, parts, strict=True):
         table = _arx_table(u, y)
         for number, part in own:
-            triangles[number].append(np.asarray(np.linalg.qr(table[part], mode="r")))
+            inner = table[part][max(TUNING.black_box) :]  # whose past does not reach into another part
+            triangles[number].append(np.asarray(np.linalg.qr(inner, mode="r")))
     return [
         _solved(np.concatenate([R for other, own in enumerate(triangles) if other != number for R in own]))
         for number in range(TUNING.folds)
@@ -76,11 +90,9 @@ def _boxes(
 
 
 def _arx_table(u: Array, y: Array) -> Array:
-    """(k, o + w + 1) past outputs, inputs and the output; zero for samples whose past reaches before the run."""
+    """(k, o + w + 1) past outputs, inputs and the output."""
     past, width = TUNING.black_box
-    table = np.column_stack([-delayed(y, range(1, past + 1)), delayed(u, range(width)), y])
-    table[: max(past, width)] = 0.0
-    return table
+    return np.column_stack([-delayed(y, range(1, past + 1)), delayed(u, range(width)), y])
 
 
 def _solved(table: Array) -> BlackBox:
@@ -114,3 +126,51 @@ def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> 
     divided = [(fold.part, left.divided(noise.whitened(fold.columns)[first:])) for fold in own]
     stitched = np.concatenate([columns[max(part.start - first, 0) : part.stop - first] for part, columns in divided])
     return without_start(stitched, noise)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighted:
+    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations.
+
+    Attributes:
+        rows: of each run.
+        basis: (n, q) of each run, whose sum of products with the noise has unit covariance.
+        top, slope: sums of its products with y and X, (q,) and (q, 5).
+    """
+
+    rows: tuple[Rows, ...]
+    basis: tuple[Array, ...]
+    top: Array
+    slope: Array
+
+
+def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> Weighted:
+    """Of sampled coefficients (5,); before there are any, as if noise were white, as least squares always does."""
+    plain = tuple(build_rows(run, WHITE) for run in case.runs)
+    if values is None:
+        model, rows, left = WHITE, plain, flat_spectrum([one.y for one in plain])
+    elif instruments is None:
+        model, rows, left = WHITE, plain, flat_spectrum([one.residuals(values) for one in plain])
+    else:
+        model = noise_model([one.residuals(values) for one in plain], values[:2], TUNING.noise_order)
+        rows = tuple(build_rows(run, model) for run in case.runs)
+        left = spectrum([one.residuals(values) for one in rows])
+    by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
+    basis = _basis(by, left)
+    parts = list(zip(basis, rows, strict=True))
+    return Weighted(
+        rows,
+        basis,
+        np.sum([B.T @ one.y for B, one in parts], axis=0),
+        np.sum([B.T @ one.X for B, one in parts], axis=0),
+    )
+
+
+def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
+    """(n, q) combinations of the columns of each run whose sums of products with the noise have unit covariance."""
+    power = noise.covariance(columns)
+    there = np.diag(power) > 0
+    size = np.sqrt(np.diag(power)[there])
+    powers, axes = np.linalg.eigh(power[np.ix_(there, there)] / np.outer(size, size))
+    kept = powers > TUNING.repeated * powers[-1:]
+    return tuple(Z[:, there] / size @ (axes[:, kept] / np.sqrt(powers[kept])) for Z in columns)

@@ -99,9 +99,18 @@ class Spectrum:
 
     def covariance(self, columns: Sequence[Array]) -> Array:
         """(q, q) of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
-        both = np.r_[1.0, np.full(len(self.density) - 2, 2.0), 1.0] * self.density / self.length
         seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
-        return np.asarray(sum((F.conj().T @ (both[:, None] * F)).real for F in seen))
+        return np.asarray(sum((F.conj().T @ ((self.shares * self.density)[:, None] * F)).real for F in seen))
+
+    def power(self, columns: Sequence[Array]) -> Array:
+        """(f,) of all columns (k, q) of each run, whose products with a density sum to a trace of covariances."""
+        seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
+        return np.asarray(self.shares * sum((np.abs(F) ** 2).sum(axis=1) for F in seen))
+
+    @property
+    def shares(self) -> Array:
+        """(f,) of each frequency, with that of its negative, among all n."""
+        return np.asarray(np.r_[1.0, np.full(len(self.density) - 2, 2.0), 1.0] / self.length)
 
 
 def flat_spectrum(residuals: Sequence[Array]) -> Spectrum:
@@ -120,18 +129,28 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     Source: P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967), 70-73; R. B. Blackman and J. W. Tukey, The
     Measurement of Power Spectra (1958), for whitening before.
     """
-    length, total = _transform_length(residuals), sum(map(len, residuals))
-    segments = [min(len(e), total // TUNING.spectral_segments) for e in residuals]
-    powers = [
-        len(e) / total * scipy.signal.welch(e, nperseg=n, nfft=length, return_onesided=False)[1]
-        for e, n in zip(residuals, segments, strict=True)
-    ]
-    density = np.sum(powers, axis=0)[: length // 2 + 1]
+    density = cross_spectrum(residuals, residuals).real
+    steps = _segments(residuals)
     return Spectrum(
         density=np.maximum(density, max(TUNING.least_density * float(density.max()), 1e-100)),
-        length=length,
-        freedom=sum(_freedom(len(e) // (n // 2) - 1) for e, n in zip(residuals, segments, strict=True)),
+        length=_transform_length(residuals),
+        freedom=sum(_freedom(len(e) // (n // 2) - 1) for e, n in zip(residuals, steps, strict=True)),
     )
+
+
+def cross_spectrum(first: Sequence[Array], second: Sequence[Array]) -> Array:
+    """(f,) of two signals (k,) of each run, at the frequencies of `spectrum`."""
+    length, total = _transform_length(first), sum(map(len, first))
+    parts = [
+        len(a) / total * scipy.signal.csd(a, b, nperseg=n, nfft=length, return_onesided=False)[1]
+        for a, b, n in zip(first, second, _segments(first), strict=True)
+    ]
+    return np.asarray(np.sum(parts, axis=0)[: length // 2 + 1])
+
+
+def _segments(signals: Sequence[Array]) -> list[int]:
+    """Samples of a segment in each run."""
+    return [min(len(e), sum(map(len, signals)) // TUNING.spectral_segments) for e in signals]
 
 
 def _freedom(segments: int) -> float:

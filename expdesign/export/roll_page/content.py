@@ -105,6 +105,12 @@ def _sentences(content: RollContent) -> Iterator[str]:
             f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
             "something, or a strong roll moment of waves hides what the rudder does."
         )
+    if estimate.weak and estimate.method == "iv":
+        yield (
+            "Waves and sensors hide what the rudder does: estimates lean towards those of least squares, by up to "
+            f"{max(abs(estimate.leaning)):.2g} standard deviations; expected larger rudder angles, "
+            "longer runs or calmer water."
+        )
     for name in estimate.reached:
         yield (
             f"{name} stands at a bound of the search, {estimate.values[name]:.4g} {UNITS[name]}: it is no estimate; "
@@ -164,6 +170,7 @@ def roll_json(content: RollContent) -> str:
             },
             "settled": estimate.settled,
             "surprise": finite(estimate.surprise),
+            "leaning": estimate.leaning.tolist(),
             "reached_bounds": list(estimate.reached),
             "intervals_trusted": estimate.trusted,
             "remarks": list(roll_sentences(content)),
