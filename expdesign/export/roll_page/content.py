@@ -116,10 +116,10 @@ def _sentences(content: RollContent) -> Iterator[str]:
             f"{name} stands at a bound of the search, {estimate.values[name]:.4g} {UNITS[name]}: it is no estimate; "
             "give it under [known], or a better start under [start]."
         )
-    if not estimate.trusted:
-        yield "The 95 % intervals are not to be trusted, for what is said above; they may be far too short."
     if estimate.method == "ls":
         yield "Least squares is biased where waves or sensors disturb, and its intervals do not say so; use iv."
+    if not estimate.trusted:
+        yield "The 95 % intervals are not to be trusted, for what is said above; they may be far too short."
 
 
 def _open(content: RollContent) -> Iterator[str]:
