@@ -17,6 +17,8 @@ from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array
 
+STRAIGHT = 2
+"""Points of a path without bends."""
 TRACKING, RETURNING, BEGUN, ABORTED, OUT = range(5)
 """What a ship does: tracks a reference, follows a return path, has begun the run, has aborted, takes no part."""
 
@@ -123,6 +125,8 @@ class Guidance:
         """Decide what ships under way (k,) do next."""
         states, late = part.states, self._sample > self._deadline[ships]
         self.doing[ships[part.lost]] = ABORTED
+        if self._last:
+            self.doing[ships[self._at_goal(states) & (self.doing[ships] == RETURNING)]] = BEGUN
         on = self.doing[ships] == TRACKING
         passed = self._passed(ships, states, on)
         self._abort_cause[ships[late]] = ABORT_CAUSES.index("time")
@@ -159,12 +163,17 @@ class Guidance:
         """
         used, waited = shares.max(axis=1), self._sample > self._deadline[ships] - self._waiting / 2
         if self._last:
-            there = lengths(states[:, :2] - self._desired[:2]) <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m
+            there = self._at_goal(states)
             return there | waited | (not self._helm.ship.keeps_station), there
         if not self._moves:
             return (used <= MONTE_CARLO.standstill_share) | ((used <= 1.0) & waited), used <= 1.0
         gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
         return (used <= 1.0) | gone_by, used <= 1.0
+
+    def _at_goal(self, states: Array) -> np.ndarray:
+        """(k,) whether ships at states (k, 6) of the leg to the goal have reached it: their place alone counts."""
+        off_m = lengths(states[:, :2] - self._desired[:2])
+        return np.asarray(off_m <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m)
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships] = TRACKING
@@ -181,11 +190,30 @@ class Guidance:
             self._within.position_m + MONTE_CARLO.rejoin_share * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
         )
         off = (self.doing == TRACKING) & (off_m > self._within.position_m)
+        if self._last and helm.ship.keeps_station:
+            self._straight_to_goal(np.flatnonzero(off & (off_m > good_m)), states)
+            off &= self.doing == TRACKING
         some = np.flatnonzero(off)
         if len(some):
             clear = self._tree.hold(*self._returns_to_leg(states[some, :2]))
             off[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
             self._go_around(ships[off], states[off])
+
+    def _straight_to_goal(self, ships: np.ndarray, states: Array) -> None:
+        """Ships (k,) with a straight way to the goal in safe water take it: its place alone counts, not the heading.
+
+        `states` (n, 6) are those of all ships.
+        """
+        for ship, path in zip(ships.tolist(), self._tree.find(states[ships, :2]), strict=True):
+            if path is not None and len(path) == STRAIGHT:
+                self.doing[ship] = RETURNING
+                self._followers.start(ship, path)
+        self._await(ships[self.doing[ships] == RETURNING])
+
+    def _await(self, ships: np.ndarray) -> None:
+        """Ships (k,) that have begun a path have until this sample to arrive."""
+        sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
+        self._deadline[ships] = self._sample + self._allowed(self._followers.length_m[ships] / sample_m)
 
     def _returns_to_leg(self, places: Array) -> tuple[Array, np.ndarray]:
         """Approximate tracks of ships from places (k, 2) back to the leg, while the reference stays abeam.
@@ -218,8 +246,7 @@ class Guidance:
             else:
                 self.doing[ship] = RETURNING
                 self._followers.start(ship, path)
-        sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
-        self._deadline[ships] = self._sample + self._allowed(self._followers.length_m[ships] / sample_m)
+        self._await(ships)
 
     @cached_property
     def _arcs(self) -> GoAroundPaths:

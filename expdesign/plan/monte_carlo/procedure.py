@@ -58,9 +58,10 @@ class Tolerances:
 def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
     """Of a run, by the vessel's length and its speeds on legs, and by the room beyond the clearance.
 
-    Information does not depend on where a run begins. So where there is room, the position may use a share of it, at
-    most a hull length. A speed that differs at the start soon decays to that of the run, and its information is
-    nearly all told after that: so the speed may differ by what moves the run by a share of the position's tolerance.
+    Information does not depend on where a run begins, and the next leg begins where the run ends. So where there is
+    room, the position may use a share of it, at most some hull lengths. A speed that differs at the start soon decays
+    to that of the run, and its information is nearly all told after that: so the speed may differ by what moves the
+    run by a share of the position's tolerance.
     """
     ship, length_m = water.ship, water.vessel.length_m
     position_m = float(

@@ -59,8 +59,8 @@ class Tuning:
     no_plan_aborted: float = 0.5
     go_arounds: int = 4
     position_hulls: float = 0.2
-    position_room: float = 0.25
-    position_most_hulls: float = 1.0
+    position_room: float = 0.5
+    position_most_hulls: float = 3.0
     heading_rad: float = radians(3.0)
     speed_share: float = 0.1
     speed_moves: float = 0.5
@@ -74,7 +74,7 @@ class Tuning:
     least_step: float = 0.2
     rejoin_samples: int = 5
     rejoin_share: float = 0.5
-    arrived_hulls: float = 1.0
+    arrived_hulls: float = 1.5
     steady_hulls: float = 2.0
     standstill_share: float = 0.5
     turn_hulls: float = 2.0
