@@ -36,6 +36,7 @@ ESTIMATE = {
     "steered": "auto",
     "samples": "all",
     "offset_mps": 0.0,
+    "prior": "none",
     "tests": (),
 }
 MONITOR = {

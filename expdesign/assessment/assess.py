@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from expdesign.assessment.actuator_times import considered, delivered_anew, found_times, known_times, told, with_times
 from expdesign.assessment.limits import Limits, decomposed
+from expdesign.assessment.prior import NONE, PARAMETER_STD, PRIORS, check_prior, with_prior
 from expdesign.assessment.residuals import one_step
 from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.tuning import TUNING
@@ -55,6 +56,7 @@ class EstimateOptions:
         samples: "all", or "equation-wise": for each equation those that meet the excitation condition.
         offset_mps: strongest current, and wind where it is not measured, that velocities inside an absolute value must
             exceed in equation-wise samples, beside the sensors' noise [m/s].
+        prior: "parameter_std" to join estimates with what the vessel file knew before, or "none".
     """
 
     methods: tuple[str, ...] = ()
@@ -68,6 +70,7 @@ class EstimateOptions:
     steered: str = AUTO
     samples: str = ALL
     offset_mps: float = 0.0
+    prior: str = NONE
 
     def __post_init__(self) -> None:
         for what, value, known in (
@@ -77,9 +80,14 @@ class EstimateOptions:
             ("motion", self.motion, MOTIONS),
             ("treatment of steered samples", self.steered, STEERED),
             ("choice of samples", self.samples, SAMPLES),
+            ("prior", self.prior, PRIORS),
         ):
             if value not in known:
                 raise UnknownName(what, value, known=known)
+        if self.prior == PARAMETER_STD and self.motion != CONTINUOUS:
+            raise InputError(
+                f"--prior {PARAMETER_STD} is of the continuous motion, expected it without --motion {EULER}"
+            )
         if not 0 <= self.offset_mps < float("inf"):
             raise InputError(f"offset is {self.offset_mps:g} m/s, expected 0 or more")
         if self.horizon_s is not None and not 0 < self.horizon_s < float("inf"):
@@ -162,6 +170,8 @@ def assess(
         Diverged: no stable model to make instruments with.
     """
     options = options or EstimateOptions()
+    if options.prior == PARAMETER_STD:
+        check_prior(vessel.model, vessel.name)
     named = tuple(method_named(name) for name in dict.fromkeys(options.methods))
     chosen = named or tuple(method_named(name) for name in default_methods(vessel, record))
     done: list[Assessed] = []
@@ -187,6 +197,7 @@ def assess(
         mean=options.mean,
         fixed=options.fixed,
         motion=options.motion,
+        prior=options.prior,
         limits=limits_of(done[chosen_one], options.integration, progress=each[-1]),
     )
 
@@ -231,6 +242,8 @@ def _assessed(
     progress: Progress,
 ) -> Assessed:
     found, start = _estimated(vessel, stated, record, method, options, progress)
+    if options.prior == PARAMETER_STD:
+        found = with_prior(found, vessel.model)
     wind = USES_WIND[method.predictor]
     now = with_times(vessel, found_times(found, vessel))
     found = told(found, record, stated, vessel)

@@ -84,6 +84,7 @@ class Assessment:
         mean: how the mean was subtracted from instruments.
         fixed: parameters held at the vessel file's values.
         motion: "continuous" or "euler", as in `EstimateOptions`.
+        prior: "parameter_std" where estimates are joined with what the vessel file knew before, else "none".
         limits: decomposed misfit of every run of the chosen estimate.
     """
 
@@ -95,6 +96,7 @@ class Assessment:
     mean: str
     fixed: tuple[str, ...]
     motion: str
+    prior: str
     limits: tuple[Limits, ...]
 
     @property

@@ -105,6 +105,14 @@ def estimate(
             "samples [m/s], beside three standard deviations of the sensors.",
         ),
     ] = 0.0,
+    prior: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="parameter_std: join estimates with what the vessel file knew before, as after a step trial or an "
+            "earlier estimate, of which these data must be no part; none.",
+        ),
+    ] = "none",
     out: OutByData = None,
 ) -> Asked:
     """Estimate the model's parameters from measured data, with standard errors.
@@ -130,6 +138,7 @@ def estimate(
         steered=steered,
         samples=samples,
         offset_mps=offset,
+        prior=prior,
         tests=tests or (),
     )
 

@@ -74,10 +74,11 @@ def limit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...
 
 
 def motion_words(found: Assessment) -> str:
-    """The discretisation that the parameters belong to."""
+    """The discretisation that the parameters belong to, and the prior that they are joined with."""
     if found.motion == "euler":
         return "The parameters belong to the Euler discretisation at the sample time of the data."
-    return "The parameters belong to the continuous-time motion, with inputs held constant between samples."
+    text = "The parameters belong to the continuous-time motion, with inputs held constant between samples."
+    return text if found.prior == "none" else f"{text} They are joined with what the vessel file knew before the data."
 
 
 def plus_minus(value: float, std: float) -> str:

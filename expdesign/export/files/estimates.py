@@ -39,6 +39,7 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         "disturbances": disturbance_entries(item),
         "form": model.form,
         "parameters_of": found.motion,
+        "prior": found.prior,
         "sample_time_s": found.record.batches[0].sample_time_s,
         "fit": fit_entries(item),
         "rmse": _per_run(item.runs, "rmse"),

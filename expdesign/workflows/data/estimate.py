@@ -51,6 +51,7 @@ def estimate(
     steered: str = "auto",
     samples: str = "all",
     offset_mps: float = 0.0,
+    prior: str = "none",
     tests: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> Outcome:
@@ -74,6 +75,7 @@ def estimate(
         steered=steered,
         samples=samples,
         offset_mps=offset_mps,
+        prior=prior,
     )
     raw = measured(data, ship, velocity=velocity)
     with workers(0, load=None):
@@ -100,6 +102,7 @@ def estimate(
             "--steered": options.steered,
             "--samples": options.samples,
             "--offset": options.offset_mps,
+            "--prior": options.prior,
         },
         usual={
             "--velocity": "auto",
@@ -110,6 +113,7 @@ def estimate(
             "--steered": "auto",
             "--samples": "all",
             "--offset": 0.0,
+            "--prior": "none",
         },
     )
     files = {

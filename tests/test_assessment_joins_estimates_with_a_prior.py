@@ -1,0 +1,82 @@
+"""Estimates joined with what was known before: the information of both adds up, and a contradiction is told."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from expdesign.assessment import EstimateOptions
+from expdesign.assessment.prior import with_prior
+from expdesign.errors import InputError
+from expdesign.vessel import Term, VesselModel
+
+NAMES = ("X_u", "X_abs_u_u")
+TERMS = (Term("u", "X_u", "u"), Term("u", "X_abs_u_u", "abs(u)*u"))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """What of an estimate is joined: two parameters and one nuisance number."""
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+    nuisance_values: np.ndarray
+    joint_covariance: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def found(seed: int) -> Found:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(3, 3))
+    joint = root @ root.T + 0.1 * np.eye(3)
+    values = rng.normal(size=3)
+    return Found(
+        names=NAMES, values=values[:2], covariance=joint[:2, :2], nuisance_values=values[2:], joint_covariance=joint
+    )
+
+
+def known(std: list[float]) -> VesselModel:
+    return VesselModel(
+        terms=TERMS,
+        parameters=np.array([0.3, -0.2]),
+        parameter_std=np.array(std),
+        form="discrete",
+        sample_time_s=1.0,
+        actuators=(),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_information_of_prior_and_data_adds_up(seed: int) -> None:
+    before, model = found(seed), known([0.5, 2.0])
+    after = with_prior(before, model)
+    prior = np.diag([0.5**-2, 2.0**-2, 0.0])
+    information = np.linalg.inv(before.joint_covariance)
+    expected = np.linalg.inv(information + prior)
+    numbers = np.concatenate([before.values, before.nuisance_values])
+    mean = expected @ (information @ numbers + prior @ [0.3, -0.2, 0.0])
+    np.testing.assert_allclose(after.joint_covariance, expected, rtol=1e-9)
+    np.testing.assert_allclose(np.concatenate([after.values, after.nuisance_values]), mean, rtol=1e-9)
+    np.testing.assert_allclose(after.covariance, expected[:2, :2], rtol=1e-9)
+
+
+def test_a_parameter_without_standard_deviation_keeps_its_value() -> None:
+    after = with_prior(found(0), known([0.0, 1.0]))
+    assert after.values[0] == pytest.approx(0.3, abs=1e-12)
+    assert after.covariance[0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_contradiction_is_told_and_agreement_is_not() -> None:
+    near, model = found(1), known([0.1, 0.1])
+    agreeing = replace(near, values=model.parameters.copy())
+    assert not with_prior(agreeing, model).warnings
+    far = replace(near, values=model.parameters + np.array([0.0, 100.0]))
+    (warning,) = with_prior(far, model).warnings
+    assert "contradict" in warning
+    assert "X_abs_u_u" in warning
+
+
+def test_euler_s_parameters_have_no_such_prior() -> None:
+    with pytest.raises(InputError, match="continuous motion"):
+        EstimateOptions(prior="parameter_std", motion="euler")
