@@ -330,9 +330,9 @@ def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPa
 
 
 def trial_parts(
-    primitives: Sequence[Primitive], runs: Sequence[int], *, environment: Environment = CALM
+    primitives: Sequence[Primitive], runs: Sequence[float], *, environment: Environment = CALM
 ) -> tuple[TrialPart, ...]:
-    """The parts of a trial of whole runs, in the dictionary's order.
+    """The parts of a trial of runs, whole or not, in the dictionary's order.
 
     In wind or current, information depends on the heading; unknown headings are then replaced by `Tuning.headings`
     evenly spread ones.

@@ -7,27 +7,35 @@ M's rate: f(a M) = f(M) + log a, and the accuracy is reached where f(M) >= 0. It
     log(s_i^2 / (sigma_i^2 (M^-1)_ii)) for parameters with a largest standard deviation s_i
     log(s_o^2 / (c_o' M^-1 c_o)) for outcomes of trials, c_o their gradients by parameters, in noise units
 
+Information takes the residuals of samples one after the other for independent. Those of measured velocities share a
+sample and partly cancel where regressors change slowly: standard deviations then are two to five times smaller than
+(M^-1)_ii says. So limits s_i and s_o are widened by that ratio, as it is for the optimal durations, which makes f a
+forecast; whether a track reaches them is judged by its own first-order covariance (`information.expected`).
+
 Source: F. Pukelsheim, Optimal Design of Experiments (2006), 5.4 for concavity of 1 / (M^-1)_ii; combined here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from expdesign.dictionary import Primitive
 from expdesign.durations import Collected, DurationDesign
 from expdesign.durations.criteria.models import congruent
-from expdesign.errors import InputError
-from expdesign.information.outcome_gradients import outcome_gradients
+from expdesign.errors import InputError, NotInformative
+from expdesign.information.expected import expected_covariance
 from expdesign.information.prior import equation_noise
 from expdesign.information.unknown_current import beside_current, slope_of_whole
+from expdesign.rehearsal import trial_parts
+from expdesign.shortest_day.limits import Limits, asked_limits
 from expdesign.shortest_day.values import AccuracySettings
+from expdesign.simulation import CALM, Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
-
-NORMAL_95 = 1.959963984540054
-"""Half of the interval that holds a normal variable in 95 of 100 cases, in standard deviations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,6 +54,7 @@ class Accuracy:
         parameters: names.
         outcomes: names of outcomes with a largest standard deviation.
         gradients: (o, d) of each by the parameters, in units of that standard deviation and of the noise.
+        limits: by which tracks are judged; None where they are judged by `margin`.
     """
 
     collected: Collected | None
@@ -56,11 +65,52 @@ class Accuracy:
     parameters: tuple[str, ...]
     outcomes: tuple[str, ...] = ()
     gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    limits: Limits | None = None
 
     def __post_init__(self) -> None:
         if not self.outcomes:
             object.__setattr__(self, "gradients", np.zeros((0, len(self.prior))))
         seal(self, prior="d d", variance="p", gradients="o d")
+
+    def margin_of_track(self, information: Array, covariance: Array | None) -> float:
+        """f of a track by its information (d, d), and by its covariance (p, p) where standard deviations are limited.
+
+        -inf where the track does not determine every parameter.
+        """
+        if self.limits is None:
+            return self.margin(information)
+        if covariance is None:
+            return -np.inf
+        criterion = self._criterion_margin(self.about_ship(information))
+        return min(criterion, float(-2 * np.log(self.limits.used(covariance)).max()))
+
+    def lacking(self, information: Array, covariance: Array | None) -> str:
+        """What a track lacks most: the parameter or outcome, how well it is told, and what was asked for.
+
+        "" where that is the criterion, or where the track does not determine every parameter.
+        """
+        if self.limits is None or covariance is None:
+            return ""
+        used = self.limits.used(covariance)
+        if self._criterion_margin(self.about_ship(information)) <= -2 * np.log(used.max()):
+            return ""
+        return self.limits.words(covariance, int(np.argmax(used)))
+
+    def told(self, covariance: Array | None) -> dict[str, float]:
+        """Standard deviations of parameters that sensors' noise leaves, and half-widths of outcomes asked for."""
+        if covariance is None:
+            return {}
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+        found = {name: value for name, value in zip(self.parameters, std, strict=True) if value > 0}
+        return found if self.limits is None else found | self.limits.told(covariance)
+
+    @property
+    def of_information(self) -> Accuracy:
+        """What of it is a statement about information matrices alone, and so bounds every track."""
+        if self.limits is None:
+            return self
+        without = np.full_like(self.variance, np.inf)
+        return replace(self, variance=without, outcomes=(), gradients=np.zeros((0, len(self.prior))), limits=None)
 
     def margin(self, information: Array) -> float:
         """f of information (d, d) besides the prior; -inf where it is singular."""
@@ -142,65 +192,87 @@ class Accuracy:
         return np.asarray(root.T @ root / np.outer(scale, scale))
 
 
-def stated_accuracy(settings: AccuracySettings, design: DurationDesign, vessel: Vessel) -> Accuracy:
+def stated_accuracy(
+    settings: AccuracySettings,
+    design: DurationDesign,
+    vessel: Vessel,
+    runs: Sequence[Primitive] = (),
+    environment: Environment = CALM,
+) -> Accuracy:
     """The accuracy that settings ask for.
 
     Args:
         settings: of the scenario.
         design: the optimal durations in `total_s`.
         vessel: gives nominal values and the noise of sensors.
+        runs: of the design, in its order; needed where standard deviations are asked for.
+        environment: that the trial is sailed in.
 
     Raises:
-        InputError: settings of the design under which the information of a track cannot be added up, or a standard
-            deviation of a parameter without stated noise.
+        InputError: settings of the design under which the information of a track cannot be added up, a standard
+            deviation of a parameter without stated noise, or a vessel that cannot run the trial of an outcome.
+        NoAnswer: a trial does not end, or an outcome is not smooth in a parameter.
     """
     problem = design.problem
     _check_adds_up(design)
-    nominal = dict(zip(vessel.model.names, np.abs(vessel.model.parameters).tolist(), strict=True))
-    asked = {**settings.std, **{name: share * nominal[name] for name, share in settings.relative_std.items()}}
-    noise = dict(zip(asked, equation_noise(vessel, list(asked)).tolist(), strict=True))
-    if silent := [name for name in asked if not noise[name] > 0]:
-        raise InputError(
-            f"design.accuracy asks for the standard deviation of {silent[0]}, which needs the noise of its sensor: "
-            "expected [sensors] in the vessel file to state it"
-        )
-    outcomes, gradients = _outcomes(settings, design, vessel)
     samples = problem.total_s / vessel.sample_time_s
     collected = Collected.of(problem) if settings.as_durations else None
-    return Accuracy(
+    found = Accuracy(
         collected=collected,
         level=collected.value(design.fractions) if collected else -np.inf,
         samples=samples,
         prior=problem.prior * samples,
-        variance=np.array([(asked[n] / noise[n]) ** 2 if n in asked else np.inf for n in problem.parameters]),
+        variance=np.full(len(problem.parameters), np.inf),
         parameters=problem.parameters,
-        outcomes=outcomes,
-        gradients=gradients,
     )
+    limits = asked_limits(settings, design, vessel, found.prior)
+    return found if limits is None else _forecast(found, limits, design, vessel, runs, environment)
 
 
-def _outcomes(settings: AccuracySettings, design: DurationDesign, vessel: Vessel) -> tuple[tuple[str, ...], Array]:
-    """Outcomes asked for, and their gradients (o, d) in units of their largest standard deviation and of the noise.
+def _forecast(
+    accuracy: Accuracy,
+    limits: Limits,
+    design: DurationDesign,
+    vessel: Vessel,
+    runs: Sequence[Primitive],
+    environment: Environment,
+) -> Accuracy:
+    """The accuracy with limits, whose margins forecast what tracks will reach.
 
-    Raises:
-        InputError: an outcome without stated noise of a sensor, or the vessel cannot run its trial.
-        NoAnswer: a trial does not end, or an outcome is not smooth in a parameter.
+    The ratio of standard deviations to those of independent residuals is that of the optimal durations; 1 where these
+    do not determine every parameter.
     """
-    problem, asked = design.problem, settings.outcomes_95
-    if not asked:
-        return (), np.zeros((0, 0))
-    found = outcome_gradients(vessel, tuple(asked), problem.parameters, speed_mps=settings.outcome_speed_mps)
+    problem = design.problem
+    p, d = len(problem.parameters), len(accuracy.prior)
     noise = equation_noise(vessel, problem.parameters)
-    silent = [name for name, size in zip(problem.parameters, noise.tolist(), strict=True) if not size > 0]
-    if silent:
-        raise InputError(
-            f"design.accuracy.outcomes_95 needs the noise of the sensor for {silent[0]}: expected [sensors] in the "
-            "vessel file to state it"
+    slopes = np.zeros((len(limits.std), d))
+    slopes[:, :p] = limits.slopes * noise / limits.std[:, None]
+    ratio, blind = np.ones(len(limits.std)), np.zeros_like(accuracy.prior)
+    M = accuracy.samples * np.tensordot(design.fractions, problem.matrices, axes=1)
+    white = replace(accuracy, prior=blind)._inverse(M)
+    with suppress(NotInformative):
+        own = expected_covariance(
+            vessel,
+            trial_parts(runs, (design.fractions * problem.total_s / problem.run_s).tolist(), environment=environment),
+            problem.parameters,
+            environment=environment,
+            mean_subtraction=problem.mean_subtraction,
+            unknown_current=environment.current_std_mps > 0,
         )
-    std = np.array([asked[name] for name in found.names]) / NORMAL_95
-    gradients = np.zeros((len(found.names), len(problem.prior)))
-    gradients[:, : len(problem.parameters)] = found.gradients * noise / std[:, None]
-    return found.names, gradients
+        taken = np.sqrt(np.einsum("kd,de,ke->k", slopes, white, slopes))
+        ratio = np.divide(replace(limits, prior=np.zeros((p, p))).used(own), taken, out=ratio, where=taken > 0)
+    count, parameters = len(limits.std) - limits.outcomes, problem.parameters
+    variance = np.array(accuracy.variance)
+    for k, name in enumerate(limits.names[:count]):
+        index = parameters.index(name)
+        variance[index] = (limits.std[k] / (noise[index] * ratio[k])) ** 2
+    return replace(
+        accuracy,
+        variance=variance,
+        outcomes=limits.names[count:],
+        gradients=slopes[count:] * ratio[count:, None],
+        limits=limits,
+    )
 
 
 def _check_adds_up(design: DurationDesign) -> None:

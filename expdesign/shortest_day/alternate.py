@@ -18,7 +18,7 @@ from expdesign.errors import NoAnswer, NoPlan, NoRoom, NotInformative
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, plan_trial
 from expdesign.plan.values import Plan, SailedTrial
-from expdesign.plan.verify import track_information
+from expdesign.plan.verify import expected_errors, track_information
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
@@ -56,7 +56,7 @@ def shortest_day(
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
-        raise NoAnswer(search.too_long(min(reached, key=lambda day: day.day_s), most_s))
+        raise NoAnswer(search.too_long(days, most_s))
     with suppress(NoAnswer):  # limits on runs may allow no more than days near those drafted have
         last = search.cheapest(days)
     found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0, most=TUNING.compared)
@@ -215,7 +215,8 @@ class _Search:
         for day in sorted(days, key=lambda day: abs(day.margin))[: TUNING.nearest]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
-                choice = cheapest_runs(self.accuracy, near, level=margin, tangents=tangents)
+                level = margin + self.accuracy.margin(day.whole) - day.margin
+                choice = cheapest_runs(self.accuracy, near, level=level, tangents=tangents)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
@@ -236,14 +237,17 @@ class _Search:
         """The day with these runs; transitions that the day before tried are not tried again."""
         problem = replace(self.problem, design=self.design(choice.repeats))
         draft = draft_trial(problem, like=days[-1].draft if days else None, progress=progress)
-        information = self._information(draft.sailed)
-        margin = self.accuracy.margin(information.sum(axis=0))
-        return DraftedDay(repeats=choice.repeats, draft=draft, information=information, margin=margin)
+        information, covariance, margin = self._told_by(draft.sailed)
+        return DraftedDay(
+            repeats=choice.repeats, draft=draft, information=information, margin=margin, covariance=covariance
+        )
 
-    def _information(self, sailed: SailedTrial) -> Array:
-        """(legs, d, d) of each leg, or (legs, d + 2, d + 2)."""
+    def _told_by(self, sailed: SailedTrial) -> tuple[Array, Array | None, float]:
+        """(legs, d, d) of each leg, or (legs, d + 2, d + 2); (p, p) covariance of the whole track; and its margin."""
         problem = self.problem
-        return track_information(problem.vessel, problem.design.problem, problem.environment, sailed)
+        of_track = problem.vessel, problem.design.problem, problem.environment, sailed
+        information, covariance = track_information(*of_track), expected_errors(*of_track)
+        return information, covariance, self.accuracy.margin_of_track(information.sum(axis=0), covariance)
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
@@ -293,7 +297,7 @@ class _Search:
             except NoPlan as error:  # a longer day may be less risky
                 refused = error
                 continue
-            if good(plan, margin := self.accuracy.margin(self._information(plan.sailed).sum(axis=0))):
+            if good(plan, margin := self._told_by(plan.sailed)[2]):
                 found.append(
                     ShortestDay(
                         plan=plan,
@@ -310,13 +314,20 @@ class _Search:
         return found
 
     def falls_short(self, days: Sequence[DraftedDay]) -> str:
-        """That no day reaches the accuracy, and what is scarcest."""
-        short = max(days, key=lambda day: day.margin)
-        name = self.accuracy.scarcest(short.whole)
-        about = f", {name} being the furthest from what is asked" if name else ""
+        """That no day reaches the accuracy, the best that is possible, and what would help."""
         return (
-            f"no day found reaches design.accuracy; the best of {len(days)} tells {np.exp(short.margin):.0%} of what "
-            f"is needed{about}; less accuracy, or manoeuvres that need less room, would do"
+            f"no day found reaches design.accuracy; {self._best(days)}; less accuracy, or manoeuvres that need less "
+            "room, would do"
+        )
+
+    def _best(self, days: Sequence[DraftedDay]) -> str:
+        """What the most accurate of days tells, and by how much better sensors it would be enough."""
+        best = max(days, key=lambda day: day.margin)
+        lacks = self.accuracy.lacking(best.whole, best.covariance)
+        noise = f"sensors with {np.exp(best.margin / 2):.2g} of the noise would do then"
+        return (
+            f"the best of {len(days)}, of {best.day_s:.0f} s, tells {np.exp(best.margin):.0%} of what is needed"
+            f"{': ' if lacks else ''}{lacks}{'; ' + noise if best.margin > -np.inf else ''}"
         )
 
     def curve(self, days: Sequence[DraftedDay], repeats: Sequence[int]) -> Array:
@@ -345,14 +356,17 @@ class _Search:
             expected_s=day.expected_s,
             informative_s=day.draft.sailed.seconds("primitive"),
             information=float(np.exp(day.margin)),
+            told=self.accuracy.told(day.covariance),
         )
 
-    def too_long(self, day: DraftedDay, most_s: float) -> str:
-        name = self.accuracy.scarcest(day.whole)
-        about = f"; {name} needs most of it" if name else ""
+    def too_long(self, days: Sequence[DraftedDay], most_s: float) -> str:
+        """That days which reach the accuracy take longer than allowed, and the best that is possible in that time."""
+        reached_s = min(day.day_s for day in days if day.margin >= 0)
+        short = [day for day in days if day.day_s <= most_s]
+        within = f"within most_s {self._best(short)}" if short else "none of those found is within most_s"
         return (
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
-            f"{day.day_s:.0f} s{about}; a larger most_s or less accuracy would do"
+            f"{reached_s:.0f} s; {within}; a larger most_s or less accuracy would do"
         )
 
 

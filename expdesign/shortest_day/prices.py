@@ -60,12 +60,14 @@ class DraftedDay:
         information: (legs, d, d) of each leg of its track, or (legs, d + 2, d + 2) where the forecast leaves a steady
             current unknown.
         margin: of the accuracy, by the whole track.
+        covariance: (p, p) of estimates from the whole track; None where it does not determine every parameter.
     """
 
     repeats: tuple[int, ...]
     draft: Draft
     information: Array
     margin: float
+    covariance: Array | None = None
 
     @property
     def whole(self) -> Array:

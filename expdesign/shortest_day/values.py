@@ -46,6 +46,8 @@ class DayTried:
         day_s, informative_s: all of it, and its runs, as planned [s].
         expected_s: all of it with the expected time of go-arounds [s].
         information: of the whole track as a share of what is needed: time would have to be 1 / information as long.
+        told: expected standard deviations of parameters from the whole track, and half-widths of the 95 % intervals of
+            the outcomes asked for.
     """
 
     runs: Mapping[str, int]
@@ -53,6 +55,7 @@ class DayTried:
     informative_s: float
     expected_s: float
     information: float
+    told: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

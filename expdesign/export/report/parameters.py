@@ -11,7 +11,8 @@ from expdesign.estimation.methods import steady_current_method
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.signals import Commands
+from expdesign.plan.verify import part_of_track
+from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array, seal
 
 
@@ -53,6 +54,14 @@ def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow
 
 def _std(value: float) -> str:
     return "not estimable" if np.isnan(value) else _small(value)
+
+
+def told_table(day: ShortestDay) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """How well each parameter and outcome is told by every day planned, the shortest first: header and rows."""
+    days = sorted((item for item in enumerate(day.tried, start=1) if item[1].told), key=lambda item: item[1].day_s)
+    names = list(dict.fromkeys(name for _, item in days for name in item.told))
+    header = ("", *(f"Day {number}, {words.duration(item.day_s)}" for number, item in days))
+    return header, [(name, *(_small(item.told[name]) for _, item in days)) for name in names]
 
 
 SMALL = 1e-3
@@ -112,25 +121,12 @@ class Expected:
 
 def expected(content: ReportContent) -> Expected:
     """By first-order propagation of the vessel file's sensor noise through instrumental-variable estimation."""
-    plan = content.plan
-    runs = [leg for leg in plan.legs if leg.kind == "primitive"]
-    whole = [_part(content, 0, len(plan.commands))]
+    sailed = content.plan.sailed
+    runs = [leg for leg in sailed.legs if leg.kind == "primitive"]
     return Expected(
         before=content.parameter_std,
-        runs=_deviations(content, [_part(content, leg.first, leg.last) for leg in runs]),
-        track=_deviations(content, whole),
-    )
-
-
-def _part(content: ReportContent, first: int, last: int) -> TrialPart:
-    commands, motion = content.plan.commands, content.plan.trajectory
-    return TrialPart(
-        commands=Commands(
-            sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[first:last]
-        ),
-        velocity=motion.velocity[first],
-        heading_rad=float(motion.pose[first, 2]),
-        standing=commands.values[first - 1] if first else None,
+        runs=_deviations(content, [part_of_track(sailed, leg.first, leg.last) for leg in runs]),
+        track=_deviations(content, [part_of_track(sailed)]),
     )
 
 

@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.durations import Collected, DurationDesign, DurationProblem, bordered_moments
+from expdesign.errors import NotInformative
 from expdesign.information import moments, regressor_rows
+from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.unknown_current import beside_current, bordered_by_current, current_rows
 from expdesign.plan.values import SailedTrial
+from expdesign.signals import Commands
 from expdesign.simulation import Environment, delivered
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -89,6 +92,41 @@ def track_covariance(
     if not (scale > 0).all() or np.linalg.matrix_rank(M / np.outer(scale, scale)) < len(M):
         return None
     return np.asarray((np.linalg.inv(M / np.outer(scale, scale)) / np.outer(scale, scale))[:p, :p])
+
+
+def part_of_track(sailed: SailedTrial, first: int = 0, last: int | None = None) -> TrialPart:
+    """Some of its samples, all by default, as one batch of data."""
+    commands, motion = sailed.commands, sailed.trajectory
+    begin = np.zeros(len(commands.names)) if sailed.standing is None else sailed.standing
+    return TrialPart(
+        commands=Commands(
+            sample_time_s=commands.sample_time_s, names=commands.names, values=commands.values[first:last]
+        ),
+        velocity=motion.velocity[first],
+        heading_rad=float(motion.pose[first, 2]),
+        standing=commands.values[first - 1] if first else begin,
+    )
+
+
+def expected_errors(
+    vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial
+) -> Array | None:
+    """(p, p) covariance of estimates from the whole track as one batch, in the parameters' units.
+
+    By first-order propagation of the sensors' noise, see `information.expected`. None where the track does not
+    determine every parameter.
+    """
+    try:
+        return expected_covariance(
+            vessel,
+            [part_of_track(sailed)],
+            problem.parameters,
+            environment=environment,
+            mean_subtraction=problem.mean_subtraction,
+            unknown_current=environment.current_std_mps > 0,
+        )
+    except NotInformative:
+        return None
 
 
 def _bordered(vessel: Vessel, rows: Array, parameters: Sequence[str], mean_subtraction: str) -> Array:

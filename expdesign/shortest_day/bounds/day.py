@@ -24,7 +24,8 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
 
     Args:
         problem: gives vessel, weather, water, dictionary and ends.
-        accuracy: to be reached.
+        accuracy: to be reached; limits on standard deviations bound the way only, as noise that samples share leaves no
+            information of single samples to bound.
         plan: a day found; the class of motions holds it.
     """
     seen = _velocities(problem, plan)
@@ -37,7 +38,7 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
             velocities,
             air_to=environment.wind_to - environment.current_to,
         )
-        samples = fewest_samples(accuracy, motions, mean_subtraction=design.mean_subtraction)
+        samples = fewest_samples(accuracy.of_information, motions, mean_subtraction=design.mean_subtraction)
     except InputError:  # inputs without limits, or enough known already: nothing to tell
         samples = None
     second = problem.vessel.sample_time_s

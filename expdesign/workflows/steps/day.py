@@ -84,7 +84,9 @@ def planned_day(
         return Day(information=information, design=design, plan=plan)
     from expdesign.shortest_day import check_way_fits, day_bound, fullest_day, shortest_day, stated_accuracy
 
-    case, accuracy = replace(case, plan=with_leg_speed(case)), stated_accuracy(asked, design, case.vessel)
+    runs = tuple(item.primitive for item in information)
+    accuracy = stated_accuracy(asked, design, case.vessel, runs, case.environment)
+    case = replace(case, plan=with_leg_speed(case))
     searching, planning = in_phases(progress, *WORK)
     problem = plan_problem(case, information, design, seed=seed)
     check_start(problem, ship_on_legs(problem))
@@ -170,6 +172,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
                 "expected_s": item.expected_s,
                 "informative_s": item.informative_s,
                 "information": item.information,
+                "told": dict(item.told),
             }
             for item in found.tried
         ],
