@@ -11,7 +11,7 @@ from expdesign.loading import Question, build_question, run_information
 from expdesign.roll import Case, Run, build_problem, estimate_roll
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
-from expdesign.simulation import CALM, measure, rudder_angle, simulate
+from expdesign.simulation import CALM, in_waves, measure, rudder_angle, simulate
 from expdesign.values import Array
 from expdesign.vessel import NOMINAL, Load, Vessel
 
@@ -47,7 +47,7 @@ def trial(vessel: Vessel, load: Load, seed: int, samples: int = 4000) -> dict[st
     """Measured columns of a run at a load."""
     rng, ship = np.random.default_rng(seed), loaded(vessel, load)
     commands = orders(ship, samples, rng)
-    sailed = simulate(ship, commands, velocity=UNDER_WAY)
+    sailed = in_waves(ship, simulate(ship, commands, velocity=UNDER_WAY), rng)
     return measure(ship, commands, sailed, environment=CALM, rng=rng)
 
 

@@ -17,7 +17,7 @@ FLOORS = {
         ("input_files", "processes"),
         ("memory",),
         ("conventions", "values"),
-        ("signals", "sea_area"),
+        ("signals", "sea_area", "waves"),
         ("vessel",),
         ("simulation", "records"),
         ("reduction",),

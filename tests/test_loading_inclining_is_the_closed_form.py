@@ -1,12 +1,18 @@
 """Inclining tests: heel, metacentric height and inertia are the textbook's, errors are their derivatives."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from design_case import SCENARIOS
+from expdesign.cli import main
 from expdesign.errors import InputError
 from expdesign.loading import heel_of_shift, inclining
+from expdesign.scenario import load_vessel
+from rolling_ship import ROLL_MODEL
 
 SHIP = {"displacement_kg": 3.7e6, "metacentric_height_m": 1.3}
 TEST = {**SHIP, "mass_kg": 2e4, "shift_m": 10.0, "period_s": 9.0}
@@ -40,3 +46,52 @@ def test_four_shifts_halve_the_error_and_no_decay_leaves_the_inertia_open() -> N
 def test_nothing_that_is_not_positive_is_taken() -> None:
     with pytest.raises(InputError, match="shift_m is 0, expected more than 0"):
         inclining(**{**TEST, "shift_m": 0.0}, heel_std_rad=1e-4)
+
+
+def inclined(*more: str, vessel: Path = ROLL_MODEL) -> int:
+    return main(["incline", "--vessel", str(vessel), "--mass-kg", "0.2", "0.4", "--shift-m", "0.05", *more])
+
+
+def test_the_command_tells_every_mass_and_shift(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Numbers of the file are those of the closed forms, by hand from the vessel file's [roll]."""
+    asked = ("--heel-std-deg", "0.01", "--period-std-s", "0.02", "--shifts", "2", "--out", str(tmp_path))
+    assert inclined(*asked) == 0
+    told = json.loads((tmp_path / "incline.json").read_text())
+    pendulum = load_vessel(ROLL_MODEL).pendulum
+    assert pendulum is not None
+    assert told["displacement_kg"] == 22.04
+    height = (9.0 + 9.81 * 22.04 * (0.0073 - 0.0294)) / (9.81 * 22.04)
+    assert told["metacentric_height_m"] == pytest.approx(height, rel=1e-12)
+    assert [(row["mass_kg"], row["shift_m"]) for row in told["tests"]] == [(0.2, 0.05), (0.4, 0.05)]
+    for row in told["tests"]:
+        heel = math.atan(row["mass_kg"] * 0.05 / (22.04 * height))
+        assert row["heel_rad"] == pytest.approx(heel, rel=1e-12)
+        share = math.radians(0.01) / math.sqrt(2) / (math.sin(heel) * math.cos(heel))
+        assert row["metacentric_height_std_m"] == pytest.approx(height * share, rel=1e-9)
+        period = 2 * 0.02 / told["period_s"]
+        assert row["inertia_std_kgm2"] == pytest.approx(row["inertia_kgm2"] * math.hypot(share, period), rel=1e-9)
+    printed = capsys.readouterr().out
+    assert f"{math.degrees(told['tests'][1]['heel_rad']):.2f}" in printed
+
+
+def test_without_a_decay_the_command_leaves_the_inertia_open(tmp_path: Path) -> None:
+    assert inclined("--out", str(tmp_path)) == 0
+    assert json.loads((tmp_path / "incline.json").read_text())["tests"][0]["inertia_std_kgm2"] is None
+
+
+def test_what_cannot_be_inclined_is_one_line_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    falling = tmp_path / "falling.toml"
+    falling.write_text(ROLL_MODEL.read_text().replace("k = 9.0", "k = 4.0"))
+    without = SCENARIOS / "vessels" / "model-ship.toml"
+    for asked, vessel, status, line in (
+        ((), without, 2, "roll: is missing, expected a table [roll] with masses and heights"),
+        ((), falling, 3, "does not stay upright: her metacentric height is -0.0"),
+        (("--heel-std-deg", "0"), ROLL_MODEL, 2, "heel_std_rad is 0, expected more than 0"),
+    ):
+        assert inclined(*asked, "--out", str(tmp_path / "out"), vessel=vessel) == status
+        error = capsys.readouterr().err.strip().splitlines()
+        assert len(error) == 1
+        assert line in error[0]
+    assert not (tmp_path / "out").exists()

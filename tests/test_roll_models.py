@@ -12,16 +12,13 @@ from expdesign.roll import (
     NOMINAL,
     PARAMETERS,
     Body,
-    Jonswap,
     Load,
     axis_inertia,
     closed_loop,
     coefficients,
     continuous,
     discrete,
-    encounter,
     first_moment,
-    froude_factor,
     load_from,
     lumped_centre,
     named,
@@ -29,10 +26,10 @@ from expdesign.roll import (
     parameters,
     pendulum_system,
     sensed_inertia,
-    shaping_filter,
     simulated,
     stiffness,
 )
+from expdesign.waves import Jonswap, encounter, froude_factor, shaping_filter
 from roll_truths import MODEL_SHIP, MODEL_SHIP_TRUTH, PENDULUM, PENDULUM_TRUTH, Hull, ship_system
 
 LOAD = Load(mass_kg=0.2, z_m=-0.274)

@@ -17,6 +17,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import AUXILIARY, Commands
 from expdesign.simulation import simulate
 from expdesign.vessel import NOMINAL, NOT_ACTING_BACK, ROLL_PARAMETERS, Load, Roll, Term, Vessel, VesselModel
+from expdesign.waves import Waves
 from expdesign.workflows import roll, score
 from rolling_ship import HIGH, ROLL_MODEL, UNDER_WAY, UNKNOWN, loaded, orders, roll_model, trial, write_csv
 
@@ -138,7 +139,9 @@ def test_she_leans_into_a_turn_first_and_out_of_it_later() -> None:
 def test_a_vessel_with_a_pendulum_survives_its_file(tmp_path: Path) -> None:
     pendulum = SHIP.pendulum
     assert pendulum is not None
-    ship = replace(SHIP, pendulum=replace(pendulum, load=HIGH, parameter_correlation={("A_x", "k"): 0.5}))
+    waves = Waves(height_m=0.05, period_s=1.3, from_rad=0.5, slope_share=0.8)
+    pendulum = replace(pendulum, load=HIGH, parameter_correlation={("A_x", "k"): 0.5}, waves=waves)
+    ship = replace(SHIP, pendulum=pendulum)
     path = tmp_path / "same.toml"
     path.write_text(vessel_toml(ship))
     assert load_vessel(path).pendulum == ship.pendulum
@@ -150,6 +153,8 @@ def test_a_vessel_with_a_pendulum_survives_its_file(tmp_path: Path) -> None:
         ("A_x = 0.157\n", "", r"roll: period_s and parameters\.A_x: neither is given, expected one of them"),
         ("mass_kg = 22.04", "mass_kg = 22.04\ndamping_ratio = 0.1", r"damping_ratio and parameters\.d: both"),
         ("K_vd = 0.95", "K_v = 0.95", r"roll\.parameters: .*'K_v'"),
+        ("[roll]\n", "[roll.waves]\nheight_m = 0.1\nperiod_s = 1.3\nfrom_deg = 0.0\ngamma = 9.0\n\n[roll]\n",
+         r"roll: waves\.gamma is 9, expected 1 to 7"),
         ("A_x = 0.157", "A_x = -0.157", r"roll: has a roll inertia A_x of -0\.157"),
         ("[roll]\n", "[model.roll]\nperiod_s = 9.0\ndamping_ratio = 0.1\nY_phi = 0.0\nN_phi = 0.0\n\n[roll]\n",
          r"roll: is given beside \[model\.roll\], expected one of them"),

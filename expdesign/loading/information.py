@@ -5,8 +5,9 @@ sensors with the spectrum
 
     S(w) = |i w + alpha1 + alpha2 / (i w)|^2 s_p^2 + beta1^2 s_s^2 + kappa1^2 s_r^2
 
-of gyro, accelerometer and yaw-rate gyro. Weighted by it, the noise-free signals x (k, 5) give X = sum_w x* x / S, and
-J^T X J with the derivatives J of the coefficients by the parameters. Waves and what the model misses come on top.
+of gyro, accelerometer and yaw-rate gyro, and of the moment of the waves that the vessel file states, as met at the
+manoeuvre's mean speed on any course. Weighted by it, the noise-free signals x (k, 5) give X = sum_w x* x / S, and
+J^T X J with the derivatives J of the coefficients by the parameters. What the model misses comes on top.
 
 Source: doctoral thesis on grey-box identification of ship roll with few sensors, (5.17)-(5.24); L. Ljung, System
 Identification (1999), 15.3, for the covariance of the best instruments.
@@ -21,8 +22,8 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NotInformative
-from expdesign.roll import TUNING, coefficients, named
-from expdesign.signals import AUXILIARY
+from expdesign.roll import TUNING, coefficients, named, sensed_inertia
+from expdesign.signals import AUXILIARY, Trajectory
 from expdesign.simulation import rudder_angle, simulate
 from expdesign.values import Array
 from expdesign.vessel import Load, RollPendulum, Vessel
@@ -103,7 +104,8 @@ def _moments(ship: Vessel, primitive: Primitive, values: Array) -> Array:
     frequency = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(signals), commands.sample_time_s)[1:], dtype=float)
     both = np.full(len(frequency), 2.0)  # positive and negative frequencies, but for the highest of an even number
     both[-1] = 1.0 if len(signals) % 2 == 0 else 2.0
-    weight = both / _noise(ship, values, frequency) / len(signals)
+    noise = _noise(ship, values, frequency) + _waves(ship, sailed, frequency)
+    weight = both / noise / len(signals)
     return np.asarray(((spectrum.conj() * weight[:, None]).T @ spectrum).real)
 
 
@@ -113,3 +115,15 @@ def _noise(ship: Vessel, values: Array, frequency: Array) -> Array:
     of, w = ship.sensors, 1j * frequency
     rate = np.abs(w + alpha1 + alpha2 / w) ** 2 * of.roll_rate_radps**2
     return np.asarray(rate + (beta * of.acceleration_mps2) ** 2 + (kappa * of.yaw_rate_radps) ** 2)
+
+
+def _waves(ship: Vessel, sailed: Trajectory, frequency: Array) -> Array:
+    """(f,) per sample, of their moment over the inertia in the equation."""
+    pendulum = ship.pendulum
+    if pendulum is None or pendulum.waves is None:
+        return np.zeros(len(frequency))
+    speed = float(np.hypot(*sailed.velocity[:, :2].T).mean())
+    of, body, load = pendulum.parameters, pendulum.body, pendulum.load
+    inertia = sensed_inertia(of["A_x"], body, load, of["z_f"]) - of["K_vd"] * body.sensor(of["z_f"])
+    slope = pendulum.waves.met_density(frequency, speed) * np.pi / sailed.sample_time_s
+    return np.asarray((pendulum.righting_nm / inertia) ** 2 * slope)

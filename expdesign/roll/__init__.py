@@ -34,7 +34,6 @@ from expdesign.roll.pendulum import load_from, own_parameters, pendulum_system
 from expdesign.roll.prepare import LowPass, low_pass, prepared
 from expdesign.roll.runs import SIGNALS, Case, Run
 from expdesign.roll.tuning import TUNING
-from expdesign.roll.waves import Jonswap, encounter, froude_factor, shaping_filter
 from expdesign.vessel.masses import (
     G_MPS2,
     NOMINAL,
@@ -62,7 +61,6 @@ __all__ = [
     "Coefficients",
     "Cure",
     "Direction",
-    "Jonswap",
     "Load",
     "LowPass",
     "NullSpace",
@@ -77,11 +75,9 @@ __all__ = [
     "cures",
     "direction",
     "discrete",
-    "encounter",
     "estimate_roll",
     "first_moment",
     "fitted_pendulum",
-    "froude_factor",
     "load_from",
     "low_pass",
     "lumped_centre",
@@ -95,7 +91,6 @@ __all__ = [
     "relative_sensitivity",
     "roll_frequency",
     "sensed_inertia",
-    "shaping_filter",
     "simulated",
     "stiffness",
 ]

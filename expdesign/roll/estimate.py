@@ -20,8 +20,9 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
+from expdesign.roll.feedback import chance_of_answers
 from expdesign.roll.instruments import Weighted, folds, weighted_equations
-from expdesign.roll.model import PARAMETERS, discrete, named, parameters, relative_sensitivity
+from expdesign.roll.model import PARAMETERS, discrete, named, parameters, relative_sensitivity, roll_frequency
 from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
@@ -131,9 +132,11 @@ class RollEstimate:
         rounds: (r, 9) parameters after each round of spectra.
         settled: whether the last round changed little.
         residual_std: (c,) of each case [rad/s].
-        leaning: (p,) bias of each free parameter towards least squares, in its standard deviations, by instruments that
-            the noise hides; of the held ones zero.
+        strength: of the instruments, what they tell of the worst combination of parameters over what noise alone would
+            seem to tell; nan for least squares.
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
+        unanswered: how often a rudder that answers nothing goes with what rolls the ship as much as this one, 0 to 1;
+            nan for least squares and a ship that does not stay upright.
     """
 
     problem: RollProblem
@@ -145,11 +148,12 @@ class RollEstimate:
     rounds: Array
     settled: bool
     residual_std: Array
-    leaning: Array
+    strength: float
     surprise: float
+    unanswered: float
 
     def __post_init__(self) -> None:
-        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c", leaning="p")
+        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c")
 
     @property
     def std(self) -> dict[str, float]:
@@ -171,13 +175,19 @@ class RollEstimate:
 
     @property
     def trusted(self) -> bool:
-        """Whether intervals may be believed: rounds settled, no bound reached, nothing left of the rudder, no bias."""
-        return self.settled and not self.reached and not self.surprise > TUNING.most_surprise and not self.weak
+        """Whether intervals may be believed: instruments are strong, the rudder answers nothing, and the model fits."""
+        fits = self.settled and not self.reached and not self.surprise > TUNING.most_surprise
+        return self.method == "iv" and fits and not self.weak and not self.answering
 
     @property
     def weak(self) -> bool:
         """Whether noise hides what the rudder does, so that the estimate leans towards least squares."""
-        return bool(np.abs(self.leaning).max() > TUNING.most_leaning)
+        return self.strength < TUNING.least_strength
+
+    @property
+    def answering(self) -> bool:
+        """Whether the rudder, or what was planned of it, answers what rolls the ship, so that it is no instrument."""
+        return self.unanswered < TUNING.least_unanswered
 
 
 def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
@@ -211,9 +221,21 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         rounds=np.array(history),
         settled=settled,
         residual_std=np.array([np.std(np.concatenate(e)) for e in _noise(problem, weighted, theta)]),
-        leaning=_leaning(problem, weighted, theta, sensed, covariance),
+        strength=_strength(problem, weighted, theta, sensed, covariance) if method == "iv" else float("nan"),
         surprise=_surprise(left, len(problem.free) - len(held)),
+        unanswered=_unanswered(problem, weighted, theta, sensed) if method == "iv" else float("nan"),
     )
+
+
+def _unanswered(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array) -> float:
+    hertz = np.array([roll_frequency(theta, problem.body, case.load) for case in problem.cases])
+    if not (hertz > 0).all():
+        return float("nan")
+    told = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
+    return chance_of_answers(
+        problem.cases, weighted, _noise(problem, weighted, theta), [rows[:, problem.places] for rows in told], sensed,
+        (1.0 / (hertz * problem.step_s)).tolist(),
+    )  # fmt: skip
 
 
 def _surprise(left: Array, fitted: int) -> float:
@@ -312,22 +334,26 @@ def _covariance(
     return np.asarray(middle * np.outer(scale, scale))
 
 
-def _leaning(
+def _strength(
     problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, covariance: Array
-) -> Array:
-    """(p,) bias in standard deviations: the noise of the regressors follows that of the equation at each instrument.
+) -> float:
+    """Least ratio, over combinations of the free parameters, of what they move to what noise alone would seem to.
 
-    Source: A. L. Nagar, Econometrica 27 (1959), 575-595, with spectra in place of variances.
+    That is the smallest F statistic of a regression of the regressors on the instruments. Noise is what their plain
+    regression on the instruments leaves.
+
+    Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240, with spectra in place of variances;
+    D. Staiger and J. H. Stock, Econometrica 65 (1997), 557-586, for what weak instruments do.
     """
     std = np.sqrt(np.diag(covariance))
     found = std > 0
-    follows, fitted = np.zeros(len(std)), np.count_nonzero(found)
-    by = zip(problem.cases, weighted, _noise(problem, weighted, theta), strict=True)
-    for case, part, residuals in by:
-        power = flat_spectrum(residuals).power(part.basis)
-        crossed = [cross_spectrum([rows.X[:, j] for rows in part.rows], residuals).real @ power for j in range(5)]
-        follows += crossed @ discrete(theta, problem.body, case.load, problem.step_s).jacobian[:, problem.places]
-    slopes = sensed[:, found] * std[found]
-    result = np.zeros(len(std))
-    result[found] = np.linalg.pinv(slopes.T @ slopes) @ (follows[found] * std[found]) * (1.0 - fitted / len(sensed))
-    return result
+    noise = np.zeros((len(std),) * 2)
+    for case, part in zip(problem.cases, weighted, strict=True):
+        columns = [[hidden[:, j] for hidden in part.hidden] for j in range(5)]
+        power = flat_spectrum(columns[0]).power(part.basis)
+        by = np.array([[cross_spectrum(one, other).real @ power for other in columns] for one in columns])
+        jacobian = discrete(theta, problem.body, case.load, problem.step_s).jacobian[:, problem.places]
+        noise += jacobian.T @ by @ jacobian
+    size = np.outer(std[found], std[found])
+    told, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
+    return float(scipy.linalg.eigh(told, seeming + 1e-12 * np.trace(seeming) * np.eye(len(told)), eigvals_only=True)[0])

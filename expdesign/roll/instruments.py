@@ -1,9 +1,10 @@
 """Instruments: what the ship would have done by the rudder alone, without noise and waves.
 
 The rudder moves sway, yaw and roll in ways that nobody models: black boxes from rudder to each signal tell what it
-does. A box that is fitted to the noise among which it is used makes instruments that follow this noise, and intervals
-that are too short; so the record is split into parts, and each has the boxes that the others were fitted to. Errors of
-the boxes then cost accuracy, not consistency.
+does. Where a helm answers the ship, the rudder that was planned takes its place, and the rudder is one of the signals.
+A box that is fitted to the noise among which it is used makes instruments that follow this noise, and intervals that
+are too short; so the record is split into parts, and each has the boxes that the others were fitted to. Errors of the
+boxes then cost accuracy, not consistency.
 
 Source: doctoral thesis on grey-box identification of roll with few sensors, algorithm 5.1, step A; J. D. Angrist, G. W.
 Imbens and A. B. Krueger, J. Applied Econometrics 14 (1999), 57-67, for instruments fitted elsewhere. The simulation of
@@ -56,11 +57,12 @@ class Fold:
 def folds(runs: Sequence[Run]) -> list[list[Fold]]:
     """Of each run: whole runs where there are enough of them, else parts of equal length."""
     parts = _parts([len(run.signals) for run in runs])
-    rudders = [run.signals[:, 3] for run in runs]
-    boxes = [_boxes(rudders, [run.signals[:, place] for run in runs], parts) for place in range(3)]
+    sources = [run.source for run in runs]
+    sought = 3 if all(run.planned is None for run in runs) else 4
+    boxes = [_boxes(sources, [run.signals[:, place] for run in runs], parts) for place in range(sought)]
     return [
-        [Fold(part, instrument_columns(_simulated(rudder, [box[number] for box in boxes]))) for number, part in own]
-        for rudder, own in zip(rudders, parts, strict=True)
+        [Fold(part, instrument_columns(_simulated(source, [box[number] for box in boxes]))) for number, part in own]
+        for source, own in zip(sources, parts, strict=True)
     ]
 
 
@@ -101,9 +103,9 @@ def _solved(table: Array) -> BlackBox:
     return found[past:], inside(np.concatenate([[1.0], found[:past]]))
 
 
-def _simulated(rudder: Array, boxes: Sequence[BlackBox]) -> Array:
-    """(k, 4) signals as in a run."""
-    return np.column_stack([*(scipy.signal.lfilter(*box, rudder) for box in boxes), rudder])
+def _simulated(source: Array, boxes: Sequence[BlackBox]) -> Array:
+    """(k, 4) signals as in a run; the source is the rudder where there is no box for it."""
+    return np.column_stack([*(scipy.signal.lfilter(*box, source) for box in boxes), source])[:, :4]
 
 
 def instrument_columns(simulated: Array) -> Array:
@@ -124,8 +126,12 @@ def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> 
     """
     first = TUNING.left_out_samples
     divided = [(fold.part, left.divided(noise.whitened(fold.columns)[first:])) for fold in own]
-    stitched = np.concatenate([columns[max(part.start - first, 0) : part.stop - first] for part, columns in divided])
-    return without_start(stitched, noise)
+    return without_start(_stitched(divided, first), noise)
+
+
+def _stitched(parts: Sequence[tuple[slice, Array]], first: int) -> Array:
+    """(n, q) rows of each part from its own columns, which begin with the first sample that is kept."""
+    return np.concatenate([columns[max(part.start - first, 0) : part.stop - first] for part, columns in parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +142,16 @@ class Weighted:
         rows: of each run.
         basis: (n, q) of each run, whose sum of products with the noise has unit covariance.
         top, slope: sums of its products with y and X, (q,) and (q, 5).
+        noise: that whitened the rows.
+        hidden: (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares.
     """
 
     rows: tuple[Rows, ...]
     basis: tuple[Array, ...]
     top: Array
     slope: Array
+    noise: NoiseModel
+    hidden: tuple[Array, ...]
 
 
 def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> Weighted:
@@ -163,7 +173,20 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
         basis,
         np.sum([B.T @ one.y for B, one in parts], axis=0),
         np.sum([B.T @ one.X for B, one in parts], axis=0),
+        model,
+        () if instruments is None else _hidden(rows, instruments, model),
     )
+
+
+def _hidden(rows: Sequence[Rows], instruments: Sequence[Sequence[Fold]], noise: NoiseModel) -> tuple[Array, ...]:
+    """(n, 5) of each run."""
+    first = TUNING.left_out_samples
+    found = []
+    for own in instruments:
+        parts = [(fold.part, noise.whitened(fold.columns)[first:]) for fold in own]
+        found.append(without_start(_stitched(parts, first), noise))
+    gains = np.linalg.lstsq(np.concatenate(found), np.concatenate([one.X for one in rows]), rcond=1e-10)[0]
+    return tuple(one.X - Z @ gains for one, Z in zip(rows, found, strict=True))
 
 
 def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:

@@ -106,8 +106,14 @@ def _prepared(run: Run, filter_: LowPass, name: str) -> Run:
         raise NotInformative(f"{name} has a run of {len(run.signals)} samples, expected {least} or more")
     if len(filter_.taps) == 1:
         return run
-    kept = scipy.signal.oaconvolve(run.signals, filter_.taps[:, None], mode="valid", axes=0)[:: filter_.every]
-    return Run(step_s=filter_.step_s, signals=kept)
+    planned = None if run.planned is None else _passed(run.planned[:, None], filter_)[:, 0]
+    return Run(step_s=filter_.step_s, signals=_passed(run.signals, filter_), planned=planned)
+
+
+def _passed(signals: Array, filter_: LowPass) -> Array:
+    """(k, ...) filtered and thinned out."""
+    kept = scipy.signal.oaconvolve(signals, filter_.taps[:, None], mode="valid", axes=0)[:: filter_.every]
+    return np.asarray(kept)
 
 
 def _gain(taps: Array, frequency_hz: float, step_s: float) -> float:

@@ -19,13 +19,20 @@ class Run:
         step_s: time between samples [s].
         signals: (k, 4) roll rate [rad/s], positive to starboard; reading of the accelerometer to port, gravity in it
             [m/s2]; yaw rate [rad/s], positive to starboard; rudder, of any sign and unit.
+        planned: (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself.
     """
 
     step_s: float
     signals: Array
+    planned: Array | None = None
 
     def __post_init__(self) -> None:
-        seal(self, signals="k 4")
+        seal(self, signals="k 4", **({} if self.planned is None else {"planned": "k"}))
+
+    @property
+    def source(self) -> Array:
+        """(k,) what moves the rudder and nothing of the ship moves: instruments come from it."""
+        return self.signals[:, 3] if self.planned is None else self.planned
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -24,7 +24,7 @@ from expdesign.simulation.environment import (
 )
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
-from expdesign.simulation.rolling import rudder_angle, steering_signals
+from expdesign.simulation.rolling import in_waves, rudder_angle, steering_signals
 from expdesign.simulation.run import integrate_motion, simulate, simulate_many
 from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
@@ -48,6 +48,7 @@ __all__ = [
     "draw_environment",
     "draw_weather",
     "euler_step",
+    "in_waves",
     "integrate_motion",
     "mapped",
     "mean_weather",

@@ -8,10 +8,12 @@ Source: K. J. Åström and B. Wittenmark, Computer-Controlled Systems (1997), 2.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 
-from expdesign.signals import AUXILIARY, Commands
+from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation.actuation import delivered_at_samples
 from expdesign.simulation.motion import motion_rates
 from expdesign.simulation.program import STATES
@@ -53,6 +55,23 @@ def rolled(
         spin = begin + pendulum.acceleration(roll, rate, 0.0, 0.0, 0.0)
         told["imu_lateral_mps2"] = -pendulum.reading(roll, spin, side)
     return np.column_stack([told.get(name, np.full(len(states), np.nan)) for name in AUXILIARY])
+
+
+def in_waves(vessel: Vessel, sailed: Trajectory, rng: np.random.Generator) -> Trajectory:
+    """The same with the roll that drawn waves add, upright at first; unchanged where the vessel file states none.
+
+    Roll is linear, so that theirs comes on top. Their moment is the righting moment by their slope.
+    """
+    pendulum = vessel.pendulum
+    if pendulum is None or pendulum.waves is None or sailed.auxiliary is None:
+        return sailed
+    slope = pendulum.waves.slope(sailed.pose, sailed.sample_time_s, rng)
+    drive = pendulum.acceleration(slope, 0.0, 0.0, 0.0, 0.0)
+    roll, rate = _followed(pendulum, drive, drive[1:], sailed.sample_time_s)
+    spin = drive + pendulum.acceleration(roll, rate, 0.0, 0.0, 0.0)
+    added = {"roll_rad": roll, "roll_rate_radps": rate, "imu_lateral_mps2": -pendulum.reading(roll, spin, 0.0)}
+    columns = [sailed.auxiliary[:, place] + added.get(name, 0.0) for place, name in enumerate(AUXILIARY)]
+    return replace(sailed, auxiliary=np.column_stack(columns))
 
 
 def _at_ends(vessel: Vessel, commands: Commands, standing: Array | None) -> tuple[Array, Array]:

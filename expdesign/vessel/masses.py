@@ -10,9 +10,7 @@ import math
 from dataclasses import dataclass
 
 from expdesign.errors import InputError
-
-G_MPS2 = 9.81
-"""Gravity, as everywhere in calculations of roll [m/s2]."""
+from expdesign.waves import G_MPS2 as G_MPS2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,7 @@ from typing import Any
 
 from expdesign.errors import InputError
 from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, Load, axis_inertia, first_moment
+from expdesign.waves import Waves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,6 +109,7 @@ class RollPendulum:
         parameters: value of each of `ROLL_PARAMETERS`.
         parameter_std: standard deviations; 0, for known, where there is none.
         parameter_correlation: of pairs of them, by their names; 0 where there is none.
+        waves: that roll the ship in simulated trials; None for still water.
     """
 
     body: Body
@@ -115,6 +117,7 @@ class RollPendulum:
     parameters: Mapping[str, float] = field(hash=False)
     parameter_std: Mapping[str, float] = field(default_factory=dict, hash=False)
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict, hash=False)
+    waves: Waves | None = None
 
     def __post_init__(self) -> None:
         if set(self.parameters) != set(ROLL_PARAMETERS):

@@ -153,6 +153,9 @@ def _pendulum(pendulum: RollPendulum) -> Iterator[str]:
     if load.mass_kg:
         stated = {"mass_kg": load.mass_kg, "height_m": -load.z_m, "inertia_kgm2": load.inertia_kgm2}
         yield from ("", *_table("[roll.load]", stated))
+    if pendulum.waves is not None:
+        waves = {"from_deg": math.degrees(pendulum.waves.from_rad), **vars(pendulum.waves)}
+        yield from ("", *_table("[roll.waves]", {key: value for key, value in waves.items() if key != "from_rad"}))
 
 
 def _correlation(model: VesselModel) -> Iterator[str]:

@@ -105,11 +105,17 @@ def _sentences(content: RollContent) -> Iterator[str]:
             f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
             "something, or a strong roll moment of waves hides what the rudder does."
         )
-    if estimate.weak and estimate.method == "iv":
+    if estimate.weak:
         yield (
-            "Waves and sensors hide what the rudder does: estimates lean towards those of least squares, by up to "
-            f"{max(abs(estimate.leaning)):.2g} standard deviations; expected larger rudder angles, "
-            "longer runs or calmer water."
+            "Waves and sensors hide what the rudder does, so that estimates lean towards those of least squares: the "
+            f"rudder tells {estimate.strength:.2g} times what noise alone would seem to tell, expected "
+            f"{TUNING.least_strength:g} times or more by larger rudder angles, longer runs or calmer water."
+        )
+    if estimate.answering:
+        yield (
+            "The rudder answers what rolls the ship, by the noise of roll that it follows later: one that answers "
+            f"nothing does so by chance in {100 * estimate.unanswered:.1g} % of trials. Estimates lean towards what "
+            "the helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
         )
     for name in estimate.reached:
         yield (
@@ -170,7 +176,8 @@ def roll_json(content: RollContent) -> str:
             },
             "settled": estimate.settled,
             "surprise": finite(estimate.surprise),
-            "leaning": estimate.leaning.tolist(),
+            "instrument_strength": finite(estimate.strength),
+            "chance_that_the_rudder_answers_nothing": finite(estimate.unanswered),
             "reached_bounds": list(estimate.reached),
             "intervals_trusted": estimate.trusted,
             "remarks": list(roll_sentences(content)),

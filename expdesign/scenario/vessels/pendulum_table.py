@@ -12,6 +12,7 @@ from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Tabl
 from expdesign.scenario.vessels.correlations import checked_correlation
 from expdesign.vessel import NOMINAL, ROLL_PARAMETERS, Body, Load, RollPendulum
 from expdesign.vessel.masses import G_MPS2
+from expdesign.waves import Waves
 
 STATED = {"k": "metacentric_height_m", "A_x": "period_s", "d": "damping_ratio"}
 """Parameter -> key that may stand for it."""
@@ -29,6 +30,16 @@ class LoadTable(Table):
         """On board."""
         there = Load(mass_kg=self.mass_kg, z_m=-self.height_m, inertia_kgm2=self.inertia_kgm2)
         return there if self.mass_kg else NOMINAL
+
+
+class WavesTable(Table):
+    """`[roll.waves]`."""
+
+    height_m: Positive = Field(description="the significant wave height [m]")
+    period_s: Positive = Field(description="the period of the peak of their JONSWAP spectrum [s]")
+    from_deg: Number = Field(description="whence they come, clockwise from north [deg]")
+    gamma: Number = Field(default=3.3, description="the sharpness of the peak, 1 to 7")
+    slope_share: Positive = Field(default=1.0, description="the share of their slope that acts on the hull, at most 1")
 
 
 class PendulumTable(Table):
@@ -61,6 +72,10 @@ class PendulumTable(Table):
         default={}, description="the correlation of the errors of two parameters, each pair once; 0 when not given"
     )
     load: LoadTable = Field(default=LoadTable(), description="a table [roll.load]: what lies on board")
+    waves: WavesTable | None = Field(
+        default=None,
+        description="a table [roll.waves]: waves that roll the ship by their slope, in simulate and roll-plan",
+    )
 
 
 def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
@@ -88,9 +103,17 @@ def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
             parameter_correlation=checked_correlation(
                 table.parameter_correlation, ROLL_PARAMETERS, entry.at("parameter_correlation")
             ),
+            waves=_waves(table.waves),
         )  # fmt: skip
     except InputError as error:
         raise entry.error(str(error)) from None
+
+
+def _waves(table: WavesTable | None) -> Waves | None:
+    if table is None:
+        return None
+    stated = table.model_dump()
+    return Waves(from_rad=math.radians(stated.pop("from_deg")), **stated)
 
 
 def _parameters(table: PendulumTable, body: Body) -> Mapping[str, float]:

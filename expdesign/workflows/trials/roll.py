@@ -117,7 +117,8 @@ def roll(
 
 def _fitted(ship: Vessel, content: RollContent) -> str:
     """The vessel file of the ship with the estimate."""
-    found = replace(ship, pendulum=fitted_pendulum(content.estimate))
+    waves = None if ship.pendulum is None else ship.pendulum.waves
+    found = replace(ship, pendulum=replace(fitted_pendulum(content.estimate), waves=waves))
     head = ("[roll] is the estimate, of the ship without load, by:", f"    {content.command}", *roll_sentences(content))
     return vessel_toml(found, comments=head)
 
@@ -129,13 +130,25 @@ def _cases(
     cases: list[Case] = []
     notes: list[str] = []
     step_s = None
+    followed = False
     for path, load in zip(data, known.loads, strict=True):
         record = load_records([path], outputs=("r",), sample_time_s=step_s)
         step_s = record.batches[0].sample_time_s
         runs = tuple(_run(path, batch, rudder, ship) for batch in record.batches)
         cases.append(Case(name=path.stem, load=load, runs=runs))
         notes += record.notes
-    return tuple(cases), tuple(notes)
+        followed |= any(batch.steered is not None and batch.steered.any() for batch in record.batches)
+    if all(run.planned is not None and run.planned.std() > 0 for case in cases for run in case.runs):
+        return tuple(cases), (*notes, AS_PLANNED)
+    cases = [replace(case, runs=tuple(replace(run, planned=None) for run in case.runs)) for case in cases]
+    return tuple(cases), (*notes, *((FOLLOWED,) if followed else ()))
+
+
+AS_PLANNED = "Instruments come from the rudder as planned (planned_...), so that a helm may answer the ship."
+FOLLOWED = (
+    "Samples are marked as steered, and no planned_... columns tell what the rudder would have done by itself: "
+    "instruments come from the rudder, which is right only where it does not answer roll."
+)
 
 
 def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -> Run:
@@ -146,14 +159,17 @@ def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -
     assert batch.auxiliary is not None
     roll_rate, sensed = (batch.auxiliary[:, AUXILIARY.index(name)] for name in NEEDED)
     chosen = [batch.input_names.index(name) for name in _rudders(batch.input_names, rudder)]
-    steering = _delivered(batch, ship)[:, chosen].mean(axis=1)
+    steering = _delivered(batch, batch.inputs, ship)[:, chosen].mean(axis=1)
     signals = np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], steering])
-    return Run(step_s=batch.sample_time_s, signals=signals)
+    planned = None
+    if batch.planned is not None and batch.planned.shape[1] == len(batch.input_names):
+        planned = _delivered(batch, batch.planned, ship)[:, chosen].mean(axis=1)
+    return Run(step_s=batch.sample_time_s, signals=signals, planned=planned)
 
 
-def _delivered(batch: Batch, ship: Vessel | None) -> Array:
+def _delivered(batch: Batch, given: Array, ship: Vessel | None) -> Array:
     """(k, m) inputs at the samples, with the lags and dead times that the vessel file states for its signals."""
-    inputs = np.array(batch.inputs)
+    inputs = np.array(given)
     if ship is None:
         return inputs
     for signal, response in zip(ship.model.inputs, ship.responses, strict=True):

@@ -18,7 +18,7 @@ from expdesign.export.routes import read_plan
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
-from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, measure
+from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, in_waves, measure
 from expdesign.simulation import simulate as simulate_run
 from expdesign.workflows.outcome import Outcome
 
@@ -35,8 +35,8 @@ def simulate(
     """Run the commands of a plan open loop on another vessel in drawn weather, and record its sensors.
 
     Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says;
-    where the vessel's file has a current or a wind, around that. With `until_s` the data end at that time, as of a
-    trial broken off.
+    where the vessel's file has a current or a wind, around that. Waves of its [roll] roll it. With `until_s` the data
+    end at that time, as of a trial broken off.
     """
     if until_s is not None and not 0 < until_s < np.inf:
         raise InputError(f"--until is {until_s:g}, expected more than 0 seconds")
@@ -54,6 +54,7 @@ def simulate(
     progress("simulating the trial", 0.2)
     begin, met = track.trajectory, _met(weather, track.commands, rng)
     sailed = simulate_run(vessel, track.commands, pose=begin.pose[0], velocity=begin.velocity[0], environment=met)
+    sailed = in_waves(vessel, sailed, rng)
     columns = measure(vessel, track.commands, sailed, environment=met, rng=rng)
     columns["steered"] = np.zeros(len(track.commands))  # the commands of legs too are those of the plan
     kept = len(track.commands) if until_s is None else math.ceil(until_s / track.commands.sample_time_s - 1e-9)

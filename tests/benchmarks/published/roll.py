@@ -5,7 +5,7 @@ pendulum: the pendulum's own parameters and its load from noisy sensors, in two 
 ship: nine parameters less a known k from three load cases of a model ship, the error of the mass beside it.
 waves: the same under a strong narrow-band roll moment.
 autopilot: the same under a moderate one, with an autopilot that moves the rudder by heading and yaw rate.
-stabilised: the same with one that answers the roll rate too.
+feedback: the same and waves, with a rudder that answers the roll rate too; instruments from it, or from its orders.
 loads: what load cases determine.
 
 All tell how often 95 % intervals hold the truth, how many estimates say that theirs are not to be trusted, and how many
@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,26 +131,16 @@ def ship(runs: int, seed: int, sea: Sea = SHIP_SEA, helm: Helm = (0.0, 0.0, 0.0)
         print(f"{method}: {told}; {_held(rows, MODEL_SHIP_TRUTH)}")
 
 
-def ship_problem(sea: Sea, rng: np.random.Generator, helm: Helm = (0.0, 0.0, 0.0)) -> RollProblem:
-    """Three load cases of the model ship, k known."""
-    cases = tuple(
-        Case(
-            name="ship",
-            load=load,
-            runs=(
-                ship_run(
-                    load or unknown_load(),
-                    switching(6000, 150, rng, levels=(-0.6, 0.0, 0.6)),
-                    sea,
-                    rng,
-                    step_s=0.01,
-                    helm=helm,
-                ),
-            ),
-        )
-        for load in CASES
-    )
-    return build_problem(MODEL_SHIP, cases, beam_m=0.3, roll_hz=0.75, known={"k": 9.0}, start={})
+def ship_problem(
+    sea: Sea, rng: np.random.Generator, helm: Helm = (0.0, 0.0, 0.0), *, planned: bool = False
+) -> RollProblem:
+    """Three load cases of the model ship, k known; `planned` makes instruments from the rudder orders."""
+    cases = []
+    for load in CASES:
+        orders = switching(6000, 150, rng, levels=(-0.6, 0.0, 0.6))
+        run = ship_run(load or unknown_load(), orders, sea, rng, step_s=0.01, helm=helm)
+        cases.append(Case(name="ship", load=load, runs=(replace(run, planned=orders if planned else None),)))
+    return build_problem(MODEL_SHIP, tuple(cases), beam_m=0.3, roll_hz=0.75, known={"k": 9.0}, start={})
 
 
 def waves(runs: int, seed: int) -> None:
@@ -184,9 +175,20 @@ def _held(rows: list[RollEstimate], wanted: Array) -> str:
     )
 
 
-def stabilised(runs: int, seed: int) -> None:
-    """The same with a rudder that damps roll: it answers the moment, which no instrument from the rudder allows."""
-    ship(runs, seed, AUTOPILOT_SEA, helm=(1.0, 1.0, -0.5))
+def feedback(runs: int, seed: int) -> None:
+    """Intervals, and how many say that the rudder answers, by the gain of the roll rate; it damps where positive."""
+    for what, sea in (("0.1 N m, damping 0.1", AUTOPILOT_SEA), ("0.2 N m, damping 0.05", WAVES)):
+        for gain in (0.0, -0.5, 0.5, 1.0):
+            for planned in (False, True):
+                rows = [
+                    estimate_roll(
+                        ship_problem(sea, np.random.default_rng([seed, number]), (1.0, 1.0, gain), planned=planned)
+                    )
+                    for number in range(runs)
+                ]
+                said = sum(one.answering for one in rows)
+                source = "orders" if planned else "rudder"
+                print(f"| {what} | {gain:g} | {source} | {said} | {_held(rows, MODEL_SHIP_TRUTH)} |", flush=True)
 
 
 def loads(runs: int, seed: int) -> None:
@@ -212,7 +214,7 @@ STUDIES = {
     "ship": ship,
     "waves": waves,
     "autopilot": autopilot,
-    "stabilised": stabilised,
+    "feedback": feedback,
     "loads": loads,
 }
 
