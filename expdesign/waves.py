@@ -143,7 +143,8 @@ def shaping_filter(peak_radps: float, *, damping: float, std: float = 1.0) -> tu
 
 
 POWERS = {
-    "length": 1.0, "time": 0.5, "speed": 0.5, "angle": 0.0, "mass": 3.0, "force": 3.0, "moment": 4.0, "inertia": 5.0,
+    "length": 1.0, "time": 0.5, "speed": 0.5, "angle": 0.0, "mass": 3.0, "force": 3.0, "moment": 4.0, "damping": 4.5,
+    "inertia": 5.0,
 }  # fmt: skip
 """Quantity -> power of the scale in Froude's law."""
 
@@ -163,5 +164,5 @@ def froude_factor(quantity: str, scale: float, *, density_ratio: float = 1.0) ->
         raise InputError(f"quantity is {quantity!r}, expected one of {', '.join(POWERS)}")
     if not scale > 0 or not density_ratio > 0:
         raise InputError(f"scale is {scale:g} and density_ratio {density_ratio:g}, expected more than 0")
-    heavy = quantity in ("mass", "force", "moment", "inertia")
+    heavy = quantity in ("mass", "force", "moment", "damping", "inertia")
     return float(scale ** POWERS[quantity] * (density_ratio if heavy else 1.0))

@@ -5,7 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from expdesign.roll import NOMINAL, Body, Load, Run, axis_inertia, first_moment, named, parameters, stiffness
+from expdesign.roll import (
+    NOMINAL,
+    Body,
+    Case,
+    Load,
+    RollProblem,
+    Run,
+    axis_inertia,
+    build_problem,
+    first_moment,
+    froude_scaled,
+    named,
+    parameters,
+    stiffness,
+)
 from expdesign.values import Array
 
 PENDULUM = Body(mass_kg=22.04, z_g=-0.018, z_s=-0.218)
@@ -119,6 +133,48 @@ def _on_course(system: System, helm: Helm, lag_s: float = SERVO_S) -> System:
     A = np.block([[A, np.zeros((5, 1))], [np.eye(5)[3], np.zeros(1)]])
     A[4, [5, 3, 2]] += np.array(helm) / lag_s
     return A, np.vstack([B, np.zeros((1, 2))]), np.column_stack([C, np.zeros(4)]), D
+
+
+def full_scale(scale: float, hull: Hull = Hull()) -> tuple[Array, Body, Hull]:
+    """The model ship by Froude's law: parameters, masses and places, sway and yaw, in kg^a m^b s^c by a + b + c / 2."""
+    theta = froude_scaled(MODEL_SHIP_TRUTH, scale)
+    body = Body(mass_kg=MODEL_SHIP.mass_kg * scale**3, z_g=MODEL_SHIP.z_g * scale, z_s=MODEL_SHIP.z_s * scale)
+    sway, yaw = (
+        np.array(hull.sway) * scale ** np.array([2.5, 3.5, 3, 3]),
+        np.array(hull.yaw) * scale ** np.array([3.5, 4.5, 4, 4]),
+    )
+    ship = Hull(
+        speed=hull.speed * scale**0.5, sway_mass=hull.sway_mass * scale**3, sway=tuple(sway.tolist()),
+        yaw_inertia=hull.yaw_inertia * scale**5, yaw=tuple(yaw.tolist()),
+        sway_by_roll_acceleration=hull.sway_by_roll_acceleration * scale**4,
+    )  # fmt: skip
+    return theta, body, ship
+
+
+def limited(orders: Array, rate: float, step_s: float) -> Array:
+    """Orders (k,) as a rudder of so many radians in a second follows them."""
+    result = np.array(orders, dtype=float)
+    for k in range(1, len(result)):
+        result[k] = result[k - 1] + np.clip(result[k] - result[k - 1], -rate * step_s, rate * step_s)
+    return result
+
+
+def full_scale_problem(
+    rate_degps: float, moment: float, rng: np.random.Generator, *, hold_s: float = 8.0, minutes: float = 10.0
+) -> tuple[Array, RollProblem]:
+    """The truth, and three load cases of the ship 24 times the model, k known, the rudder at 20 degrees or none."""
+    scale, step_s = 24.0, 0.05
+    theta, body, hull = full_scale(scale)
+    sea = Sea(roll_rate=0.001, sensed=0.02, yaw_rate=0.001, moment=moment, frequency_hz=0.16, damping=0.3)
+    cases = []
+    for load in (NOMINAL, Load(mass_kg=CALIBRATION.mass_kg * scale**3, z_m=CALIBRATION.z_m * scale), None):
+        wished = switching(round(60 * minutes / step_s), round(hold_s / step_s), rng, levels=(-0.35, 0.0, 0.35))
+        orders = limited(wished, np.deg2rad(rate_degps), step_s)
+        there = load or unknown_load(theta)
+        run = ship_run(there, orders, sea, rng, step_s=step_s, theta=theta, body=body, hull=hull)
+        cases.append(Case(name="ship", load=load, runs=(run,)))
+    known = {"k": float(theta[0])}
+    return theta, build_problem(body, tuple(cases), beam_m=7.2, roll_hz=0.16, known=known, start={})
 
 
 def unknown_load(theta: Array = MODEL_SHIP_TRUTH) -> Load:

@@ -154,6 +154,28 @@ def test_the_command_writes_what_plan_and_roll_read(tmp_path: Path) -> None:
         assert dict(zip(names, repeats, strict=True)) == {**dict.fromkeys(names, 0), **case["runs"]}
 
 
+@pytest.mark.slow
+def test_every_load_case_has_cards_that_name_its_load_and_the_same_runs_are_planned_once(tmp_path: Path) -> None:
+    """A ship with samples of 0.1 s and five load cases of one run each."""
+    scenario, candidates = small(tmp_path)
+    (tmp_path / "ship.toml").write_text(ROLL_MODEL.read_text().replace("sample_time_s = 0.02", "sample_time_s = 0.1"))
+    text = scenario.read_text().replace(str(SCENARIOS / "vessels" / "roll-model.toml"), "ship.toml")
+    scenario.write_text(text.replace("total_s = 240.0", "total_s = 80.0"))
+    said: list[str] = []
+    outcome = roll_plan(
+        scenario, tmp_path / "out", loads=candidates, place=True, progress=lambda what, _: said.append(what)
+    )
+    cases = json.loads((tmp_path / "out" / "roll-plan.json").read_text())["load_cases"]
+    for number, case in enumerate(cases, start=1):
+        folder = tmp_path / "out" / f"case-{number}"
+        assert f"load case {number}: {case['name']}" in (folder / "cards.html").read_text()
+        assert f"--durations {tmp_path / 'out' / f'durations-{number}.json'}" in (folder / "report.html").read_text()
+        assert folder / "commands.csv" in outcome.files
+    runs = {json.dumps(case["runs"], sort_keys=True) for case in cases}
+    assert len(runs) < len(cases)
+    assert said.count("sailing to the goal") == len(runs)
+
+
 @pytest.mark.parametrize("seeds", [range(101, 103), pytest.param(range(201, 221), marks=pytest.mark.slow)])
 def test_estimates_scatter_no_less_than_the_bound(seeds: range) -> None:
     """Mean squares of p errors over n seeds are 1 or more, but for three standard errors sqrt(2 / (n p))."""

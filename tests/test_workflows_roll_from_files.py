@@ -89,6 +89,43 @@ def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
         assert abs(values[name] - truth(name)) < 4 * std, name
 
 
+def test_a_model_tells_of_the_ship_by_froude_s_law(tmp_path: Path) -> None:
+    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
+    roll(three(tmp_path), tmp_path / "out", loads=loads, scale=24.0)
+    found = json.loads((tmp_path / "out" / "roll.json").read_text())
+    for name, power in {"A_x": 5.0, "d": 4.5, "K_r": 4.5, "K_vd": 4.0, "K_delta": 4.0, "z_f": 1.0, "m": 3.0}.items():
+        model, ship = found["parameters"][name], found["at_full_scale"][name]
+        for key in ("value", "std"):
+            assert ship[key] == pytest.approx(24.0**power * model[key], rel=1e-12)
+    page = (tmp_path / "out" / "roll.html").read_text()
+    assert "24 times as long as her model" in page
+    assert f"{24.0**3 * found['parameters']['m']['value']:.4g}" in page
+    with pytest.raises(InputError, match="--scale is 0, expected more than 0"):
+        roll(three(tmp_path), tmp_path / "none", loads=loads, scale=0.0)
+
+
+def test_planned_rudders_are_instruments_and_said_to_be(tmp_path: Path) -> None:
+    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
+    files = three(tmp_path)
+    for path in files:
+        head, *rows = path.read_text().splitlines()
+        planned = [row + f",{float(row.split(',')[-1]) * 0.5:.9g},1" for row in rows]
+        path.write_text("\n".join([head + ",planned_rudder1_rad,steered", *planned]) + "\n")
+    roll(files, tmp_path / "out", loads=loads)
+    planned_told = json.loads((tmp_path / "out" / "roll.json").read_text())
+    assert any("Instruments come from the rudder as planned" in note for note in planned_told["notes"])
+    for name in ("A_x", "m"):
+        assert (
+            abs(planned_told["parameters"][name]["value"] - truth(name)) < 4 * planned_told["parameters"][name]["std"]
+        )
+    for path in files:
+        lines = [line.split(",") for line in path.read_text().splitlines()]
+        path.write_text("\n".join(",".join([*line[:5], line[6]]) for line in lines) + "\n")
+    roll(files, tmp_path / "out", loads=loads)
+    told = json.loads((tmp_path / "out" / "roll.json").read_text())
+    assert any("Samples are marked as steered" in note for note in told["notes"])
+
+
 def test_a_parameter_at_a_bound_of_the_search_is_named_on_page_and_in_file(tmp_path: Path) -> None:
     far = K_KNOWN.replace("9.0", "40.0")
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + far)

@@ -226,6 +226,12 @@ def roll(
         float | None,
         typer.Option("--lowpass-hz", metavar="F", help="Low-pass filter, which must pass roll. Default: as needed."),
     ] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option(
+            "--scale", metavar="S", help="Length of the ship by that of the model tried, to tell of the ship too."
+        ),
+    ] = None,
     out: OutByData = None,
 ) -> Asked:
     """Estimate roll inertia, damping, stiffness and an unknown load from runs at one or more loads.
@@ -236,7 +242,10 @@ def roll(
 
     Example: expdesign roll nominal.csv calibration.csv loaded.csv --loads loads.toml
     """
-    return ask("roll", data, out, loads=loads, vessel=vessel, rudder=rudder or (), method=method, lowpass_hz=lowpass)
+    return ask(
+        "roll", data, out, loads=loads, vessel=vessel, rudder=rudder or (), method=method, lowpass_hz=lowpass,
+        scale=scale,
+    )  # fmt: skip
 
 
 @command("incline")

@@ -14,7 +14,7 @@ Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -186,7 +186,7 @@ class RollEstimate:
 
     @property
     def answering(self) -> bool:
-        """Whether the rudder, or what was planned of it, answers what rolls the ship, so that it is no instrument."""
+        """Whether the rudder answers what rolls the ship, so that it is no instrument."""
         return self.unanswered < TUNING.least_unanswered
 
 
@@ -201,15 +201,19 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
     held = _held(problem)
     instruments = [folds(case.runs) if method == "iv" else None for case in problem.cases]
     theta, history, settled = np.array(problem.start), [], False
-    weighted = [weighted_equations(case, own, None) for case, own in zip(problem.cases, instruments, strict=True)]
+    values: list[Array | None] = [None] * len(problem.cases)
+    if method == "iv" and any(run.planned is not None for case in problem.cases for run in case.runs):
+        theta = estimate_roll(_by_rudder(problem)).theta
+        values = [*_sampled(problem, theta)]
     while True:
+        parts = zip(problem.cases, instruments, values, strict=True)
+        weighted = [weighted_equations(case, own, one) for case, own, one in parts]
         before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
         history.append(theta)
         settled = len(history) > 1 and _little(problem, theta - before, sensed)
         if settled or len(history) == TUNING.most_rounds:
             break
-        parts = zip(problem.cases, instruments, _sampled(problem, theta), strict=True)
-        weighted = [weighted_equations(case, own, values) for case, own, values in parts]
+        values = [*_sampled(problem, theta)]
     covariance = _covariance(problem, weighted, theta, sensed, held, method)
     return RollEstimate(
         problem=problem,
@@ -225,6 +229,12 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         surprise=_surprise(left, len(problem.free) - len(held)),
         unanswered=_unanswered(problem, weighted, theta, sensed) if method == "iv" else float("nan"),
     )
+
+
+def _by_rudder(problem: RollProblem) -> RollProblem:
+    """The same with instruments from the rudder itself, whose estimate may be biased and begins near the best one."""
+    cases = [replace(case, runs=tuple(replace(run, planned=None) for run in case.runs)) for case in problem.cases]
+    return replace(problem, cases=tuple(cases))
 
 
 def _unanswered(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array) -> float:

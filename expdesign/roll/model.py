@@ -25,6 +25,7 @@ import numpy as np
 from expdesign.errors import UnknownName
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import G_MPS2, Body, Load
+from expdesign.waves import froude_factor
 
 UNITS = {
     "k": "N m/rad", "A_x": "kg m2", "d": "N m s/rad", "K_r": "N m s/rad", "K_vd": "kg m", "K_delta": "N m/rad",
@@ -44,6 +45,11 @@ MEANINGS = {
     "m": "mass of the unknown load",
     "z_m": "place of the unknown load, down from the body origin",
 }
+FROUDE = {
+    "k": "moment", "A_x": "inertia", "d": "damping", "K_r": "damping", "K_vd": "moment", "K_delta": "moment",
+    "z_f": "length", "m": "mass", "z_m": "length",
+}  # fmt: skip
+"""Parameter -> quantity of Froude's law that it scales as; kg m scales as a moment, as gravity does not change."""
 COEFFICIENTS = ("alpha1", "alpha2", "beta1", "kappa1", "gamma1")
 """Of the continuous equation: d, k - K_vd g, -(K_vd + S1), K_r and K_delta, each over A2."""
 
@@ -63,6 +69,11 @@ def parameters(**values: float) -> Array:
 def named(values: Array) -> dict[str, float]:
     """Parameters (9,) by name."""
     return dict(zip(PARAMETERS, values.tolist(), strict=True))
+
+
+def froude_scaled(values: Array, scale: float) -> Array:
+    """Parameters (9,), or standard deviations, of a ship so many times as long as her model, in the same water."""
+    return np.asarray(values * [froude_factor(FROUDE[name], scale) for name in PARAMETERS])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

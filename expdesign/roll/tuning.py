@@ -32,7 +32,7 @@ class Tuning:
         most_rounds: of instruments and noise models.
         settled: change in a round, in standard deviations of each parameter, that ends them.
         most_surprise: least sum of squares over its expected value, beyond which intervals are not to be trusted.
-        least_strength: of instruments, below which intervals are not to be trusted; chosen in simulated waves.
+        least_strength: of instruments, below which noise alone would seem to tell as much, and no interval is trusted.
         leads: to which the rudder is looked at, up to a period of roll later, to see whether it answers.
         least_unanswered: chance of an estimate whose rudder answers nothing, below which it is said to answer.
         unseen: relative sensitivity below which the equations themselves leave a direction open.
@@ -63,7 +63,7 @@ class Tuning:
     most_rounds: int = 12
     settled: float = 0.1
     most_surprise: float = 3.0
-    least_strength: float = 1.5
+    least_strength: float = 1.0
     leads: int = 8
     least_unanswered: float = 0.05
     unseen: float = 1e-9

@@ -5,21 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from expdesign.export.files import finite, strict_json
 from expdesign.roll import (
     G_MPS2,
     MEANINGS,
+    PARAMETERS,
     TUNING,
     UNITS,
     Direction,
     LowPass,
     NullSpace,
     RollEstimate,
+    froude_scaled,
     roll_frequency,
     stiffness,
 )
 
 PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
+SCALED_HEADER = ("parameter", "at full scale", "95 % interval", "unit")
 CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
 NORMAL = 1.96
 
@@ -34,6 +39,7 @@ class RollContent:
         filter: that the data passed.
         notes: on the data.
         command, version: to reproduce it.
+        scale: of the ship to the model that was tried; None for a ship.
     """
 
     estimate: RollEstimate
@@ -42,6 +48,7 @@ class RollContent:
     notes: tuple[str, ...]
     command: str
     version: str
+    scale: float | None = None
 
 
 def parameter_rows(content: RollContent) -> list[tuple[str, ...]]:
@@ -68,6 +75,21 @@ def interval(content: RollContent, name: str) -> tuple[float, float]:
     """95 % interval of a free parameter, for held parameters as they are."""
     value, std = content.estimate.values[name], content.estimate.std[name]
     return value - NORMAL * std, value + NORMAL * std
+
+
+def scaled_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """What Froude's law makes of free parameters for the ship; none without a scale."""
+    if content.scale is None:
+        return []
+    of = dict(zip(PARAMETERS, froude_scaled(np.ones(len(PARAMETERS)), content.scale).tolist(), strict=True))
+    estimate = content.estimate
+    free = [name for name in estimate.problem.free if name not in estimate.held]
+    return [
+        (name, f"{of[name] * estimate.values[name]:.4g}", " to ".join(
+            f"{of[name] * end:.4g}" for end in interval(content, name)
+        ), UNITS[name])
+        for name in free
+    ]  # fmt: skip
 
 
 def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
@@ -113,9 +135,9 @@ def _sentences(content: RollContent) -> Iterator[str]:
         )
     if estimate.answering:
         yield (
-            "The rudder answers what rolls the ship, by the noise of roll that it follows later: one that answers "
-            f"nothing does so by chance in {100 * estimate.unanswered:.1g} % of trials. Estimates lean towards what "
-            "the helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
+            "The rudder seems to answer what rolls the ship: it follows the noise of roll, as one that answers nothing "
+            f"does by chance in {100 * estimate.unanswered:.1g} % of trials. Estimates then lean towards what the "
+            "helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
         )
     for name in estimate.reached:
         yield (
@@ -174,6 +196,7 @@ def roll_json(content: RollContent) -> str:
                 "passed": content.filter.passed,
                 "sample_time_s": content.filter.step_s,
             },
+            **({} if content.scale is None else {"at_full_scale": _scaled(content)}),
             "settled": estimate.settled,
             "surprise": finite(estimate.surprise),
             "instrument_strength": finite(estimate.strength),
@@ -184,6 +207,15 @@ def roll_json(content: RollContent) -> str:
             "notes": list(content.notes),
         }
     )
+
+
+def _scaled(content: RollContent) -> dict[str, object]:
+    estimate, scale = content.estimate, content.scale
+    assert scale is not None
+    std = np.array([estimate.std.get(name, 0.0) for name in PARAMETERS])
+    values, stds = froude_scaled(estimate.theta, scale).tolist(), froude_scaled(std, scale).tolist()
+    rows = zip(PARAMETERS, values, stds, strict=True)
+    return {"scale": scale, **{name: {"value": value, "std": deviation or None} for name, value, deviation in rows}}
 
 
 def _told(one: Direction) -> dict[str, object]:

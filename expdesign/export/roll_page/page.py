@@ -6,10 +6,12 @@ from expdesign.export.pages import page_templates
 from expdesign.export.roll_page.content import (
     CURE_HEADER,
     PARAMETER_HEADER,
+    SCALED_HEADER,
     RollContent,
     cure_rows,
     parameter_rows,
     roll_sentences,
+    scaled_rows,
 )
 
 
@@ -23,6 +25,8 @@ def roll_html(content: RollContent) -> str:
             sentences=roll_sentences(content),
             parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
             parameter_rows=parameter_rows(content),
+            scaled_header=[name.capitalize() for name in SCALED_HEADER],
+            scaled_rows=scaled_rows(content),
             cure_header=[name.capitalize() for name in CURE_HEADER],
             cure_rows=cure_rows(content),
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.dictionary import build_dictionary
-from expdesign.durations import Aim, with_repeats
+from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, UnknownName
 from expdesign.export import write_files
 from expdesign.export.load_page import (
@@ -24,6 +24,7 @@ from expdesign.export.load_page import (
     repeats_json,
 )
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
+from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
@@ -34,6 +35,8 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, planned
 from expdesign.workflows.steps.scored import scored
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+
+Paths = tuple[Path, ...]
 
 
 def roll_plan(
@@ -99,7 +102,7 @@ def roll_plan(
     }  # fmt: skip
     paths = write_files(folder, files)
     if place:
-        paths += _placed(case, plan, folder, seed, within(progress, 0.4, 1.0))
+        paths += _placed(case, plan, content, folder, seed, within(progress, 0.4, 1.0))
     progress("done", 1.0)
     return Outcome(files=paths, summary=_summary(content), tables=_tables(content))
 
@@ -133,20 +136,29 @@ def _commands(scenario: Path, folder: Path, plan: LoadPlan) -> tuple[str, ...]:
     return (*each, command_text("roll", data, {"--loads": folder / "loads.toml", "--vessel": "VESSEL.toml"}))
 
 
-def _placed(case: Scenario, plan: LoadPlan, folder: Path, seed: int, progress: Progress) -> tuple[Path, ...]:
-    """A plan with routes, run cards and report for every load case, in folders of their own."""
+def _placed(case: Scenario, plan: LoadPlan, told: LoadContent, folder: Path, seed: int, progress: Progress) -> Paths:
+    """A plan with routes, run cards and report for every load case, in folders of their own.
+
+    Loads do not change the ship's path: load cases with the same runs are sailed alike, and planned once.
+    """
     information = scored(case, progress=within(progress, 0.0, 0.1))
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.2))
-    order = list(plan.manoeuvres)
-    paths: tuple[Path, ...] = ()
-    for number, repeats in enumerate(plan.repeats.astype(int).tolist(), start=1):
-        part = within(progress, 0.2 + 0.8 * (number - 1) / len(plan.repeats), 0.2 + 0.8 * number / len(plan.repeats))
-        runs = with_repeats(design, [repeats[order.index(item.primitive.name)] for item in information])
-        trip = planned(case, information, runs, seed=seed, progress=within(part, 0.0, 0.8))
-        route = built_route(case, trip)
-        content = replace(report_content(case, information, runs, trip, seed), route=route)
-        files = trial_files(case, None, content, route, progress=within(part, 0.8, 1.0))
-        paths += write_files(folder / f"case-{number}", files)
+    order = [list(plan.manoeuvres).index(item.primitive.name) for item in information]
+    trips: dict[tuple[int, ...], tuple[DurationDesign, Plan]] = {}
+    paths: Paths = ()
+    for number, row in enumerate(plan.repeats.astype(int).tolist()):
+        part = within(progress, 0.2 + 0.8 * number / len(plan.repeats), 0.2 + 0.8 * (number + 1) / len(plan.repeats))
+        repeats = tuple(row[place] for place in order)
+        if repeats not in trips:
+            runs = with_repeats(design, list(repeats))
+            trips[repeats] = runs, planned(case, information, runs, seed=seed, progress=within(part, 0.0, 0.8))
+        runs, trip = trips[repeats]
+        loaded_case = replace(case, name=f"{case.name}, load case {number + 1}: {told.options[number].name}")
+        route = built_route(loaded_case, trip)
+        content = report_content(loaded_case, information, runs, trip, seed)
+        content = replace(content, route=route, command=told.commands[number])
+        files = trial_files(loaded_case, None, content, route, progress=within(part, 0.8, 1.0))
+        paths += write_files(folder / f"case-{number + 1}", files)
     return paths
 
 

@@ -57,6 +57,7 @@ def roll(
     rudder: Sequence[str] = (),
     method: str = "iv",
     lowpass_hz: float | None = None,
+    scale: float | None = None,
     progress: Progress = silent,
 ) -> Outcome:
     """Parameters, intervals and what is not told apart, into `out` or runs/<first data file>.
@@ -70,12 +71,15 @@ def roll(
         rudder: signals whose mean steers; found by their kinds when empty.
         method: "iv" or "ls".
         lowpass_hz: of the filter; None for one that thinning out needs.
+        scale: of the ship to the model that was tried, for the estimate at full scale, too.
         progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the data tell too little.
     """
+    if scale is not None and not 0 < scale < float("inf"):
+        raise InputError(f"--scale is {scale:g}, expected more than 0")
     progress("reading the data", 0.0)
     ship = None if vessel is None else load_vessel(vessel)
     known = load_cases(loads, ship)
@@ -101,10 +105,12 @@ def roll(
         "--rudder": tuple(rudder),
         "--method": method,
         "--lowpass-hz": lowpass_hz,
+        "--scale": scale,
     }
     content = RollContent(
         estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
         command=command_text("roll", data, options, usual={"--method": "iv"}), version=__version__,
+        scale=scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
     files = {"roll.json": roll_json(content), "roll.html": roll_html(content)}

@@ -6,6 +6,7 @@ ship: nine parameters less a known k from three load cases of a model ship, the 
 waves: the same under a strong narrow-band roll moment.
 autopilot: the same under a moderate one, with an autopilot that moves the rudder by heading and yaw rate.
 feedback: the same and waves, with a rudder that answers the roll rate too; instruments from it, or from its orders.
+fullscale: ten minutes for each load of the ship 24 times as long, whose rudder is slow.
 loads: what load cases determine.
 
 All tell how often 95 % intervals hold the truth, how many estimates say that theirs are not to be trusted, and how many
@@ -46,6 +47,7 @@ from roll_truths import (
     PENDULUM_TRUTH,
     Helm,
     Sea,
+    full_scale_problem,
     pendulum_run,
     ship_run,
     switching,
@@ -191,6 +193,18 @@ def feedback(runs: int, seed: int) -> None:
                 print(f"| {what} | {gain:g} | {source} | {said} | {_held(rows, MODEL_SHIP_TRUTH)} |", flush=True)
 
 
+def fullscale(runs: int, seed: int) -> None:
+    """Intervals, strength and the standard deviation told of the mass, by rudder rate and roll moment."""
+    for rate in (3.0, 6.0, 20.0):
+        for moment_nm in (2e3, 7e3, 30e3):
+            pairs = [full_scale_problem(rate, moment_nm, np.random.default_rng([seed, n])) for n in range(runs)]
+            wanted = pairs[0][0]
+            rows = [estimate_roll(problem) for _, problem in pairs]
+            told = np.median([one.std["m"] for one in rows]) / truth(wanted, "m")
+            strong = np.median([one.strength for one in rows])
+            print(f"| {rate:g} | {moment_nm:g} | {100 * told:.0f} | {strong:.1f} | {_held(rows, wanted)} |", flush=True)
+
+
 def loads(runs: int, seed: int) -> None:
     """Rank and smallest relative singular value of all nine parameters, by load cases; nothing is drawn."""
     theta = np.array([9.0067, 0.1566, 0.2668, -1.9911, 0.9408, -0.4433, -0.0293, 0.369, -0.2426])
@@ -215,6 +229,7 @@ STUDIES = {
     "waves": waves,
     "autopilot": autopilot,
     "feedback": feedback,
+    "fullscale": fullscale,
     "loads": loads,
 }
 
