@@ -67,7 +67,7 @@ def test_causes_are_fitted_beside_the_file_where_it_simulates_better_with_them_f
     first = Model("first", keys=("theta:Y_v",), ship=None)
     found = replace(steps_of("wind"), first=first, last=Model("re-estimated"))  # type: ignore[arg-type]
     known = replace(found, last=Model("beside"), beside_stated=True)  # type: ignore[arg-type]
-    monkeypatch.setattr(judgement, "beside_stated_parameters", lambda *_: known)
+    monkeypatch.setattr(judgement, "fitted_ahead", lambda *_, beside_stated: known if beside_stated else found)
     monkeypatch.setattr(judgement, "within_stated_std", lambda _fit: True)
     monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
     unclear = 75.0 + np.array([[-25.0], [-20.0], [-10.0], [15.0], [20.0], [20.0]])

@@ -171,10 +171,10 @@ def test_times_that_cannot_be_negative_have_uniform_one_sided_p_values(clean_sco
 def test_a_step_ends_at_its_bound_and_the_rest_follows():
     """Two correlated effects, the first of which may not fall: the other takes its own optimum there."""
     A, score = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-3.0, 1.0])
-    free, gain = best_step(A, score, np.array([-np.inf, -np.inf]))
+    free, gain = best_step(A, score, np.array([[-np.inf, -np.inf], [np.inf, np.inf]]))
     np.testing.assert_allclose(free, np.linalg.solve(A, score))
     assert gain == pytest.approx(score @ free)
-    held, less = best_step(A, score, np.array([-0.5, -np.inf]))
+    held, less = best_step(A, score, np.array([[-0.5, -np.inf], [np.inf, np.inf]]))
     np.testing.assert_allclose(held, [-0.5, 0.75])
     assert less == pytest.approx(2 * score @ held - held @ A @ held)
     assert less < gain

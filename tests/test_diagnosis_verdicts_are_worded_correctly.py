@@ -140,3 +140,12 @@ def test_a_large_varying_current_is_noted():
     (text,) = note_on_random_current(varying(0.25, 400.0))
     assert "0.25 m/s" in text
     assert "400 s" in text
+
+
+def test_causes_that_would_harm_the_simulation_are_said_in_one_sentence():
+    """Beside findings, and where nothing is found: then the model is not called right."""
+    said = "with wind the simulation of these data would run away or be worse, so that is not written"
+    text = verdict([], BEFORE, refused=["wind"])
+    assert text.startswith("No cause of the remaining error is certain: the fit is 60 %")
+    assert text.endswith(f"{said}.")
+    assert said in verdict([finding("current")], BEFORE, refused=["wind"])

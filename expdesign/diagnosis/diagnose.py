@@ -43,7 +43,7 @@ from expdesign.diagnosis.fit import (
     with_longer_windows,
     within_stated_std,
 )
-from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged
+from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, without_harm
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
@@ -117,8 +117,9 @@ def diagnose(
     order = sorted(range(len(findings)), key=lambda index: -findings[index].certain_reduction)
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
-    within = () if findings else _gains_within_std(chosen, ship, seed)
-    refined = steps or ship.stated_std or within
+    harmless = bool(findings) or not harms(ship, chosen.kept.last.ship, record)
+    within = _gains_within_std(chosen, ship, seed) if harmless and not findings else ()
+    refined = harmless and (steps or ship.stated_std or within)
     final = chosen.kept.last.ship if refined else ship
     last = chosen.kept.last
     estimated = ((), np.zeros((0, 0))) if chosen.kept.beside_stated else (last.keys, last.covariance)
@@ -145,6 +146,7 @@ def diagnose(
             unexplained,
             within,
             _signs(chosen, after, windows, seed),
+            [step.chosen.candidate.cause for step in chosen.refused],
             _in_words(chosen.rest.kinds),
             _in_words(chosen.rest.instead),
         ),
@@ -182,6 +184,11 @@ class _Selected:
     rest: Remainder
 
     @property
+    def refused(self) -> tuple[Step, ...]:
+        """Causes that improve simulations of held-out units and harm those of the data as they are."""
+        return self.rest.kept.steps[len(self.kept.steps) :]
+
+    @property
     def before(self) -> HeldOut:
         """`as_stated` as `held` was measured: of whole units or of short stretches."""
         return _like(self.held[0], self.as_stated)
@@ -207,7 +214,8 @@ def _select(
 
     kept, held = eliminate_backward(found, windows, cross_validated, seed)
     rest = with_unlisted_terms(kept, held, windows, validation, seed)
-    return _Selected(found=found, kept=rest.kept, as_stated=as_stated, held=rest.held, validation=validation, rest=rest)
+    kept, held = without_harm(rest.kept, rest.held, ship, data[1])
+    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held, validation=validation, rest=rest)
 
 
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
@@ -245,7 +253,7 @@ def _signs(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> t
 
     Their gain is against the same model without them, fitted as they are.
     """
-    kept = {id(step.chosen.candidate) for step in chosen.kept.steps}
+    kept = {id(step.chosen.candidate) for step in chosen.rest.kept.steps}
     rejected = [step for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
     if not _more_than_noise(after, windows).any():
         return ()
@@ -289,7 +297,7 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
     notes = [
         *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
-        *notes_on_rejected(chosen.found, chosen.kept, unit),
+        *notes_on_rejected(chosen.found, chosen.rest.kept, unit),
     ]
     if chosen.kept.first.keys:
         notes += note_on_nuisance(chosen.before, chosen.held[0], seed)

@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import CrossValidation, HeldOut, held_out_gain, judged, leads_away, within_stated_std
-from expdesign.diagnosis.select import Selection, beside_stated_parameters, improves_held_out, only_nuisance
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.accuracy import WHOLE_S, pooled_fit
+from expdesign.diagnosis.data import Windows, cut_windows
+from expdesign.diagnosis.fit import (
+    AHEAD_S,
+    CrossValidation,
+    HeldOut,
+    cluster_robust,
+    held_out_gain,
+    judged,
+    leads_away,
+    within_stated_std,
+)
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import simulate_from_measured
+from expdesign.diagnosis.select import SELECTION_TUNING, Selection, fitted_ahead, improves_held_out, only_nuisance
 from expdesign.progress import Progress, within
+from expdesign.signals import Record
+from expdesign.values import Array
 
 LITTLE_FIT = 50.0
 """Fit of an output [%] below which a simulation explains little."""
@@ -25,25 +39,26 @@ def errors_as_judged(
     a cause has to improve on the file's parameters, and is fitted beside them: else it would have to make up for the
     loss. A file with which the simulation leads away is no such file. Nor is one that simulates neither whole units nor
     stretches of them better for certain once the causes are in the model: parameters that were fitted without a cause
-    imitate some of it.
+    imitate some of it. What is judged in stretches is fitted in stretches of all data, too, as it is written.
     """
     short = validation.short_windows(found.first.ship)
     if found.beside_stated:
-        again = beside_stated_parameters(found, windows, short) or found
+        again = fitted_ahead(found, windows, short, beside_stated=True) or found
         return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
     held = _cross_validated(found, as_stated, validation, progress)
     if found.steps and not improves_held_out(found, held, seed)[0]:
         held = _where_certain(held, seed)
+    known = None
     uncertain = found.steps and found.first.keys and not leads_away(as_stated)
-    if not uncertain or not as_stated.mean_fit > validation.of(found.first).mean_fit:
-        return found, held
-    known = beside_stated_parameters(found, windows, short)
-    if known is None:
-        return found, held
-    whole = [validation.of(one.last) for one in (found, known)]
-    if not _gains_for_certain(whole, seed) and not _gains_for_certain(_ahead(whole), seed):
-        return found, held
-    return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+    if uncertain and as_stated.mean_fit > validation.of(found.first).mean_fit:
+        known = fitted_ahead(found, windows, short, beside_stated=True)
+    if known is not None:
+        whole = [validation.of(one.last) for one in (found, known)]
+        if _gains_for_certain(whole, seed) or _gains_for_certain(_ahead(whole), seed):
+            return known, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+    if found.steps and held[0].in_stretches:
+        found = fitted_ahead(found, windows, short, beside_stated=False) or found
+    return found, held
 
 
 def _where_certain(held: list[HeldOut], seed: int) -> list[HeldOut]:
@@ -73,10 +88,10 @@ def _cross_validated(
     """Of the model before any cause, then after every step.
 
     The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
-    has them fitted, unless it simulates held-out units well as it is, and better: what a cause repairs of a worse fit
-    is no gain. If the first cause is that they exceed their standard deviations, it gets their gain, and the model is
-    not fitted. Neither is it where a fit without any cause needs parameters far beyond them: that fit is no model that
-    the vessel file allows.
+    has them fitted, unless it simulates held-out units better as it is: what a cause repairs of a worse fit is no gain.
+    If the first cause is that they exceed their standard deviations, it gets their gain, and the model is not fitted.
+    Neither is it where a fit without any cause needs parameters far beyond them: that fit is no model that the vessel
+    file allows.
     """
     fitted = bool(found.first.keys) and not any(only_nuisance(step, found) for step in found.steps[:1])
     fitted = fitted and (within_stated_std(found.first) or not found.steps)
@@ -85,11 +100,52 @@ def _cross_validated(
     for number, item in enumerate(fits):
         part = within(progress, number / len(fits), (number + 1) / len(fits))
         results.append(validation.of(item, part))
+    results = judged(results)
     if fitted:
-        results[:2] = [results[0] if _simulates_better(*results[:2]) else results[1]]
-    return judged(results)
+        results[:2] = [max(results[:2], key=lambda held: held.mean_fit)]
+    return results
 
 
-def _simulates_better(as_stated: HeldOut, fitted: HeldOut) -> bool:
-    one, other = (np.nan_to_num(held.fit, nan=-np.inf) for held in (as_stated, fitted))
-    return bool(one.min() >= LITTLE_FIT and one.mean() > other.mean())
+def without_harm(
+    kept: Selection, held: list[HeldOut], ship: ExtendedModel, record: Record
+) -> tuple[Selection, list[HeldOut]]:
+    """The first causes, as many as can be, with which the data are simulated no worse than by the model in use.
+
+    Args:
+        kept: the causes.
+        held: errors on held-out units of the model before any cause, then after every one.
+        ship: the model in use.
+        record: data.
+    """
+    while kept.steps and harms(ship, kept.last.ship, record):
+        kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]
+        if kept.steps:
+            kept = replace(kept, last=cluster_robust(kept.last, kept.last.linear.motion.windows.batch))
+    return kept, held
+
+
+def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
+    """Whether an extended model simulates the data worse than the model in use, each from the first measured state.
+
+    It does if it runs away where the model in use does not; if its mean fit in short stretches is less by more than
+    `Tuning.most_loss_points`; and if it simulates some output of whole runs worse than a constant, while the model in
+    use simulates none so. A loss in whole runs short of that tells little: slow errors decide there, and a wrong model
+    may have the luck that they cancel.
+    """
+    for length_s in (AHEAD_S, WHOLE_S):
+        windows = cut_windows(ship.model, record, longest_s=length_s)
+        (before, ran_before), (after, runs_away) = (_simulated(one, windows) for one in (ship, extended))
+        if length_s == AHEAD_S:
+            loses = after.mean() < before.mean() - SELECTION_TUNING.most_loss_points
+        else:
+            loses = bool((after < 0.0).any() and not (before < 0.0).any())
+        if loses or (runs_away and not ran_before):
+            return True
+    return False
+
+
+def _simulated(ship: ExtendedModel, windows: Windows) -> tuple[Array, bool]:
+    """(n,) fit of all outputs [%], and whether the simulation runs away."""
+    columns = [OUTPUTS.index(name) for name in ship.model.outputs]
+    motion = simulate_from_measured(ship, windows)
+    return pooled_fit(motion.error[..., columns], windows.measured[..., columns]), motion.diverged

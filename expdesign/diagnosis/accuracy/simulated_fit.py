@@ -16,6 +16,7 @@ from expdesign.signals import Record
 from expdesign.values import Array
 
 WHOLE_S = 1e9
+"""Length of windows that are whole runs [s]."""
 
 
 def accuracy(ship: ExtendedModel, record: Record) -> Accuracy:

@@ -131,7 +131,8 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
         )
     return (
         "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
-        f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state.",
+        f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state, a fifth of every "
+        "run held out at a time.",
     )
 
 

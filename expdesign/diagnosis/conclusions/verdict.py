@@ -106,6 +106,7 @@ def verdict(
     unexplained: Unexplained | None = None,
     within_std: Sequence[ErrorReduction] = (),
     signs: Sequence[Lead] = (),
+    refused: Sequence[str] = (),
     kinds: Sequence[str] = (),
     instead: Sequence[str] = (),
 ) -> str:
@@ -118,6 +119,7 @@ def verdict(
         unexplained: what remains, if that is much.
         within_std: what uncertain parameters gain within their standard deviations, if that is clear.
         signs: causes that are significant in a test and no findings, where the error is more than noise.
+        refused: causes with which the data would be simulated worse than without, and which are no findings so.
         kinds: what else the error looks like, which no cause of the catalogue is and no model can get.
         instead: the same of what explains about as much as the findings do.
     """
@@ -127,17 +129,19 @@ def verdict(
     if not findings and within_std:
         return _within_std(within_std, unexplained, unit)
     if not findings and unexplained is not None:
-        return f"The simulation explains little of these data and no cause is certain: {_remainder(unexplained, unit)}."
-    if not findings and signs:
-        return (
-            f"No cause of the remaining error is certain: {accuracy_in_words(before)}; signs of "
-            f"{listed([_lead(item) for item in signs])} improve nothing for certain on {unit} held out."
-        )
+        parts = [_remainder(unexplained, unit), *_refused(refused)]
+        return f"The simulation explains little of these data and no cause is certain: {'; '.join(parts)}."
+    if not findings and (signs or refused):
+        parts = [f"No cause of the remaining error is certain: {accuracy_in_words(before)}", *_refused(refused)]
+        named = [_lead(item) for item in signs]
+        parts += [f"signs of {listed(named)} improve nothing for certain on {unit} held out"] if named else []
+        return "; ".join(parts) + "."
     if not findings:
         return f"These data show no error of the model: {accuracy_in_words(before)}."
     parts = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
     parts += [_benefits(findings, unit), *_invisible(findings)]
     parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
+    parts += _refused(refused)
     parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
     parts += (
         [f"no cause of the catalogue, {listed(instead, 'or')} explains these data about as well"] if instead else []
@@ -195,6 +199,14 @@ def _invisible(findings: Sequence[Finding]) -> list[str]:
     names = "it" if len(findings) == 1 else listed([lacking(item) for item in small])
     verb = "is" if len(small) == 1 else "are"
     return [f"{names} {verb} significant in a test, but too small to show in velocities as noisy as these"]
+
+
+def _refused(causes: Sequence[str]) -> list[str]:
+    """Causes that would harm the simulation."""
+    if not causes:
+        return []
+    names = listed([missing_effect(cause) for cause in causes])
+    return [f"with {names} the simulation of these data would run away or be worse, so that is not written"]
 
 
 def _is_visible(reduction: ErrorReduction) -> bool:

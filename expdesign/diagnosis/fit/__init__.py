@@ -34,7 +34,7 @@ from expdesign.diagnosis.fit.linear_model import (
     effect_disturbances,
     sensitivities_to,
 )
-from expdesign.diagnosis.fit.output_error import fit_beside_stated_parameters, with_longer_windows
+from expdesign.diagnosis.fit.output_error import fit_ahead, with_longer_windows
 from expdesign.diagnosis.fit.prediction import prediction_gain
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
@@ -59,7 +59,7 @@ __all__ = [
     "difference_step",
     "effect_disturbances",
     "fit",
-    "fit_beside_stated_parameters",
+    "fit_ahead",
     "gram_matrices",
     "held_out_gain",
     "information",

@@ -5,10 +5,12 @@ units that they are evaluated on. Where such a fit does not improve on the fit t
 are kept; `unconverged` counts these folds. The selection of causes and the grid searches (width of a dead band, time of
 a change, direction of the wind) used all units.
 
-Every unit is simulated as a whole. A fit of many parameters to few units may lead away from the ship in a whole unit.
-Then models are judged by what they predict a short time ahead: in stretches, each simulated from its first measured
-state. What is judged so is also fitted so, by output error in the stretches of the other units. The likelihood whitens
-slow errors away, and these are most of the error of such a prediction.
+Every unit is simulated as a whole. A fit of many parameters to few units may lead away from the ship in a whole unit,
+most of all where that moves otherwise than the others. Then models are judged by what they predict a short time ahead:
+in stretches, each simulated from its first measured state, one part of every run held out at a time (as the h-block
+cross-validation of P. Burman, E. Chow and D. Nolan, Biometrika 81 (1994), 351-358). What is judged so is also fitted
+so, by output error in the other stretches. The likelihood whitens slow errors away, and these are most of the error of
+such a prediction.
 """
 
 from __future__ import annotations
@@ -122,7 +124,7 @@ def cross_validate(
         found=found,
         ship=ship,
         windows=short,
-        unit=of_short,
+        unit=_parts_of_runs(short),
         part=np.arange(float(len(of_short))),
         fitted=fitted,
         near=False,
@@ -157,7 +159,8 @@ class _Folds:
 def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
     found, windows = given.found, given.windows
     names, parts = np.unique(given.unit), np.unique(given.part)
-    folds = [names[index :: TUNING.folds] for index in range(min(TUNING.folds, len(names)))]
+    most = TUNING.folds if given.near else TUNING.parts
+    folds = [names[index::most] for index in range(min(most, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(parts), len(columns)))
     deviation, unconverged = np.zeros_like(error), 0
@@ -209,6 +212,16 @@ def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Recor
     short = windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
     within = (windows.batch == short.batch[:, None]) & (windows.first <= short.first[:, None])
     return short, unit[np.where(within, windows.first, -1.0).argmax(axis=1)]
+
+
+def _parts_of_runs(short: Windows) -> Array:
+    """(w,) fold of every stretch: each fold is one part of every run, another in each."""
+    part = np.zeros(len(short.batch))
+    for batch in np.unique(short.batch):
+        mine = np.flatnonzero(short.batch == batch)
+        place = np.argsort(np.argsort(short.first[mine]))
+        part[mine] = (place * TUNING.parts // len(mine) + batch) % TUNING.parts
+    return part
 
 
 def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:

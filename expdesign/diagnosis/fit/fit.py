@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from expdesign.diagnosis.data import Noise
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities
+from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.fit.tuning import TUNING
-from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.model import ExtendedModel, resisting
 from expdesign.diagnosis.motion import LinearisedMotion
 from expdesign.values import Array
 
@@ -158,12 +159,24 @@ def _prior_std(ship: ExtendedModel) -> dict[str, float]:
     return {**parameters, **ship.stated_std}
 
 
-def lowest_steps(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
-    """(c,) steps to the bounds of effects that cannot be below zero; -inf for others."""
-    return np.array([LEAST_TIME_S - ship.get(key) if key.startswith(POSITIVE) else -np.inf for key in keys])
+def step_bounds(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+    """(2, c) least and greatest steps to the bounds of effects; infinite for those without.
+
+    Times cannot be below zero, and what holds the ship at high speed cannot push her (`resisting`).
+    """
+    bounds = np.tile([[-np.inf], [np.inf]], len(keys))
+    parameters = dict(zip(ship.model.names, ship.model.parameters.tolist(), strict=True))
+    signs = resisting(ship.model)
+    for place, key in enumerate(keys):
+        if key.startswith(POSITIVE):
+            bounds[0, place] = LEAST_TIME_S - ship.get(key)
+        sign = signs.get(key.removeprefix("theta:"), 0.0)
+        if sign:
+            bounds[int(sign < 0), place] = -parameters[key.removeprefix("theta:")] - ship.get(key)
+    return bounds
 
 
-def best_step(A: Array, score: Array, lowest: Array) -> tuple[Array, float]:
+def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:
     """(c,) step to the least cost of a linear model within the bounds, and by how much it lowers the cost.
 
     What leaves its bounds is held there, and the rest is solved again: an active set that only grows.
@@ -171,19 +184,28 @@ def best_step(A: Array, score: Array, lowest: Array) -> tuple[Array, float]:
     Args:
         A: (c, c) information.
         score: (c,).
-        lowest: (c,) least step allowed.
+        bounds: (2, c) least and greatest step allowed.
     """
     step = np.zeros(len(score))
     held = np.zeros(len(score), dtype=bool)
     while len(score):
         free = ~held
-        step[held] = lowest[held]
+        step[held] = np.clip(step, *bounds)[held]
         left = score[free] - A[np.ix_(free, held)] @ step[held]
         step[free] = np.linalg.lstsq(A[np.ix_(free, free)], left, rcond=None)[0]
-        if not (step < lowest).any():
+        outside = free & ((step < bounds[0]) | (step > bounds[1]))
+        if not outside.any():
             break
-        held |= step < lowest
+        held |= outside
     return step, float(2.0 * score @ step - step @ A @ step)
+
+
+def nearest_possible(ship: ExtendedModel) -> ExtendedModel:
+    """The model with its uncertain effects within their bounds, nearest in units of their standard deviations."""
+    keys = uncertain_keys(ship)
+    precision = prior_precision(ship, keys)
+    step, _ = best_step(precision, -precision @ deviations_of(ship, keys), step_bounds(ship, keys))
+    return ship.with_effects(after_step(ship, keys, step))
 
 
 def deviations_of(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
@@ -205,7 +227,7 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     m = marginalised(grams, found.sensitivities, noise)
     now = deviations_of(found.ship, found.keys)
     score = m.s - found.precision @ now
-    _, best = best_step(m.A + found.precision, score, lowest_steps(found.ship, found.keys))
+    _, best = best_step(m.A + found.precision, score, step_bounds(found.ship, found.keys))
     return float(m.quadratic + now @ found.precision @ now - best)
 
 

@@ -26,11 +26,12 @@ class Prior:
     Attributes:
         precision: (c, c) of the Gaussian priors around zero change; zero for effects without a prior.
         now: (c,) the effects that the sensitivities are taken at, less what the vessel file states of them.
+        bounds: (2, c) least and greatest steps from there.
     """
 
     precision: Array
     now: Array
-    lowest: Array
+    bounds: Array
 
 
 def estimate_noise(
@@ -67,7 +68,7 @@ def _estimate_random_current(grams: GramMatrices, found: Sensitivities, noise: N
             trial = replace(noise, current_std_mps=std_mps, current_time_s=time_s)
             m = marginalised(grams, found, trial)
             A = m.A + prior.precision
-            cost = m.log_det + m.quadratic - best_step(A, m.s - prior.precision @ prior.now, prior.lowest)[1]
+            cost = m.log_det + m.quadratic - best_step(A, m.s - prior.precision @ prior.now, prior.bounds)[1]
             cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
             if cost < best[0] - 1e-9:
                 best = (cost, trial)
@@ -84,7 +85,7 @@ def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: P
     m = marginalised(grams, found, noise)
     c = found.numbers
     score = m.s - prior.precision @ prior.now
-    step, _ = best_step(m.A + prior.precision, score, prior.lowest)
+    step, _ = best_step(m.A + prior.precision, score, prior.bounds)
     effects = np.broadcast_to(step, (len(grams.Xe), c))
     if noise.current_std_mps > 0 and found.knot_count:
         ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))

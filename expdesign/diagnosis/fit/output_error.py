@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.cluster_robust import cluster_robust
-from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, uncertain_keys
+from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, nearest_possible, uncertain_keys
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
@@ -30,25 +30,26 @@ def fit_output_error(ship: ExtendedModel, windows: Windows, free: tuple[str, ...
     return fit(ship, part, free, starts=initial_states(windows, ship.states), options=options)
 
 
-def fit_beside_stated_parameters(found: Fit, windows: Windows, short: Windows) -> Fit:
-    """The free effects of a fit beside the parameters of the vessel file, as these stand in it.
+def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bool = False) -> Fit:
+    """A fit made anew as models are judged in short windows: by output error in these.
 
-    Effects are fitted by output error in short windows: beside parameters that are not the likeliest ones, likelihoods
-    of long windows say little about anything slow. Standard errors are no smaller than those beside parameters that may
-    differ, and than the scatter from stretch to stretch tells.
+    Likelihoods of long windows whiten slow errors away, so that a model that is likely there may predict worse.
+    Standard errors are no smaller than those of the fit, and than the scatter from stretch to stretch tells.
 
     Args:
         found: the fit, of all windows.
         windows: that it is of.
         short: the same data in short windows.
+        beside_stated: beside the parameters of the vessel file, as these stand in it.
 
     Raises:
-        FloatingPointError: the simulation diverges at the start of the fit.
+        FloatingPointError: the simulation diverges, at the start of the fit or in the windows after it.
     """
-    free = found.free_keys
-    parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
-    model = replace(found.ship.model, parameter_std=np.zeros(len(found.ship.model.parameters)))
-    ship = replace(found.ship.without_effects(parameters), model=model)
+    free, ship = found.free_keys, found.ship
+    if beside_stated:
+        parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
+        model = replace(ship.model, parameter_std=np.zeros(len(ship.model.parameters)))
+        ship = replace(ship.without_effects(parameters), model=model)
     ahead = cluster_robust(fit_output_error(ship, short, free), np.arange(float(len(short.batch))))
     at_these = replace(continuing(found), steps=0, warm_start=None)
     again = fit(ahead.ship, windows, free, starts=found.starts, options=at_these)
@@ -62,18 +63,19 @@ def fit_beside_stated_parameters(found: Fit, windows: Windows, short: Windows) -
 def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -> tuple[ExtendedModel, Windows]:
     """A model that leads away within `Tuning.ahead_s`, re-estimated, and windows as long as it then allows.
 
-    It is re-estimated within the standard deviations of the vessel file, first in windows short enough for the model
-    in use, then in longer ones. Where that does not succeed, both are as given.
+    It is re-estimated within the standard deviations of the vessel file: first what is impossible in it becomes
+    possible (`nearest_possible`), then it is fitted in windows short enough for it, then in longer ones. Where that
+    does not succeed, both are as given.
 
     Args:
         ship: the model in use.
         record: data.
         windows: of the data, short enough for the model in use.
     """
-    length_s = windows.steps * windows.step_s
-    if length_s >= TUNING.ahead_s or not uncertain_keys(ship):
+    if _length_s(windows) >= TUNING.ahead_s or not uncertain_keys(ship):
         return ship, windows
-    found = ship
+    found = nearest_possible(ship)
+    length_s = _length_s(stable_windows(found, record))
     try:
         while length_s < TUNING.ahead_s:
             found = fit_output_error(found, cut_windows(ship.model, record, longest_s=length_s), ()).ship
@@ -83,3 +85,7 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
         return ship, windows
     longer = stable_windows(found, record)
     return found, longer if longer.steps > windows.steps else windows
+
+
+def _length_s(windows: Windows) -> float:
+    return windows.steps * windows.step_s

@@ -27,6 +27,7 @@ class Tuning:
         least_correlation_eigenvalue: of stated parameters; smaller ones count as rounded.
         fewest_runs: for cluster-robust standard errors.
         folds: of the cross-validation.
+        parts: of every run, in the cross-validation of short stretches.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
         ahead_s: length of the stretches that held-out data are also simulated in [s].
         longer_by: factor of the length of windows from one fit of a diverging model to the next.
@@ -54,6 +55,7 @@ class Tuning:
     least_correlation_eigenvalue: float = 1e-6
     fewest_runs: int = 10
     folds: int = 3
+    parts: int = 5
     fold_steps: int = 6
     ahead_s: float = 30.0
     longer_by: float = 1.4

@@ -13,6 +13,7 @@ from expdesign.diagnosis.model.terms import (
     is_damping,
     is_thrust,
     reads_rudder,
+    resisting,
     term_factors,
     turns_by_force,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "own_advance_terms",
     "own_air_terms",
     "reads_rudder",
+    "resisting",
     "term_factors",
     "term_library",
     "turns_by_force",

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel import Term, VesselModel, stem
 from expdesign.vessel.expressions import Expression, parse_expression
@@ -16,6 +17,8 @@ from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 Effects = Mapping[str, float]
 AIR_SIGNALS = frozenset({"u_q", "v_q"})
 """Velocity through the air."""
+LINEAR = 2.0 + 1e-9
+"""Growth of a linear term from one speed to its double."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,6 +198,27 @@ def is_thrust(expression: Expression, model: VesselModel) -> bool:
 def reads_rudder(expression: Expression) -> bool:
     """It reads a rudder angle."""
     return any(name.startswith("rudder") for name in expression.signals)
+
+
+@lru_cache(maxsize=64)
+def resisting(model: VesselModel) -> Mapping[str, float]:
+    """Sign of the parameters that have to resist: term -> -1, or 1 where its expression is negative.
+
+    These are the terms that grow fastest with the velocity of their own equation alone, and faster than linearly, such
+    as N_abs_r_r r |r|. With the other sign any motion that is fast enough runs away, which no ship does. Linear damping
+    may push: many ships are unstable on course.
+    """
+    found: dict[str, tuple[float, str, float]] = {}
+    for term, expression in zip(model.terms, model.expressions, strict=True):
+        if set(expression.signals) != {term.equation}:
+            continue
+        back, one, two = (
+            float(evaluation([expression]).values({term.equation: np.array(speed)})[0]) for speed in (-1.0, 1.0, 2.0)
+        )
+        growth = abs(two / one) if one and np.isclose(back, -one) else 0.0
+        if growth > max(LINEAR, found.get(term.equation, (0.0,))[0]):
+            found[term.equation] = growth, term.name, -float(np.sign(one))
+    return {name: sign for _, name, sign in found.values()}
 
 
 def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:

@@ -10,7 +10,7 @@ from expdesign.diagnosis.select.candidate_disturbances import candidate_disturba
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import Selection, Step, beside_stated_parameters, redundant_step, without_step
+from expdesign.diagnosis.select.selection import Selection, Step, fitted_ahead, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
 
@@ -20,10 +20,10 @@ __all__ = [
     "ScoreTest",
     "Selection",
     "Step",
-    "beside_stated_parameters",
     "candidate_disturbances",
     "eliminate_backward",
     "fit_nuisance",
+    "fitted_ahead",
     "improves_held_out",
     "leading_candidates",
     "only_nuisance",

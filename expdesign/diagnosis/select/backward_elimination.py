@@ -9,8 +9,15 @@ from itertools import pairwise
 import numpy as np
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit import HeldOut, cluster_robust, held_out_gain, on_common_units, prediction_gain
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import (
+    HeldOut,
+    bootstrap_sums,
+    cluster_robust,
+    held_out_gain,
+    on_common_units,
+    prediction_gain,
+)
 from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, without_step
 from expdesign.diagnosis.select.tuning import TUNING
 
@@ -93,8 +100,9 @@ def improves_held_out(
     that imitates others may make no output worse by more than it gains on average. Where whole simulations lead away,
     the interval of a later cause must exclude zero, and so must that of any cause beside the parameters of the file, as
     tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off every error is a remark,
-    whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause that does not show in
-    simulations may show in predictions from one sample to the next, if it makes simulations no worse for certain.
+    whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause whose gain is not certain has
+    to show for certain in the error of some output, or in predictions from one sample to the next. It may show in these
+    alone, if it makes simulations no worse for certain.
 
     Args:
         found: the selection.
@@ -117,10 +125,19 @@ def improves_held_out(
     ]
     if windows is None:
         return simulated
-    _, (_, high) = gains[0] if gains else (0.0, (0.0, -np.inf))
-    if high >= 0.0 and not simulated[0]:
-        simulated[0] = predicts_better(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
+    _, (low, high) = gains[0] if gains else (0.0, (0.0, -np.inf))
+    if high >= 0.0 and low <= 0.0:
+        share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
+        shows = least > 0.0 or _falls_for_certain(held[0], held[1], seed)
+        simulated[0] = (simulated[0] and shows) or (share >= TUNING.least_predicted and least > 0.0)
     return simulated
+
+
+def _falls_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
+    """Whether the error of some output falls, by an interval that excludes zero."""
+    one, other = on_common_units(before, after)
+    lost, left = (held.squared_error for held in bootstrap_sums(one, other, seed))
+    return bool((np.quantile(left / np.maximum(lost, 1e-300), 0.975, axis=0) < 1.0).any())
 
 
 def _is_certain_ahead(
@@ -161,12 +178,6 @@ def simulates_better(
     (gain, interval), least = gained, _least_change(before, after)
     possible = _matters(before, after) and (not imitates or least >= -gain)
     return possible and _improves(certain, least >= 0.0, gain, interval)
-
-
-def predicts_better(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> bool:
-    """Whether predictions of held-out data from one sample to the next are better by enough, and for certain."""
-    share, (low, _) = prediction_gain(before, after, windows, noise)
-    return share >= TUNING.least_predicted and low > 0.0
 
 
 def _matters(before: HeldOut, after: HeldOut) -> bool:

@@ -9,7 +9,7 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, continuing, fit, fit_beside_stated_parameters, log_likelihood_gain
+from expdesign.diagnosis.fit import Fit, continuing, fit, fit_ahead, log_likelihood_gain
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.tuning import TUNING
@@ -68,17 +68,24 @@ class Selection:
         )
 
 
-def beside_stated_parameters(found: Selection, windows: Windows, short: Windows) -> Selection | None:
-    """The same causes beside the parameters of the vessel file, by windows and by `short` ones; None if that fails."""
+def fitted_ahead(found: Selection, windows: Windows, short: Windows, *, beside_stated: bool) -> Selection | None:
+    """The same causes fitted as they are judged in short windows; None if that fails.
+
+    Args:
+        found: the selection.
+        windows: of its fits.
+        short: the same data in short windows.
+        beside_stated: beside the parameters of the vessel file, instead of those within their standard deviations.
+    """
     steps, before = list[Step](), None
     for step in found.steps:
         try:
-            known = fit_beside_stated_parameters(step.chosen.fit, windows, short)
+            known = fit_ahead(step.chosen.fit, windows, short, beside_stated=beside_stated)
         except (FloatingPointError, np.linalg.LinAlgError):
             return None
         steps.append(replace(step, chosen=replace(step.chosen, fit=known), before=before or step.before))
         before = known
-    return replace(found, steps=tuple(steps), last=before or found.first, beside_stated=True)
+    return replace(found, steps=tuple(steps), last=before or found.first, beside_stated=beside_stated)
 
 
 def redundant_step(steps: list[Step], windows: Windows) -> int | None:

@@ -114,12 +114,13 @@ def best_step(
             work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
             rough.append(candidate)
     possible = [item for item in rough if _is_possible(item)]
-    fitted = _significant(base, windows, ranked_by_gain(base, possible), work)
+    astray = leads_away(validation.of(base))
+    fitted = _significant(base, windows, ranked_by_gain(base, possible), work, all_of_them=astray)
     accepted = [item for item in fitted if item.p_value <= TUNING.accepted_p_value and _is_possible(item)]
     if not accepted:
         return None
     first = simplest(accepted)
-    chosen = _best_on_held_out(first, accepted, validation)
+    chosen = _best_on_held_out(first, accepted, validation, astray=astray)
     outranked = () if chosen is first else (first.candidate,)
     worse = set() if first.candidate.imitates else {one.cause for one in outranked}
     others = [item for item in fitted if item.candidate.cause not in worse]
@@ -138,7 +139,7 @@ def _is_possible(item: FittedCandidate) -> bool:
 
 
 def _best_on_held_out(
-    first: FittedCandidate, accepted: Sequence[FittedCandidate], validation: CrossValidation
+    first: FittedCandidate, accepted: Sequence[FittedCandidate], validation: CrossValidation, *, astray: bool = False
 ) -> FittedCandidate:
     """The best candidate, or one with fewer numbers that simulates data held out of the fit better.
 
@@ -148,7 +149,7 @@ def _best_on_held_out(
     likelihoods tell little, and the best candidates of all other causes are compared. Where it does so only with
     another cause, that one is no rival.
     """
-    astray = leads_away(validation.of(first.fit))
+    astray = astray or leads_away(validation.of(first.fit))
     rivals = _rivals(first, accepted, any_number=astray)
     rivals = [item for item in rivals if astray or not leads_away(validation.of(item.fit))]
     if not rivals:
@@ -175,7 +176,7 @@ def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_
         most = first.numbers if _is_about_as_likely(item, first) else first.numbers - 1
         if (any_number or item.numbers <= most) and item.candidate.cause != first.candidate.cause:
             found.setdefault(item.candidate.cause, item)
-    return [*found.values()][: TUNING.rivals]
+    return [*found.values()][: TUNING.shortlist if any_number else TUNING.rivals]
 
 
 def _rough_fit(base: Fit, windows: Windows, far: bool, point: StartingPoint) -> FittedCandidate | None:
@@ -206,13 +207,15 @@ def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tup
     return tuple(found.values())
 
 
-def _significant(base: Fit, windows: Windows, rough: list[FittedCandidate], work: Work) -> list[FittedCandidate]:
-    """The best candidates, fitted to convergence and significant by a Wald test.
+def _significant(
+    base: Fit, windows: Windows, rough: list[FittedCandidate], work: Work, *, all_of_them: bool = False
+) -> list[FittedCandidate]:
+    """The best candidates, or all of them, fitted to convergence and significant by a Wald test.
 
     A candidate may converge to zero in the nonlinear fit. Then the next best are fitted.
     """
     while rough:
-        leading = _leading(rough)
+        leading = rough if all_of_them else _leading(rough)
         converged = list(in_order(fit_to_convergence, (base, windows), [(item,) for item in leading]))
         for new, old in zip(converged, leading, strict=True):
             if not old.fit.converged:
@@ -243,8 +246,7 @@ def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) 
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
         return [starting_point(base, test) for test in shortlist], False
-    causes = [*dict.fromkeys(item.candidate.cause for item in shortlist)][: TUNING.certain]
-    best = [next(item for item in shortlist if item.candidate.cause == cause) for cause in causes]
+    best = _never_left_out(shortlist)
     certain = [*best, *_hidden_by_random_current(base, tests)]
     listed = {id(item.candidate) for item in certain}
     multiplicity = {id(item.candidate): item.multiplicity for item in tests}
@@ -254,6 +256,19 @@ def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) 
         if id(item.candidate) not in listed
     ]
     return start_in_short_windows(short_fit, [*certain, *others], len(certain)), True
+
+
+def _never_left_out(shortlist: Sequence[ScoreTest]) -> list[ScoreTest]:
+    """The best candidate of the first causes, and of all whose statistic is about as large as the largest."""
+    first: dict[str, ScoreTest] = {}
+    for item in shortlist:
+        first.setdefault(item.candidate.cause, item)
+    largest = max((item.statistic for item in shortlist), default=0.0)
+    return [
+        item
+        for place, item in enumerate(first.values())
+        if place < TUNING.certain or item.statistic > TUNING.about_as_likely * largest
+    ]
 
 
 def _explained_share(tests: tuple[ScoreTest, ...], base: Fit) -> float:

@@ -1,0 +1,128 @@
+"""A diagnosis writes no model that runs away, or simulates the data worse, where the model in use does not."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis import judgement
+from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit.fit import best_step, nearest_possible, step_bounds
+from expdesign.diagnosis.fit.output_error import fit_output_error
+from expdesign.diagnosis.judgement import harms, without_harm
+from expdesign.diagnosis.model.terms import resisting
+from expdesign.diagnosis.select import backward_elimination
+from expdesign.diagnosis.select.backward_elimination import improves_held_out
+from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.vessel import Term
+from held_out_cases import errors, steps_of
+
+
+@pytest.fixture(scope="module")
+def record():
+    return hidden_record("barge", seed=1, batches=2, samples=150)
+
+
+def with_parameters(vessel, **values):
+    return replace(vessel, model=vessel.model.with_parameters(values))
+
+
+def test_models_that_run_away_or_simulate_worse_harm(record):
+    """Anti-damping; damping off by a half; a true model in place of either; the same model."""
+    vessel = vessel_of("barge")
+    right = extended_model(vessel, record)
+    yaw = vessel.model.parameters[vessel.model.names.index("N_r")]
+    wrong, wild = (extended_model(with_parameters(vessel, N_r=value), record) for value in (0.5 * yaw, 2.0))
+    for before, after, harmful in (
+        (right, right, False), (right, wild, True), (right, wrong, True), (wrong, right, False), (wild, right, False),
+        (wild, wild, False),
+    ):  # fmt: skip
+        assert harms(before, after, record) is harmful
+
+
+def test_causes_are_taken_back_until_none_harms(monkeypatch):
+    """Three causes, of which the second makes the simulation worse: the first is left, with its errors."""
+    found = steps_of("good", "bad", "worse")
+    fits = {key: SimpleNamespace(ship=key, linear=SimpleNamespace(motion=SimpleNamespace(windows=SimpleNamespace(
+        batch=None)))) for key in ("good", "bad", "worse")}  # fmt: skip
+    steps = tuple(
+        SimpleNamespace(**{**vars(step), "chosen": SimpleNamespace(fit=fits[step.chosen.fit])}) for step in found.steps
+    )
+    found = replace(found, steps=steps, last=fits["worse"])  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "harms", lambda _ship, extended, _record: extended != "good")
+    monkeypatch.setattr(judgement, "cluster_robust", lambda fit, _batch: fit)
+    kept, held = without_harm(found, [errors(fit) for fit in (50.0, 60.0, 70.0, 80.0)], None, None)  # type: ignore[arg-type]
+    assert [step.chosen.fit.ship for step in kept.steps] == ["good"]
+    assert kept.last is fits["good"]
+    assert len(held) == 2
+
+
+def with_quadratic_yaw_damping(value: float, std: float):
+    """The barge with N_abs_r_r beside N_r, uncertain."""
+    vessel = vessel_of("barge")
+    model = vessel.model
+    terms = (*model.terms, Term("r", "N_abs_r_r", "r*abs(r)"))
+    return replace(
+        vessel,
+        model=replace(
+            model, terms=terms, parameters=np.append(model.parameters, value),
+            parameter_std=np.append(model.parameter_std, std),
+        ),
+    )  # fmt: skip
+
+
+def test_the_steepest_damping_of_each_velocity_has_to_resist():
+    """Of r and r |r| the latter, whichever sign its expression has; linear terms and cross terms may have any sign."""
+    model = with_quadratic_yaw_damping(-1.0, 0.1).model
+    assert resisting(model)["N_abs_r_r"] == -1.0
+    assert "N_r" not in resisting(model)
+    assert all(set(model.expressions[model.names.index(name)].signals) <= {"u", "v", "r"} for name in resisting(model))
+    turned = tuple(replace(t, expression="-r*abs(r)") if t.name == "N_abs_r_r" else t for t in model.terms)
+    assert resisting(replace(model, terms=turned))["N_abs_r_r"] == 1.0
+
+
+def test_uncertain_damping_that_pushes_is_taken_back_to_what_is_possible(record):
+    """Stated as +2 +- 5: zero is the nearest that is possible, and fits stay there or below."""
+    vessel = with_quadratic_yaw_damping(2.0, 5.0)
+    ship = extended_model(vessel, record)
+    begun = nearest_possible(ship)
+    assert begun.get("theta:N_abs_r_r") == pytest.approx(-2.0)
+    assert {key for key, value in begun.effects.items() if value} == {"theta:N_abs_r_r"}
+    found = fit_output_error(begun, cut_windows(ship.model, record, longest_s=30.0), ())
+    assert found.value("theta:N_abs_r_r") <= -2.0 + 1e-9
+
+
+def test_steps_end_at_their_bounds_and_others_make_the_best_of_it():
+    """Minimum of (x - 3)^2 + (y - x)^2 with x at most 1 is x = y = 1; without bounds x = y = 3."""
+    A, score = np.array([[2.0, -1.0], [-1.0, 1.0]]), np.array([3.0, 0.0])
+    free = np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
+    np.testing.assert_allclose(best_step(A, score, free)[0], [3.0, 3.0])
+    step, gain = best_step(A, score, np.array([[-np.inf, -np.inf], [1.0, np.inf]]))
+    np.testing.assert_allclose(step, [1.0, 1.0])
+    assert gain == pytest.approx(9.0 - 4.0)
+
+
+def test_bounds_are_those_of_times_and_of_damping(record):
+    ship = extended_model(with_quadratic_yaw_damping(-0.5, 0.1), record)
+    low, high = step_bounds(ship.with_effects({"lag:all": 2.0}), ("lag:all", "theta:N_abs_r_r", "theta:N_r"))
+    np.testing.assert_allclose(low, [-2.0, -np.inf, -np.inf], atol=1e-5)
+    np.testing.assert_allclose(high, [np.inf, 0.5, np.inf])
+
+
+def test_a_first_cause_that_shows_nowhere_for_certain_is_a_remark(monkeypatch):
+    """A point on average, perhaps none: predictions decide, alone if they gain much; a sure gain decides itself."""
+    spread = np.array([[-3.0], [-3.0], [-3.0], [5.0], [5.0], [5.0]])
+    for after, predicted, kept in (
+        (70.0 + spread, (0.01, (0.001, 0.02)), True),
+        (70.0 + spread, (0.01, (-0.001, 0.02)), False),
+        (70.0 + spread, (0.3, (-0.1, 0.5)), False),
+        (71.0, (0.0, (-0.1, 0.1)), True),
+        (70.0, (0.06, (0.01, 0.1)), True),
+        (70.0, (0.04, (0.01, 0.1)), False),
+    ):
+        monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_, predicted=predicted: predicted)
+        found = steps_of("only")
+        found.steps[0].chosen.fit = SimpleNamespace(noise=None)  # type: ignore[misc]
+        assert improves_held_out(found, [errors(70.0), errors(after)], 0, object()) == [kept]  # type: ignore[arg-type]
