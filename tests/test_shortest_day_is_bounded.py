@@ -9,7 +9,7 @@ from design_case import WIND, force_actuator, scored_example, vessel
 from expdesign.durations import Collected, build_durations, optimal_shares
 from expdesign.information import regressor_rows
 from expdesign.shortest_day import Accuracy
-from expdesign.shortest_day.bounds import Motions, fewest_samples, richest_sample
+from expdesign.shortest_day.bounds import Motions, fewest_samples, richest_sample, speed_changes
 from expdesign.shortest_day.bounds.affine import AFFINE, over_boxes
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
@@ -181,3 +181,45 @@ def test_wider_limits_never_raise_the_bound_and_twice_the_accuracy_doubles_it():
     assert wide.least < narrow.least
     assert doubled.enough == pytest.approx(2 * narrow.enough, rel=0.03)
     assert doubled.least == pytest.approx(2 * narrow.least, rel=0.15)
+
+
+def test_a_ship_that_only_surges_gets_under_way_in_closed_form():
+    drag, thrust, top, way_m = 0.1, 0.2, 1.5, 40.0
+    model = VesselModel(
+        terms=(Term("u", "X_u", "u"), Term("u", "X_tau", "tau_x")),
+        parameters=np.array([-drag, 1.0]),
+        parameter_std=np.zeros(2),
+        form="continuous",
+        sample_time_s=1.0,
+        actuators=(force_actuator(Limit(low=-thrust, high=thrust)),),
+    )
+    motions = Motions.within(model, model.names, np.array([[-top, top], [0, 0], [0, 0.0]]), air_to=np.zeros(2))
+    changes = speed_changes(motions, top)
+    # u' = X - drag u and u' = -X - drag u
+    gain_s, loss_s = -np.log(1 - drag * top / thrust) / drag, np.log(1 + drag * top / thrust) / drag
+    covered_m = (thrust * gain_s - top) / drag + (top - thrust * loss_s) / drag
+    exact_s = gain_s + loss_s + (way_m - covered_m) / top
+    assert 0.97 * exact_s < changes.least_s(way_m, 0.0) <= exact_s
+    assert changes.least_s(way_m, top) < changes.least_s(way_m, 0.0)
+    assert speed_changes(motions, top, rounds=0).least_s(way_m, 0.0) <= changes.least_s(way_m, 0.0)
+    assert changes.least_s(0.5, 0.0) > np.sqrt(4 * 0.5 / (thrust + drag * top + thrust))  # never up to speed
+
+
+@pytest.mark.parametrize("ship", [AZIMUTHS, rudder_ship()], ids=["azimuths", "rudder"])
+def test_no_motion_gains_or_loses_speed_faster_than_bounded(ship):
+    rng, model = np.random.default_rng(4), ship.model
+    motions = Motions.within(model, model.names, FASTEST, air_to=np.array([3.0, 2.0]))
+    changes = speed_changes(motions, 1.6, rounds=3)
+    points = rng.uniform(motions.low, motions.high, (20_000, len(motions.low)))
+    base, gains = motions.regressors(tuple(points.T), NUMPY)
+    force = motions.forces[rng.integers(len(motions.forces), size=len(points))] * rng.random((len(points), 1))
+    speed = np.hypot(*points[:, :2].T)
+    change = np.zeros(len(points))
+    for index, (term, theta) in enumerate(zip(model.terms, model.parameters.tolist(), strict=True)):
+        value = base[index] + sum(size * gain[index] for size, gain in zip(force.T, gains, strict=True))
+        along = {"u": points[:, 0], "v": points[:, 1], "r": 0.0}[term.equation] / speed
+        change = change + along * theta * value / model.time_scale_s
+    kept = speed < 1.6
+    place = np.searchsorted(changes.edges, speed[kept]) - 1
+    assert (change[kept] <= changes.gain[place]).all()
+    assert (-change[kept] <= changes.loss[place]).all()

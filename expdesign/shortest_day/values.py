@@ -77,12 +77,13 @@ class DayBound:
     """What no day of a class takes less than.
 
     Class: velocities through water within limits, delivered inputs within those of the actuators, any heading, the
-    nominal model; motions need not obey it, so the class is wider than what the ship can do.
+    nominal model; motions need not obey it but in how fast they gain and lose speed on the way, so the class is wider
+    than what the ship can do.
 
     Attributes:
         information_s: least time in which a motion of the class tells what is needed; proved, 0 where nothing is.
         searched_s: the same if the search found the samples that tell most; an estimate, never less.
-        way_s: least time from start to goal in safe water at the largest speed of the class.
+        way_s: least time from start to goal in safe water, up to the largest speed of the class, and stopping there.
         velocities: (3, 2) limits of u, v and r through water [m/s, rad/s].
         speed_mps: largest speed through water, in any direction.
     """

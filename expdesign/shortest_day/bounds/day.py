@@ -13,6 +13,8 @@ from expdesign.plan.values import Plan
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds.fewest_samples import fewest_samples
 from expdesign.shortest_day.bounds.motions import Motions
+from expdesign.shortest_day.bounds.tuning import TUNING
+from expdesign.shortest_day.bounds.under_way import speed_changes
 from expdesign.shortest_day.values import DayBound
 from expdesign.simulation import to_body
 from expdesign.values import Array
@@ -45,7 +47,7 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
     return DayBound(
         information_s=samples.least * second if samples else 0.0,
         searched_s=samples.estimate * second if samples else 0.0,
-        way_s=way_bound_s(problem, speed_mps),
+        way_s=_from_rest_to_rest_s(problem, velocities, speed_mps),
         velocities=velocities,
         speed_mps=speed_mps,
     )
@@ -70,6 +72,29 @@ def fastest_mps(problem: PlanProblem) -> float:
     begin = through_water(problem.environment, problem.begin)[None]
     runs = np.concatenate([begin, *(item.trajectory.velocity for item in problem.primitives)])
     return max(ship_on_legs(problem).transit_speed_mps, float(np.hypot(*runs[:, :2].T).max()))
+
+
+def _from_rest_to_rest_s(problem: PlanProblem, velocities: Array, speed_mps: float) -> float:
+    """`way_bound_s`, and the time to gain speed and to stop, by the nominal model; without a mean current only.
+
+    Boxes are halved for a closer bound only where that time matters.
+    """
+    way_s, environment = way_bound_s(problem, speed_mps), problem.environment
+    if problem.current_mps > 0:
+        return way_s
+    model, begin_mps = problem.vessel.model, float(np.hypot(*through_water(environment, problem.begin)[:2]))
+    try:
+        motions = Motions.within(model, model.names, velocities, air_to=environment.wind_to)
+    except InputError:  # inputs without limits
+        return way_s
+    found_s = way_s
+    for rounds in (0, TUNING.speed_rounds):
+        changes = speed_changes(motions, speed_mps, rounds=rounds)
+        if changes is not None:
+            found_s = max(found_s, changes.least_s(way_s * speed_mps, begin_mps))
+        if found_s < (1 + TUNING.slow_start) * way_s:
+            break
+    return found_s
 
 
 def way_bound_s(problem: PlanProblem, speed_mps: float) -> float:

@@ -78,7 +78,7 @@ class Motions:
 
     def rows(self, points: Array) -> Array:
         """(4, b, p + n) regressors and a 1 for each mean, at points (b, d): without force, and by unit forces."""
-        base, gains = self._regressors(tuple(points.T), NUMPY)
+        base, gains = self.regressors(tuple(points.T), NUMPY)
         rows = np.zeros((4, len(points), len(self.parameters) + len(self.model.outputs)))
         for column, values in enumerate(zip(base, *gains, strict=True)):
             for row, value in zip(rows[:, :, column], values, strict=True):
@@ -88,7 +88,7 @@ class Motions:
 
     def affine_rows(self, centres: Array, halves: Array) -> tuple[Array, Array, Array]:
         """The same over boxes: centres (4, b, p + n), slopes (d, 4, b, p + n) and errors (4, b, p + n)."""
-        base, gains = self._regressors(over_boxes(centres, halves), AFFINE)
+        base, gains = self.regressors(over_boxes(centres, halves), AFFINE)
         count, d = centres.shape
         shape = (4, count, len(self.parameters) + len(self.model.outputs))
         middle, slopes, error = np.zeros(shape), np.zeros((d, *shape)), np.zeros(shape)
@@ -102,7 +102,7 @@ class Motions:
         middle[0, :, len(self.parameters) :] = 1.0
         return middle, slopes, error
 
-    def _regressors(self, point: tuple[Any, ...], ops: Operators) -> tuple[list[Any], list[list[Any]]]:
+    def regressors(self, point: tuple[Any, ...], ops: Operators) -> tuple[list[Any], list[list[Any]]]:
         """p regressors without force, and what each unit of force adds to them."""
         table = self._signals(point, ops)
         chosen = [self.model.expressions[self.model.names.index(name)] for name in self.parameters]

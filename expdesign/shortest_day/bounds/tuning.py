@@ -25,6 +25,9 @@ class Tuning:
         added: most samples added in a round.
         added_weight: of all of them.
         least_weight: of a sample, as a share of an equal one; others are left out.
+        speeds: ranges of speed whose gain and loss are bounded.
+        speed_rounds, speed_boxes: of halving boxes of such a range, and most halved at once.
+        slow_start: share of the way's time that gaining speed must take for these boxes to be halved.
         searches: for the sample that tells most, each with a better measure.
     """
 
@@ -44,6 +47,10 @@ class Tuning:
     added: int = 40
     added_weight: float = 0.1
     least_weight: float = 1e-4
+    speeds: int = 24
+    speed_rounds: int = 20
+    speed_boxes: int = 300
+    slow_start: float = 0.01
     searches: int = 5
 
 

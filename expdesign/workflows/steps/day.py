@@ -201,7 +201,7 @@ def _bound(found: ShortestDay) -> dict[str, object]:
         "day_over_bound": found.plan.commands.duration_s / bound.day_s,
         "bound": {
             "holds_for": "motions within these velocities through water and the actuators' limits, whether or not "
-            "the model can follow them; regressors by the nominal model",
+            "the model can follow them; regressors, and how fast speed is gained and lost, by the nominal model",
             "velocities": dict(zip(("u_mps", "v_mps", "r_radps"), bound.velocities.tolist(), strict=True)),
             "speed_mps": bound.speed_mps,
             "information_s": bound.information_s,
