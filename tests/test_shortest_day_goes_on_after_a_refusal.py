@@ -90,3 +90,22 @@ def test_a_run_without_any_place_is_not_chosen_again_and_costs_no_day(asked, mon
     assert len(tried) == 2 + rounds
     assert min(tried[0]) not in set().union(*tried[1:])
     assert min(tried[1]) not in set().union(*tried[2:])
+
+
+@pytest.mark.parametrize(("what", "costs"), [("unstable", 0), ("sailing", 1)])
+def test_a_run_that_cannot_be_sailed_is_not_chosen_again(asked, monkeypatch, what, costs):
+    problem, accuracy = asked
+    names, tried, rounds = problem.design.problem.names, [], 2
+
+    def refuse(problem, *, like, progress):
+        tried.append({name for name, count in zip(names, problem.design.repeats, strict=True) if count})
+        if len(tried) > 1:
+            raise NoPlan("no place for a run")
+        raise NoPlan("a run cannot be sailed", what=what, which=min(tried[-1]))
+
+    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
+    with pytest.raises(NoPlan, match="no place for a run"):
+        shortest_day(problem, accuracy)
+    assert len(tried) == 1 + rounds - costs
+    assert min(tried[0]) not in set().union(*tried[1:])

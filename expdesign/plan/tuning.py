@@ -80,7 +80,7 @@ class Tuning:
     faster: tuple[float, ...] = (1.05, 1.2, 1.5)
     trials_stream: int = 1
     lateness_stream: int = 2
-    lateness_trials: int = 100
+    lateness_trials: int = 60
     replans: int = 2
     widening: float = 1.4
     replan_budgets: float = 2.0

@@ -59,11 +59,10 @@ def shortest_day(
         raise NoAnswer(search.too_long(days, most_s))
     with suppress(NoAnswer):  # limits on runs may allow no more than days near those drafted have
         last = search.cheapest(days)
-    found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0, most=TUNING.compared)
-    if not found:
+    found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0)
+    if found is None:
         raise NoPlan(search.falls_short(days))
-    best = min(found, key=lambda day: day.plan.day.median_s)
-    return replace(best, curve=search.curve(days, best.design.repeats))
+    return replace(found, curve=search.curve(days, found.design.repeats))
 
 
 def fullest_day(
@@ -96,12 +95,10 @@ def fullest_day(
             f"design.day_s is {day_s:g}: the shortest of {len(days)} days found, with runs in it, takes "
             f"{least_s:.0f} s; a larger day_s, or shorter manoeuvres, would do"
         )
-    found = search.planned(
-        allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s, most=1
-    )
-    if not found:
+    found = search.planned(allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s)
+    if found is None:
         raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
-    return replace(found[0], most_s=day_s, curve=search.curve(days, found[0].design.repeats))
+    return replace(found, most_s=day_s, curve=search.curve(days, found.design.repeats))
 
 
 def check_way_fits(problem: PlanProblem, day_s: float) -> None:
@@ -120,7 +117,8 @@ class _Search:
 
     Attributes:
         problem, accuracy, added: as of `shortest_day`.
-        placeless: runs found to have no place in the water; grows.
+        placeless: runs found to have no place in the water, to be unstable for drawn ships, or to be reached by no leg
+            in the time budget; grows.
     """
 
     problem: PlanProblem
@@ -154,9 +152,10 @@ class _Search:
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
-                if isinstance(error, NoRoom) and not self.placeless.issuperset(error.lacking):
-                    self.placeless.update(error.lacking)
-                    continue  # soon found, and no reason to try fewer days
+                if fresh := _impossible(error) - self.placeless:
+                    self.placeless.update(fresh)
+                    if error.what != "sailing":
+                        continue  # soon found, and no reason to try fewer days
             told = next(left, None)
         if not days:
             raise refused
@@ -272,9 +271,8 @@ class _Search:
         progress: Progress,
         *,
         good: Callable[[Plan, float], bool],
-        most: int,
-    ) -> list[ShortestDay]:
-        """The first good ones of the best days, with their verification and their drawn trials.
+    ) -> ShortestDay | None:
+        """The first good one of the best days, with its verification and its drawn trials.
 
         Args:
             best: to be planned, the best first.
@@ -282,15 +280,12 @@ class _Search:
             last: the runs chosen last.
             progress: of planning.
             good: whether a plan with this margin is what was asked for.
-            most: plans, at most.
 
         Raises:
             NoPlan: none is good, and what was planned last was refused.
         """
-        refused, found = None, list[ShortestDay]()
+        refused = None
         for day in best:
-            if len(found) == most or any(day.day_s >= other.plan.day.median_s for other in found):
-                break  # drawn trials take no less than planned
             design = self.design(day.repeats)
             try:
                 plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
@@ -298,20 +293,18 @@ class _Search:
                 refused = error
                 continue
             if good(plan, margin := self._told_by(plan.sailed)[2]):
-                found.append(
-                    ShortestDay(
-                        plan=plan,
-                        design=design,
-                        tried=tuple(self._told(item) for item in days),
-                        cost_s=last.cost_s,
-                        cost_bound_s=last.bound_s,
-                        information=float(np.exp(margin)),
-                        parts=_parts(day.draft, plan),
-                    )
+                return ShortestDay(
+                    plan=plan,
+                    design=design,
+                    tried=tuple(self._told(item) for item in days),
+                    cost_s=last.cost_s,
+                    cost_bound_s=last.bound_s,
+                    information=float(np.exp(margin)),
+                    parts=_parts(day.draft, plan),
                 )
-        if refused is not None and not found:
+        if refused is not None:
             raise refused
-        return found
+        return None
 
     def falls_short(self, days: Sequence[DraftedDay]) -> str:
         """That no day reaches the accuracy, the best that is possible, and what would help."""
@@ -382,6 +375,13 @@ def promised_at_zero(promised: Sequence[float], margins: Sequence[float]) -> flo
     low, high = short[0], enough[0]
     share = -margins[low] / (margins[high] - margins[low])
     return float(promised[low] + share * (promised[high] - promised[low]))
+
+
+def _impossible(error: NoPlan) -> set[str]:
+    """Runs that a refusal names as its cause, by themselves."""
+    if isinstance(error, NoRoom):
+        return set(error.lacking)
+    return {error.which} if error.which and error.what in ("unstable", "sailing") else set()
 
 
 def _parts(draft: Draft, plan: Plan) -> DayParts:

@@ -19,8 +19,6 @@ class Tuning:
         other_runs: of each manoeuvre that it has more or fewer, at most.
         level_step, level_steps: margin that is asked for besides where the cheapest runs were tried already, at most so
             many times.
-        compared: days that reach the accuracy and are planned, of which that with the least median of drawn trials is
-            taken: they know slow ships and go-arounds, which the expected time of a draft hardly does.
         least_level, level_halvings: least margin of a day of a given length, and steps in search of the largest.
         average_legs: legs to one manoeuvre that the average of all legs counts as, once days have been planned.
         least_leg_s: least of it once days have been planned [s].
@@ -51,7 +49,6 @@ class Tuning:
     other_runs: int = 2
     level_step: float = 0.05
     level_steps: int = 10
-    compared: int = 2
     least_level: float = -4.0
     level_halvings: int = 12
     average_legs: float = 2.0
@@ -66,7 +63,7 @@ class Tuning:
     curve_shares: tuple[float, ...] = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
     cuts: int = 200
     tangents: int = 60
-    halvings: int = 20
+    halvings: int = 12
     reached: float = 1e-9
     choice_gap: float = 1e-3
     exchanged: int = 24
