@@ -135,6 +135,30 @@ def _on_course(system: System, helm: Helm, lag_s: float = SERVO_S) -> System:
     return A, np.vstack([B, np.zeros((1, 2))]), np.column_stack([C, np.zeros(4)]), D
 
 
+def nonlinear_run(
+    load: Load, orders: Array, sea: Sea, rng: np.random.Generator, *, damping: float, cross_flow: float, stall: float,
+    step_s: float = 0.01,
+) -> Run:  # fmt: skip
+    """A run of the ship with a moment -damping p|p| - cross_flow v|v| + stall delta^3 on top, held over samples."""
+    system = _steered(ship_system(MODEL_SHIP_TRUTH, MODEL_SHIP, load))
+    A, B, C, D, _ = scipy.signal.cont2discrete(system, step_s)
+    waves, state = shaped(len(orders), sea, step_s, rng), np.zeros(5)
+    outputs = np.empty((len(orders), 4))
+    for k, order in enumerate(orders):
+        _, v, p, _, rudder = state
+        moment = waves[k] - damping * p * abs(p) - cross_flow * v * abs(v) + stall * rudder**3
+        outputs[k] = C @ state + D @ [order, moment]
+        state = A @ state + B @ [order, moment]
+    noise = np.array([sea.roll_rate, sea.sensed, sea.yaw_rate, 0.0]) * rng.standard_normal(outputs.shape)
+    return Run(step_s=step_s, signals=outputs + noise)
+
+
+def halves(run: Run) -> tuple[Run, Run]:
+    """Of a run."""
+    middle = len(run.signals) // 2
+    return Run(step_s=run.step_s, signals=run.signals[:middle]), Run(step_s=run.step_s, signals=run.signals[middle:])
+
+
 def full_scale(scale: float, hull: Hull = Hull()) -> tuple[Array, Body, Hull]:
     """The model ship by Froude's law: parameters, masses and places, sway and yaw, in kg^a m^b s^c by a + b + c / 2."""
     theta = froude_scaled(MODEL_SHIP_TRUTH, scale)

@@ -20,6 +20,7 @@ from expdesign.roll import (
     Run,
     axis_inertia,
     build_problem,
+    discrete,
     estimate_roll,
     froude_scaled,
     low_pass,
@@ -32,7 +33,7 @@ from expdesign.roll import (
     stiffness,
 )
 from expdesign.roll.instruments import folds
-from expdesign.roll.regression import Spectrum
+from expdesign.roll.regression import WHITE, Spectrum, build_rows
 from expdesign.values import Array
 from roll_truths import (
     MODEL_SHIP,
@@ -42,6 +43,8 @@ from roll_truths import (
     Sea,
     full_scale,
     full_scale_problem,
+    halves,
+    nonlinear_run,
     pendulum_run,
     ship_run,
     switching,
@@ -184,6 +187,53 @@ def test_a_slow_rudder_at_full_scale_tells_the_ship() -> None:
     for name, std in one.std.items():
         assert abs(one.values[name] - named(truth)[name]) < 4 * std, name
     assert one.std["m"] < 0.3 * named(truth)["m"]
+
+
+def entries_over_mean(**moments: float) -> tuple[float, RollEstimate]:
+    """Mean over turn entries of the largest residual there, over the mean residual; and the estimate."""
+    rng, sea = np.random.default_rng(25), Sea(moment=0.005, frequency_hz=0.8, damping=0.5)
+    turns = [switching(6000, 300, rng, levels=(-0.6, 0.0, 0.6)) for _ in THEIR_LOADS]
+    cases = tuple(
+        Case(name="ship", load=load, runs=(nonlinear_run(load or unknown_load(), orders, sea, rng, **moments),))
+        for load, orders in zip(THEIR_LOADS, turns, strict=True)
+    )
+    one = estimate_roll(build_problem(MODEL_SHIP, cases, beam_m=0.3, roll_hz=0.75, known={"k": 9.0}, start={}))
+    peaks, sizes = [], []
+    for case, orders in zip(cases, turns, strict=True):
+        values = discrete(one.theta, MODEL_SHIP, case.load, 0.01).values
+        left = np.abs(build_rows(case.runs[0], WHITE).residuals(values))
+        entries = np.flatnonzero(np.diff(orders)) + 1 - (len(orders) - len(left))
+        peaks += [left[k : k + 40].max() for k in entries if k >= 0]
+        sizes.append(left.mean())
+    return float(np.mean(peaks) / np.mean(sizes)), one
+
+
+def test_what_the_model_misses_shows_at_turn_entries_and_in_the_verdict() -> None:
+    """As in the thesis's figure 6.17, about tenfold; residuals of a linear ship have the peaks of noise, about 3."""
+    linear, own = entries_over_mean(damping=0.0, cross_flow=0.0, stall=0.0)
+    nonlinear, other = entries_over_mean(damping=0.5, cross_flow=3.0, stall=0.3)
+    assert linear < 4.0
+    assert nonlinear > 7.0
+    assert own.trusted
+    assert other.surprise > 10.0
+    assert not other.trusted
+
+
+@pytest.mark.slow
+def test_halves_of_a_record_scatter_as_they_say() -> None:
+    """Two estimates of the load from a minute each: squares of their difference over its variance are 1 on average."""
+    squares, shares = [], []
+    for seed in range(10):
+        pair = [
+            estimate_roll(ship_problem(tuple(replace(case, runs=(halves(case.runs[0])[half],)) for case in cases)))
+            for cases in [ship_cases(THEIR_LOADS, replace(LITTLE, moment=0.02), seed=100 + seed, samples=12_000)]
+            for half in (0, 1)
+        ]
+        apart = pair[0].values["m"] - pair[1].values["m"]
+        squares.append(apart**2 / sum(one.std["m"] ** 2 for one in pair))
+        shares.append(abs(apart) / unknown_load().mass_kg)
+    assert 0.05 < np.mean(squares) < 1.0 + 3.0 * np.sqrt(2.0 / 10)
+    assert np.median(shares) > 0.01
 
 
 def test_k_stays_where_the_search_began_and_the_mass_does_not_care() -> None:
