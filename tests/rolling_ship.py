@@ -8,7 +8,7 @@ import numpy as np
 from design_case import SCENARIOS
 from expdesign.dictionary import Primitive
 from expdesign.loading import Question, build_question, run_information
-from expdesign.roll import Case, Run, build_problem, estimate_roll
+from expdesign.roll import Case, RollEstimate, Run, build_problem, estimate_roll
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, in_waves, measure, rudder_angle, simulate
@@ -91,8 +91,14 @@ def bound(ship: Vessel, seed: int, samples: int = 3000) -> tuple[Question, Array
 
 def error_and_bound(ship: Vessel, seed: int, *, late_s: float = 0.0, samples: int = 3000) -> tuple[Array, Array]:
     """Errors (p,) of an estimate from three load cases with k known, and their least standard deviations (p,)."""
-    assert ship.pendulum is not None
     question, least = bound(ship, seed, samples)
+    found = estimated(ship, question, seed, late_s=late_s, samples=samples)
+    return (found.theta - question.theta)[question.places], least
+
+
+def estimated(ship: Vessel, question: Question, seed: int, *, late_s: float = 0.0, samples: int = 3000) -> RollEstimate:
+    """From three load cases with k known."""
+    assert ship.pendulum is not None
     cases = tuple(
         Case(
             name=option.name,
@@ -104,4 +110,4 @@ def error_and_bound(ship: Vessel, seed: int, *, late_s: float = 0.0, samples: in
     start = dict(ship.pendulum.parameters)
     known = {"k": start.pop("k")}
     problem = build_problem(ship.pendulum.body, cases, beam_m=0.3, roll_hz=0.8, known=known, start=start)
-    return (estimate_roll(problem).theta - question.theta)[question.places], least
+    return estimate_roll(problem)

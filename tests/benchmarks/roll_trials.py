@@ -3,8 +3,9 @@
 bound: errors of estimates, over the least standard deviations that roll-plan states.
 height: these least standard deviations by the height of the inertial sensor.
 late: mean errors where the accelerometer is late, as where its clock is off.
+waves: errors over these least standard deviations in waves of a period near that of roll, as [roll.waves] has them.
 
-Three load cases of a minute each, k known, no waves; the ship is scenarios/vessels/roll-model.toml.
+Three load cases of a minute each, k known, no waves but there; the ship is scenarios/vessels/roll-model.toml.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from expdesign.roll import PARAMETERS
 from expdesign.vessel import Vessel
-from rolling_ship import bound, error_and_bound, roll_model
+from expdesign.waves import Waves
+from rolling_ship import bound, error_and_bound, estimated, roll_model
 
 HEIGHTS_M = (0.05, 0.1, 0.23, 0.5)
 LATE_S = (0.0, 0.002, 0.005, 0.01, 0.02)
@@ -58,7 +61,24 @@ def late(runs: int, seed: int) -> None:
         print(f"| {1000 * late_s:g} ms | " + " | ".join(f"{name} {100 * share:+.1f} %" for name, share in told) + " |")
 
 
-STUDIES = {"bound": over_bound, "height": height, "late": late}
+def waves(runs: int, seed: int) -> None:
+    """Root mean square of error over bound where intervals are trusted, and how many are; the bound of m in percent."""
+    ship = roll_model()
+    assert ship.pendulum is not None
+    for height_m in (0.002, 0.005, 0.01, 0.02):
+        sea = Waves(height_m=height_m, period_s=1.2, from_rad=1.0)
+        there, ratios, trusted = replace(ship, pendulum=replace(ship.pendulum, waves=sea)), [], []
+        for run in range(runs):
+            question, least = bound(there, seed + run)
+            one = estimated(there, question, seed + run)
+            ratios.append((one.theta - question.theta)[question.places] / least)
+            trusted.append(one.trusted)
+        rms = np.sqrt(np.mean(np.square(ratios)[trusted])) if any(trusted) else np.nan
+        share = 100 * least[question.free.index("m")] / question.theta[PARAMETERS.index("m")]
+        print(f"| {1000 * height_m:g} mm | {rms:.2f} | {sum(trusted)} of {runs} | {share:.1f} % |", flush=True)
+
+
+STUDIES = {"bound": over_bound, "height": height, "late": late, "waves": waves}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
