@@ -60,13 +60,13 @@ def parameter_rows(content: RollContent) -> list[tuple[str, ...]]:
     ]
 
 
-def _interval(content: RollContent, name: str) -> str:
+def _interval(content: RollContent, name: str, factor: float = 1.0) -> str:
     estimate = content.estimate
     if name not in estimate.problem.free:
         return "given"
     if name in estimate.held:
         return "held: not determined"
-    low, high = interval(content, name)
+    low, high = (factor * end for end in interval(content, name))
     only = f" for {' and '.join(estimate.held)} as held" if name in content.report.undetermined else ""
     return f"{low:.4g} to {high:.4g}{only}"
 
@@ -85,11 +85,9 @@ def scaled_rows(content: RollContent) -> list[tuple[str, ...]]:
     estimate = content.estimate
     free = [name for name in estimate.problem.free if name not in estimate.held]
     return [
-        (name, f"{of[name] * estimate.values[name]:.4g}", " to ".join(
-            f"{of[name] * end:.4g}" for end in interval(content, name)
-        ), UNITS[name])
+        (name, f"{of[name] * estimate.values[name]:.4g}", _interval(content, name, of[name]), UNITS[name])
         for name in free
-    ]  # fmt: skip
+    ]
 
 
 def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
@@ -215,7 +213,15 @@ def _scaled(content: RollContent) -> dict[str, object]:
     std = np.array([estimate.std.get(name, 0.0) for name in PARAMETERS])
     values, stds = froude_scaled(estimate.theta, scale).tolist(), froude_scaled(std, scale).tolist()
     rows = zip(PARAMETERS, values, stds, strict=True)
-    return {"scale": scale, **{name: {"value": value, "std": deviation or None} for name, value, deviation in rows}}
+    told = {
+        name: {"value": value, "std": deviation or None, "determined": _determined(content, name)}
+        for name, value, deviation in rows
+    }
+    return {"scale": scale, **told}
+
+
+def _determined(content: RollContent, name: str) -> bool:
+    return name in content.estimate.problem.free and name not in content.report.undetermined
 
 
 def _told(one: Direction) -> dict[str, object]:
@@ -230,5 +236,5 @@ def _parameter(content: RollContent, name: str) -> dict[str, object]:
         "value": estimate.values[name],
         "unit": UNITS[name],
         "std": std,
-        "determined": free and name not in content.report.undetermined,
+        "determined": _determined(content, name),
     }
