@@ -30,6 +30,14 @@ ScenarioFile = Annotated[
         metavar="SCENARIO.toml", help="Names vessel, dictionary and area; see expdesign explain scenario for its keys."
     ),
 ]
+OtherVessel = Annotated[
+    Path | None,
+    typer.Option(
+        "--vessel",
+        metavar="VESSEL.toml",
+        help="In place of the vessel file that the scenario names, e.g. vessel-steps.toml or vessel-estimated.toml.",
+    ),
+]
 PlanFile = Annotated[
     Path,
     typer.Argument(metavar="PLAN.json", help="A plan made before; its track.csv and commands.csv must lie beside it."),

@@ -12,6 +12,7 @@ from expdesign.cli.options import (
     MOST_TRIALS,
     Jobs,
     NoCache,
+    OtherVessel,
     Out,
     OutBesidePlan,
     OutWhatIf,
@@ -25,6 +26,7 @@ from expdesign.cli.options import (
 @command("run")
 def run(
     scenario: ScenarioFile,
+    vessel: OtherVessel = None,
     out: Out = None,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
@@ -35,21 +37,22 @@ def run(
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    return ask("run", scenario, out, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed)
+    return ask("run", scenario, out, vessel=vessel, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed)
 
 
 @command("score")
-def score(scenario: ScenarioFile, out: Out = None, seed: Seed = 0) -> Asked:
+def score(scenario: ScenarioFile, vessel: OtherVessel = None, out: Out = None, seed: Seed = 0) -> Asked:
     """Simulate the manoeuvres of the dictionary, and rank them by the information that each adds beside all others.
 
     Writes dictionary.json.
     """
-    return ask("score", scenario, out, seed=seed)
+    return ask("score", scenario, out, vessel=vessel, seed=seed)
 
 
 @command("durations")
 def durations(
     scenario: ScenarioFile,
+    vessel: OtherVessel = None,
     out: Out = None,
     grow: Annotated[
         bool,
@@ -74,12 +77,13 @@ def durations(
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name;
     with --monte-carlo also covariances.json.
     """
-    return ask("durations", scenario, out, grow=grow, monte_carlo=monte_carlo, jobs=jobs, seed=seed)
+    return ask("durations", scenario, out, vessel=vessel, grow=grow, monte_carlo=monte_carlo, jobs=jobs, seed=seed)
 
 
 @command("plan")
 def plan(
     scenario: ScenarioFile,
+    vessel: OtherVessel = None,
     out: Out = None,
     durations: Annotated[
         Path | None,
@@ -95,7 +99,15 @@ def plan(
     Writes plan.json, track.csv and commands.csv.
     """
     return ask(
-        "plan", scenario, out, durations=durations, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed
+        "plan",
+        scenario,
+        out,
+        vessel=vessel,
+        durations=durations,
+        jobs=jobs,
+        scheduler=scheduler,
+        cache=not no_cache,
+        seed=seed,
     )
 
 

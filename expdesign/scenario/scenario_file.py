@@ -122,11 +122,12 @@ class ScenarioFile(Table):
     plan: PlanTable = Field(default=PlanTable(), description="the clearance, safety and repositioning legs of the plan")
 
 
-def load_scenario(path: Path | str) -> Scenario:
+def load_scenario(path: Path | str, *, vessel: Path | None = None) -> Scenario:
     """Read a scenario file and the vessel, dictionary, area and chart it names.
 
     Args:
         path: a TOML file with `[scenario]`, `[design]`, `[start]`, `[goal]` and optionally `[environment]`, `[plan]`.
+        vessel: a vessel file in place of the one it names.
 
     Raises:
         FileError: a file is unreadable, an entry is wrong, missing or unknown, or start or goal has no room.
@@ -141,7 +142,7 @@ def load_scenario(path: Path | str) -> Scenario:
             "has only some keys of a scenario, as variants have; expected a whole scenario, or the variant after its "
             f"scenario: expdesign whatif SCENARIO.toml {entry.path}",
         )
-    return build_scenario(content, entry)
+    return build_scenario(content, entry, vessel=vessel)
 
 
 def _is_variant(content: Mapping[str, Any]) -> bool:
@@ -152,36 +153,37 @@ def _is_variant(content: Mapping[str, Any]) -> bool:
     return bool(content) and set(content) <= set(ScenarioFile.model_fields) and sum(needed) <= 2
 
 
-def build_scenario(content: Mapping[str, Any], entry: Entry) -> Scenario:
+def build_scenario(content: Mapping[str, Any], entry: Entry, *, vessel: Path | None = None) -> Scenario:
     """A scenario from the tables of its file; raises as `load_scenario` does.
 
     Args:
         content: the tables, unchecked.
         entry: the file, to which the files it names are relative.
+        vessel: a vessel file in place of the one it names.
     """
     file = check_table(ScenarioFile, content, entry)
     places = {"start": file.start, "goal": file.goal}
     for key, place in places.items():
         _check_position(place, entry.at(key))
-    vessel = load_vessel(entry.at("scenario.vessel").file(file.scenario.vessel))
+    ship = load_vessel(vessel or entry.at("scenario.vessel").file(file.scenario.vessel))
     dictionary = load_dictionary(entry.at("scenario.dictionary").file(file.scenario.dictionary))
     plan = PlanSettings(**file.plan.model_dump())
-    area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=vessel.draught_m)
+    area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=ship.draught_m)
     poses = {key: _pose(place, area) for key, place in places.items()}
     for key, place in places.items():
-        problem = berth_problem(poses[key], vessel, area, plan.clearance_m, degrees=place.lat_deg is not None)
+        problem = berth_problem(poses[key], ship, area, plan.clearance_m, degrees=place.lat_deg is not None)
         if problem:
             raise entry.at(key).error(problem)
     return Scenario(
         name=_name(file.scenario.name, entry),
         path=entry.path,
-        vessel=vessel,
+        vessel=ship,
         dictionary=dictionary,
         area=area,
-        design=design_settings(file.design, vessel, tuple(spec.name for spec in dictionary), entry.at("design")),
+        design=design_settings(file.design, ship, tuple(spec.name for spec in dictionary), entry.at("design")),
         plan=plan,
         environment=build_environment(file.environment),
-        under_way=_under_way(file.start, vessel, entry.at("start")),
+        under_way=_under_way(file.start, ship, entry.at("start")),
         **poses,
     )
 

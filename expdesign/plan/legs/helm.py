@@ -2,8 +2,8 @@
 
 First the ship recovers from what it was doing. From there the path is a Dubins curve of the ship's own turning radius
 between straights: one to accelerate, one in which the turn decays and, before a goal, the ship stops. Optimisation
-starts from steady turns along it. The last part before a run is the run-up of the standard trials: steady speed, helm
-as it holds the course, engines as the run begins with.
+starts from steady turns along it; on long straights the ship is steady. The last part before a run is the run-up of the
+standard trials: steady speed, helm as it holds the course, engines as the run begins with.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.recovery import Recovery, recover
+from expdesign.plan.legs.transit import steady_transit
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns, through_water
 from expdesign.values import Array
@@ -34,16 +35,40 @@ def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> Array | None:
         path = _path(before_run, water, straights)
         if path is None:
             continue
-        problem = _problem(before_run, water, ship, check, path)
-        values = solve_leg(problem)
+        values = _along(path, before_run, water, ship, check)
         if values is None:
             continue
         whole = np.concatenate([values, tail + (values[-1] - task.end_inputs)])
-        turned = problem.end[2] - before_run.end[2]
+        turned = whole_turns(path[-1, 2] - task.end[2])
         end = np.r_[task.end[:2], task.end[2] + turned, task.end[3:]]
         if acceptable(task.start, end, water, whole, task.past):
             return whole
     return None
+
+
+def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: Recovery) -> Array | None:
+    """Commands (k, m) along a path (j, 3): optimised, but for a long straight, on which they are constant."""
+    braking_m = ship.stopping_m if _stops(task, water) else 0.0
+    transit = steady_transit(path, braking_m, water, ship)
+    if transit is None:
+        return solve_leg(_problem(task, water, ship, check, path))
+    steady = transit.commands[0]
+    before = solve_leg(
+        _problem(replace(task, end=transit.states[0], end_inputs=steady), water, ship, check, transit.to)
+    )
+    if before is None:
+        return None
+    held = transit.commands + (before[-1] - steady)
+    past = water.remembered(np.concatenate([task.past, before, held]))
+    rest = replace(task, start=transit.states[-1], start_inputs=past[-1], before=past)
+    at_once = Recovery(states=rest.start[None], commands=np.empty((0, len(steady))))
+    after = solve_leg(_problem(rest, water, ship, at_once, transit.on))
+    return None if after is None else np.concatenate([before, held, after])
+
+
+def _stops(task: LegTask, water: LegWater) -> bool:
+    """Whether the ship is to stop at the leg's end."""
+    return _speed_mps(water, task.end) < LEGS.slow_share * water.ship.transit_speed_mps
 
 
 def _speed_mps(water: LegWater, state: Array) -> float:
@@ -55,7 +80,7 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
     vessel, speed = water.vessel, _speed_mps(water, task.end)
     samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
-    if speed < LEGS.slow_share * water.ship.transit_speed_mps:
+    if _stops(task, water):
         return task, 0
     states = water.states(task.end, np.tile(task.end_inputs, (samples, 1)))
     scale = np.r_[1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
@@ -97,7 +122,7 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip
     """
     length, radius = water.vessel.length_m, ship.turning_radius_m
     first, last = _course_pose(start, water), _course_pose(task.end, water)
-    stopping = _speed_mps(water, task.end) < LEGS.slow_share * water.ship.transit_speed_mps
+    stopping = _stops(task, water)
     tries = [
         Straights(
             first=first,

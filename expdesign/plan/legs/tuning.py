@@ -39,6 +39,10 @@ class Tuning:
         helm_node: time between nodes of helm-steered legs, in that of a hull length at transit speed.
         eased_hulls: hull lengths over which their first guess eases into turns.
         straight_off_hulls: straight before the first turn, as the helm takes that long to act.
+        transit_hulls: shortest straight that is sailed with constant commands, in hull lengths.
+        transit_ends_hulls: of straights before and after it that are optimised with the rest of the leg.
+        straight_rad: change of course from point to point of a path from which on it bends.
+        heading_rounds: of the search for the heading that makes good a course in a current.
         counter_helm: helm against a residual turn, per yaw rate, in times of a hull length at transit speed.
         recovered_share: yaw rate at which the ship has recovered, in that of a leg's turns.
         recovery_hulls: time after which a recovery ends in any case, in that of a hull length at transit speed.
@@ -80,6 +84,10 @@ class Tuning:
     helm_node: float = 0.25
     eased_hulls: float = 1.0
     straight_off_hulls: float = 1.0
+    transit_hulls: float = 20.0
+    transit_ends_hulls: float = 6.0
+    straight_rad: float = 1e-6
+    heading_rounds: int = 8
     counter_helm: float = 3.0
     recovered_share: float = 0.05
     recovery_hulls: float = 8.0

@@ -25,6 +25,7 @@ def durations(
     scenario: Path,
     out: Path | None,
     *,
+    vessel: Path | None = None,
     grow: bool = False,
     monte_carlo: int = 0,
     jobs: int = 0,
@@ -34,8 +35,9 @@ def durations(
     """How long to run each primitive, with its certificate; with `grow` also of manoeuvres found to add most.
 
     With `monte_carlo` trials of each primitive alone, shares are by the fused covariance of its estimates instead.
+    `vessel` stands in for the vessel file that the scenario names.
     """
-    case = loaded(scenario, progress)
+    case = loaded(scenario, progress, vessel=vessel)
     if monte_carlo:
         if grow or case.design.grow is not None:
             raise InputError("--monte-carlo takes the dictionary as it is, expected neither --grow nor [design.grow]")

@@ -22,6 +22,7 @@ def plan(
     scenario: Path,
     out: Path | None,
     *,
+    vessel: Path | None = None,
     durations: Path | None = None,
     seed: int = 0,
     jobs: int = 1,
@@ -34,6 +35,7 @@ def plan(
     Args:
         scenario: the scenario file.
         out: folder.
+        vessel: a vessel file in place of the one that the scenario names.
         durations: a durations.json made before.
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
@@ -41,9 +43,9 @@ def plan(
         cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
     """
-    case = loaded(scenario, progress)
+    case = loaded(scenario, progress, vessel=vessel)
     check_plannable(case)
-    words = command_text("plan", [scenario], {"--durations": durations, "--seed": seed})
+    words = command_text("plan", [scenario], {"--vessel": vessel, "--durations": durations, "--seed": seed})
     with (
         remembering(user_memory() if cache else None),
         workers(jobs, scheduler=scheduler),

@@ -24,6 +24,7 @@ def run(
     scenario: Path,
     out: Path | None,
     *,
+    vessel: Path | None = None,
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -35,15 +36,16 @@ def run(
     Args:
         scenario: the scenario file.
         out: folder.
+        vessel: a vessel file in place of the one that the scenario names.
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
         cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
     """
-    case = loaded(scenario, progress)
+    case = loaded(scenario, progress, vessel=vessel)
     check_plannable(case)
-    words = command_text("run", [scenario], {"--seed": seed})
+    words = command_text("run", [scenario], {"--vessel": vessel, "--seed": seed})
     with (
         remembering(user_memory() if cache else None),
         workers(jobs, scheduler=scheduler),

@@ -11,9 +11,16 @@ from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.scored import parameters_of, ranking, score_files, scored
 
 
-def score(scenario: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
-    """Information of every primitive of a scenario's dictionary."""
-    case = loaded(scenario, progress)
+def score(
+    scenario: Path,
+    out: Path | None,
+    *,
+    vessel: Path | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
+    case = loaded(scenario, progress, vessel=vessel)
     information = scored(case, progress=within(progress, 0.05, 0.95))
     summary = {
         "primitives": len(information),

@@ -19,10 +19,10 @@ PLAN = "plan.json"
 """Name of a file that every plan has."""
 
 
-def loaded(scenario: Path, progress: Progress) -> Scenario:
-    """A scenario file."""
+def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) -> Scenario:
+    """A scenario file; with `vessel`, that file in place of the one it names."""
     progress("reading the scenario", 0.0)
-    return load_scenario(scenario)
+    return load_scenario(scenario, vessel=vessel)
 
 
 def written(
