@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record
+from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError
+from expdesign.estimation.disturbance import mean_current
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.output_error import gauss_newton, minimise
@@ -16,6 +17,7 @@ from expdesign.estimation.replay.replay import Integration, build_replay, simula
 from expdesign.estimation.settings import Settings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
+from expdesign.vessel import VesselModel
 from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
@@ -123,27 +125,31 @@ def measured_from(batch, start):
 
 
 @pytest.mark.parametrize(("integrator", "windy"), [("rk4", False), ("euler", True)])
-def test_sensitivities_are_derivatives(integrator: str, windy: bool) -> None:
-    """Of two stretches side by side, by parameters, constants and starts."""
+@pytest.mark.parametrize("flowing", [False, True])
+def test_sensitivities_are_derivatives(integrator: str, windy: bool, flowing: bool) -> None:
+    """Of two stretches side by side, by parameters, a current, constants and starts."""
     batch = trials(QUIET, seeds=(1,), samples=80).batches[0]
     blown = 3 * np.random.default_rng(2).normal(size=(40, 2, 2))
     drive = np.stack([batch.inputs[:40], batch.inputs[40:]], axis=1)
+    course = np.stack([np.cos(blown[..., 0]), np.sin(blown[..., 0])], axis=2)
     stretches = Stretches(
         model=TRUE.model,
         sought=(0, 6, 12),
         states=(0, 1, 2),
-        drive=np.concatenate([drive, blown], axis=2) if windy else drive,
+        drive=np.concatenate([drive, *([blown] if windy else []), *([course] if flowing else [])], axis=2),
         windy=windy,
+        flowing=flowing,
         sample_time_s=1.0,
         integrator=integrator,
         substeps=1,
     )
     ready = compiled(stretches)
-    values = np.tile([*TRUE.model.parameters[[0, 6, 12]], 1e-3, -2e-3, 1e-4], (2, 1))
+    current = (0.2, -0.1) if flowing else ()
+    values = np.tile([*TRUE.model.parameters[[0, 6, 12]], *current, 1e-3, -2e-3, 1e-4], (2, 1))
     start = batch.velocity[[0, 40]]
     by_values, by_start = ready.sensitivities(values, ready.states(values, start))
-    for index in range(6):
-        step = 1e-6 * np.eye(6)[index]
+    for index in range(values.shape[1]):
+        step = 1e-6 * np.eye(values.shape[1])[index]
         numeric = (ready.states(values + step, start) - ready.states(values - step, start)) / 2e-6
         np.testing.assert_allclose(by_values[..., index], numeric, rtol=1e-5, atol=1e-6)
     for index in range(3):
@@ -180,6 +186,30 @@ def test_measured_wind_leads_to_the_air_terms_and_without_it_the_wind_is_misfit(
     exact = np.array([TRUTH[name] for name in found.names])
     assert (np.abs(found.values - exact) < 4.5 * found.std).all()
     assert (calm.residuals.std[:2] > 2 * found.residuals.std[:2]).all()
+
+
+@pytest.mark.parametrize("method", ["oe-current", "oe-air-current"])
+def test_a_steady_current_is_estimated_with_the_parameters(method: str) -> None:
+    wind = np.array([3.0, 2.0]) if "air" in method else np.zeros(2)
+    weather = Environment(current_to=CURRENT, wind_to=wind)
+    rng = np.random.default_rng(43)
+    data = record(*(measured(QUIET, commands(400, rng), weather=weather, seed=seed) for seed in (1, 2)))
+    model = NOMINAL if "air" in method else without_air(NOMINAL)
+    fixed = () if "air" in method else tuple(MERGED.values())
+    found = estimate(data, model, method=method, settings=Settings(fixed=fixed))
+    np.testing.assert_allclose(found.values, [TRUTH[name] for name in found.names], rtol=1e-6)
+    np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-6)
+
+
+def without_air(model: VesselModel) -> VesselModel:
+    """With the true drag in still air, to be held."""
+    return model.with_parameters({name: TRUTH[name] for name in MERGED.values()})
+
+
+def test_a_current_that_nobody_knows_needs_a_heading() -> None:
+    blind = record(*(replace(batch, pose=None) for batch in trials(TRUE, samples=200).batches))
+    with pytest.raises(InputError, match="heading"):
+        estimate(blind, NOMINAL, method="oe-current")
 
 
 def test_a_shorter_horizon_agrees_with_whole_runs() -> None:

@@ -38,6 +38,12 @@ def sailed(ship: str, case: str):
             (16 * length, 9 * length, 1.2, *ahead.velocity),
             ahead.inputs,
         ),
+        "far": (
+            (-24 * length, -20 * length, 0.2, *turning),
+            over,
+            (26 * length, 8 * length, 1.2, *ahead.velocity),
+            ahead.inputs,
+        ),
         "to rest": ((0.0, 0.0, 0.0, *ahead.velocity), ahead.inputs, (20 * length, 6 * length, 0.5, *still), rest),
     }[case]
     task = LegTask(start=np.array(start), end=np.array(end), start_inputs=before, end_inputs=after, seed=1)
@@ -51,8 +57,10 @@ BOTH = pytest.mark.parametrize(
     [
         ("coaster", "after a turn"),
         ("coaster", "to rest"),
+        ("coaster", "far"),
         pytest.param("coaster", "off from rest", marks=pytest.mark.slow),
         pytest.param("catamaran", "after a turn", marks=pytest.mark.slow),
+        pytest.param("catamaran", "far", marks=pytest.mark.slow),
     ],
 )
 ONE = pytest.mark.parametrize("ship", ["coaster", pytest.param("catamaran", marks=pytest.mark.slow)])
@@ -101,6 +109,21 @@ def test_no_leg_asks_for_more_than_the_helm_gives(ship, case):
     ]
     sailed_m = speed.sum() * water.vessel.sample_time_s
     assert sailed_m < max(planned) + 6 * water.vessel.length_m
+
+
+@ONE
+def test_a_long_leg_is_steady_ahead_in_between_and_hardly_longer_than_its_path(ship):
+    water, task, values = sailed(ship, "far")
+    transit = water.ship.approach
+    steady = np.flatnonzero((np.abs(values - transit.inputs) < 1e-6).all(axis=1))
+    assert len(steady) * water.vessel.sample_time_s * transit.speed_mps > 20 * water.vessel.length_m
+    velocity = water.sail(task.start, values, task.past).velocity[steady[0] : steady[-1] + 1]
+    np.testing.assert_allclose(velocity, np.tile(transit.velocity, (len(velocity), 1)), atol=2e-3 * transit.speed_mps)
+    path_m = min(
+        item.length_m(water.ship.turning_radius_m) for item in _shortest_first(task.start, task, water, water.ship)
+    )
+    time_s = len(values) * water.vessel.sample_time_s
+    assert time_s < 1.15 * path_m / transit.speed_mps
 
 
 @ONE

@@ -17,6 +17,7 @@ from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, 
 
 NAMES = ("time_s", "u_mps", "r_radps", "n1_rps", "rudder1_rad")
 CONTROLS = controls_of(INPUTS)
+DESIGNED = GUESS.parents[1] / "fast-boat-designed.toml"
 
 
 def standard_scores(seed: int, *, with_sway: bool) -> np.ndarray:
@@ -68,6 +69,26 @@ def test_the_page_and_the_summary_speak_of_the_same_steps(results: Path) -> None
     found = json.loads((results / "step-model.json").read_text())
     assert all(remark.split(" \N{PLUS-MINUS SIGN}")[0] in page for remark in found["remarks"][:3])
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_trial_is_designed_on_top_of_what_the_steps_told(results: Path, tmp_path: Path) -> None:
+    """More is known in the end than from a guess, and the same minutes add less to it."""
+    known, added = {}, {}
+    for name, vessel in (("guess", GUESS), ("steps", results / "vessel-steps.toml")):
+        words = ["durations", str(DESIGNED), "--vessel", str(vessel), "--out", str(tmp_path / name), "-q"]
+        assert main(words) == 0
+        known[name] = json.loads((tmp_path / name / "durations.json").read_text())["log_det"]
+        added[name] = known[name] + np.linalg.slogdet(load_vessel(vessel).model.parameter_covariance)[1]
+    assert known["steps"] > known["guess"]
+    assert added["steps"] < added["guess"]
+
+
+def test_a_vessel_file_that_is_not_there_leaves_no_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["score", str(DESIGNED), "--vessel", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out"), "-q"]
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert "none.toml: does not exist, expected a TOML file" in told
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_mirrored_trial_gives_the_same_model() -> None:

@@ -34,7 +34,8 @@ def estimate(
             "--method",
             metavar="M ...",
             help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind iv iv-air iv-augmented "
-            "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air. See expdesign explain methods. "
+            "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air oe-current oe-air-current. See "
+            "expdesign explain methods. "
             "Default: ls and iv, and those with wind where wind is measured and the model has terms for it.",
         ),
     ] = None,

@@ -80,6 +80,8 @@ METHODS = (
     Method("iv-air-current", "the same with measured wind", "steady-current-wind", solver="iv"),
     Method("oe", "output error", "basic", solver="oe"),
     Method("oe-air", "output error with measured wind", "basic-wind", solver="oe"),
+    Method("oe-current", "output error with an unknown steady current", "steady-current", solver="oe"),
+    Method("oe-air-current", "the same with measured wind", "steady-current-wind", solver="oe"),
 )
 
 
@@ -167,7 +169,8 @@ def estimate(
             tables = [measured_table(layout.model, b, wind_measured=layout.predictor.wind) for b in record.batches]
             rows = with_strata(layout, rows, tables, worst=choices.worst)
         return _estimate(chosen, layout, rows, least_squares(rows, choices.weighting), steered)
-    start, fitting = quick_least_squares(rows, choices.weighting), _fitting(choices)
+    start, fitting = quick_least_squares(rows, choices.weighting), _fitting(choices, current=layout.guess is not None)
+    layout = replace(layout, guess=None)  # nothing is linearised around it
     solution, regression = minimise_output_error(layout, record, start, fitting, progress=progress)
     left_out = sum(map(len, record.batches)) - len(regression)
     rows = Rows(regression=regression, used=(), left_out=left_out)
@@ -200,9 +203,13 @@ def _steered_notes(steered: Steered, method: Method) -> tuple[str, ...]:
     return (f"{told} and used all the same; {HOLDS_STEERED[method.solver]}",)
 
 
-def _fitting(choices: Settings) -> Fitting:
+def _fitting(choices: Settings, *, current: bool) -> Fitting:
     return Fitting(
-        integration=choices.integration, horizon_s=choices.horizon_s, constant=choices.constant, times=choices.times
+        integration=choices.integration,
+        horizon_s=choices.horizon_s,
+        constant=choices.constant,
+        current=current,
+        times=choices.times,
     )
 
 

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from expdesign.estimation.noise import Fitted, Stretch, coupled_covariance, fit_coupled, stretches
 from expdesign.estimation.output_error.gauss_newton import regular
 from expdesign.estimation.output_error.problem import Problem
-from expdesign.estimation.regression import Integers, Layout, Regression, headings_at
+from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, Regression, headings_at
 from expdesign.estimation.solve import Solution, Weighting, changing_variance, misfit_note, solve_ls, widening
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Record
@@ -169,12 +169,12 @@ def _inverse(information: Array) -> Array:
 
 
 def _owners(problem: Problem, layout: Layout) -> Integers:
-    """(p,) the output in whose equation each parameter and each constant stands; times act in every one."""
+    """(p,) the output in whose equation each parameter and each constant stands; current and times act in every one."""
     model = layout.model
     equations = [model.terms[model.names.index(name)].equation for name in layout.parameters]
     found = [model.outputs.index(name) for name in equations]
     runs = int(problem.batch.max()) + 1 if problem.constant else 0
-    return np.array([*found, *([EVERY] * problem.beyond), *(list(range(len(model.outputs))) * runs)])
+    return np.array([*found, *([EVERY] * (problem.parameters - len(found))), *(list(range(len(model.outputs))) * runs)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,9 +218,9 @@ def _places(problem: Problem) -> tuple[Integers, Integers, Integers]:
 
 
 def _columns(slopes: Array, problem: Problem, layout: Layout) -> tuple[Array, tuple[str, ...]]:
-    """Parameters and times, then the constants of each run."""
-    p, outputs = problem.parameters, layout.model.outputs
-    sought = (*layout.parameters, *problem.compiled.stretches.times)
+    """Parameters, a current and times, then the constants of each run."""
+    p, outputs, stretches = problem.parameters, layout.model.outputs, problem.compiled.stretches
+    sought = (*layout.parameters, *(STEADY_CURRENT if stretches.flowing else ()), *stretches.times)
     if not problem.constant:
         return slopes, sought
     runs = int(problem.batch.max()) + 1

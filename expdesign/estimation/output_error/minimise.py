@@ -7,6 +7,9 @@ of IV. Unmodelled forces accumulate in a simulation, and simulations of course-u
 motion; a shorter horizon limits both. Optionally each run has a constant acceleration, for steady unmodelled forces.
 Measured wind acts through the b-frame velocity of the air, ship velocity minus relative wind, without a heading.
 
+A steady current, the same for all runs, is estimated with the parameters where the method asks for it: the model's
+terms act through the water that it carries along.
+
 Dead times and lags of actuators that are not known exactly are estimated beside the parameters. What is known of them
 beforehand counts as one more measurement, and their errors are in the covariance.
 
@@ -49,7 +52,7 @@ from expdesign.values import Array
 def minimise_output_error(
     layout: Layout, record: Record, start: Solution, fitting: Fitting, *, progress: Progress = silent
 ) -> tuple[Solution, Regression]:
-    """The estimate of the layout's parameters; then, if requested, one constant per run and output.
+    """The estimate of the layout's parameters; then a current, times and constants per run and output, if requested.
 
     Returns the solution and the regression of its last Gauss-Newton step, for names and rows.
 
@@ -69,7 +72,7 @@ def minimise_output_error(
     values = np.concatenate(
         [
             start.values[: len(layout.parameters)],
-            np.zeros(len(fitting.times) + len(record.batches) * len(layout.model.outputs)),
+            np.zeros(fitting.unexpected + len(fitting.times) + len(record.batches) * len(layout.model.outputs)),
         ]
     )
     stages = _stages(record, fitting)

@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
-from expdesign.estimation.regression import Integers, Layout, drive_of, parts_of
+from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, drive_of, heading_of, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
@@ -38,13 +38,20 @@ class Fitting:
         integration: how the model is simulated.
         horizon_s: length of a stretch [s], None for whole runs.
         constant: whether each run has a constant acceleration of its own.
+        current: whether a steady current is estimated too, one for all runs.
         times: dead times and lags that are estimated too.
     """
 
     integration: Integration
     horizon_s: float | None = None
     constant: bool = False
+    current: bool = False
     times: tuple[ActuatorTime, ...] = ()
+
+    @property
+    def unexpected(self) -> int:
+        """Number of values beside the parameters of which nothing is known beforehand."""
+        return len(STEADY_CURRENT) if self.current else 0
 
     def __post_init__(self) -> None:
         if self.horizon_s is not None and not 0 < self.horizon_s < np.inf:
@@ -66,9 +73,9 @@ class Problem:
         batch: (W,) number of the run.
         first: (W,) sample of the run at which each stretch begins.
         constant: whether constants are estimated.
-        expected: (p,) values known beforehand; of parameters, which count as unknown, zero.
-        precision: (p,) what the cost adds for squared differences from these; of parameters zero.
-        spread: (p,) standard deviations of these; of parameters zero.
+        expected: (p,) values known beforehand; of parameters and a current, which count as unknown, zero.
+        precision: (p,) what the cost adds for squared differences from these; of those zero.
+        spread: (p,) standard deviations of these; of those zero.
     """
 
     compiled: Compiled
@@ -83,7 +90,7 @@ class Problem:
 
     @property
     def parameters(self) -> int:
-        """Number p of estimated parameters and times, without constants."""
+        """Number p of estimated parameters, of a current, and times, without constants."""
         return self.compiled.stretches.values
 
     @property
@@ -153,6 +160,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
     cuts = cuts[:: max(1, int(sum(map(len, read)) / excerpt.most))]
     ends = [_end(first, samples, len(read[number])) for number, first in cuts]
     length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
+    unknown = [0.0] * (len(layout.parameters) + fitting.unexpected)
 
     def stacked(rows: list[Array], fill: bool) -> Array:
         parts = [rows[number][first:end] for (number, first), end in zip(cuts, ends, strict=True)]
@@ -171,6 +179,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
                 integrator=fitting.integration.integrator,
                 substeps=fitting.integration.substeps,
                 parts=parts_of(record.batches[0], substeps=fitting.integration.substeps),
+                flowing=fitting.current,
                 times=tuple(time.name for time in fitting.times),
                 counts=np.array([end - first for (_, first), end in zip(cuts, ends, strict=True)]),
             )
@@ -180,9 +189,9 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
         batch=np.array([number for number, _ in cuts]),
         first=np.array([first for _, first in cuts]),
         constant=fitting.constant,
-        expected=np.array([0.0] * len(layout.parameters) + [time.change_s for time in fitting.times]),
-        precision=np.array([0.0] * len(layout.parameters) + [time.std_s**-2 for time in fitting.times]),
-        spread=np.array([0.0] * len(layout.parameters) + [time.std_s for time in fitting.times]),
+        expected=np.array([*unknown, *(time.change_s for time in fitting.times)]),
+        precision=np.array([*unknown, *(time.std_s**-2 for time in fitting.times)]),
+        spread=np.array([*unknown, *(time.std_s for time in fitting.times)]),
     )
 
 
@@ -208,20 +217,38 @@ def _read(batch: Batch) -> Array:
 
 
 def _drive(layout: Layout, batch: Batch, fitting: Fitting) -> Array:
-    """(k, c) as of `drive_of`, and the b-frame wind where it is used; missing wind takes the last known value."""
+    """(k, c) the drive of `Stretches`; missing wind takes the last known value."""
     names = tuple(time.name for time in fitting.times)
     inputs = drive_of(layout.model, batch, substeps=fitting.integration.substeps, times=names)
     if not np.isfinite(inputs).all():
         raise InputError(f"{batch.name}: output error needs inputs at every sample; some are not numbers")
-    if not layout.predictor.wind:
-        return inputs
+    columns = [inputs]
+    if layout.predictor.wind:
+        columns.append(_wind(batch))
+    if fitting.current:
+        columns.append(_courses(batch, fitting.integration.integrator))
+    return np.hstack(columns)
+
+
+def _courses(batch: Batch, integrator: str) -> Array:
+    """(k, 2) cosine and sine of the heading: in the middle of each sample, for Euler's map where it begins."""
+    heading = np.unwrap(heading_of(batch))
+    if not np.isfinite(heading).all():
+        raise InputError(f"{batch.name}: output error with a current needs a heading at every sample")
+    if integrator != "euler":
+        heading = (heading + np.append(heading[1:], heading[-1:])) / 2.0
+    return np.stack([np.cos(heading), np.sin(heading)], axis=1)
+
+
+def _wind(batch: Batch) -> Array:
+    """(k, 2) the wind's velocity in the b-frame."""
     assert batch.wind is not None  # the regression was built from it
     wind = batch.velocity[:, :2] - batch.wind
     seen = np.isfinite(wind).all(axis=1)
     if not seen.any():
         raise InputError(f"{batch.name}: no sample has velocity and relative wind")
     places = np.maximum.accumulate(np.where(seen, np.arange(len(batch)), int(seen.argmax())))
-    return np.concatenate([inputs, wind[places]], axis=1)
+    return np.asarray(wind[places])
 
 
 def first_states(problem: Problem, found: Mapping[Place, Array]) -> Array:

@@ -134,20 +134,22 @@ def called(function: ca.Function, shapes: tuple[tuple[int, ...], ...]) -> Called
 def velocity_step(problem: Stretches) -> ca.Function:
     """One sample of the modelled velocities: (state (n,), drive (c,), values (p + n,)) -> state.
 
-    Values are parameters, changes of times, and accelerations.
+    Values are parameters, a current, changes of times, and accelerations.
     """
     model, n, p = problem.model, len(problem.states), problem.values
     x, drive, values = ca.SX.sym("x", n), ca.SX.sym("i", problem.drive.shape[2]), ca.SX.sym("p", p + n)
-    held, wind = _split(_at_times(problem, drive, values), len(model.inputs), problem.parts, problem.windy)
+    current, given = _current(problem, drive, values)
+    held, wind = _split(_at_times(problem, given, values), len(model.inputs), problem.parts, problem.windy)
     theta = ca.SX(model.parameters)
     for index, place in enumerate(problem.sought):
         theta[place] = values[index]
 
     def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
-        water: list[Any] = [0.0, 0.0, 0.0]
+        ground: list[Any] = [0.0, 0.0, 0.0]
         for index, place in enumerate(problem.states):
-            water[place] = state[index]
-        air = (water[0] - wind[0], water[1] - wind[1])
+            ground[place] = state[index]
+        water = (ground[0] - current[0], ground[1] - current[1], ground[2])
+        air = (ground[0] - wind[0], ground[1] - wind[1])
         all_rates = model.accelerations(water, air, inputs, CASADI, theta)
         return tuple(all_rates[place] + values[p + index] for index, place in enumerate(problem.states))
 
@@ -155,9 +157,18 @@ def velocity_step(problem: Stretches) -> ca.Function:
     return ca.Function("velocities", [x, drive, values], [after], {"cse": True})
 
 
+def _current(problem: Stretches, drive: ca.SX, values: ca.SX) -> tuple[tuple[Any, Any], ca.SX]:
+    """The current's velocity in the b-frame, and what else acts."""
+    if not problem.flowing:
+        return (0.0, 0.0), drive
+    first, width = len(problem.sought), drive.size1() - 2
+    north, east, c, s = values[first], values[first + 1], drive[width], drive[width + 1]
+    return (north * c + east * s, east * c - north * s), drive[:width]
+
+
 def _at_times(problem: Stretches, drive: ca.SX, values: ca.SX) -> ca.SX:
     """What acts after the changes of times, without the derivatives by them."""
-    width, first = drive_width(len(problem.model.inputs), problem.parts), len(problem.sought)
+    width, first = drive_width(len(problem.model.inputs), problem.parts), problem.values - len(problem.times)
     acting, wind = drive[:width], drive[width * (1 + len(problem.times)) :]
     for index in range(len(problem.times)):
         acting += values[first + index] * drive[width * (1 + index) : width * (2 + index)]

@@ -30,12 +30,13 @@ class Stretches:
         sought: (p,) places of the parameters to find, among the model's.
         states: (n,) places of the velocities that have an equation, among u, v, r.
         drive: (L, W, c) inputs as of `drive_of` with these times; two columns more, the wind's velocity in the b-frame,
-            where `windy`.
+            where `windy`; two more, cosine and sine of the heading, where `flowing`.
         windy: whether air velocities are those of that wind.
+        flowing: whether a steady current to north and east [m/s] is sought too, after the parameters.
         sample_time_s: of all stretches.
         integrator, substeps: how the model is integrated.
         parts: of a sample, with inputs of their own.
-        times: (u,) names of uncertain times of actuators, whose changes [s] are sought too, after the parameters.
+        times: (u,) names of uncertain times of actuators, whose changes [s] are sought too, last.
         counts: (W,) samples of each stretch; L for all when left out.
     """
 
@@ -48,6 +49,7 @@ class Stretches:
     integrator: str
     substeps: int
     parts: int = 1
+    flowing: bool = False
     times: tuple[str, ...] = ()
     counts: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
@@ -58,8 +60,8 @@ class Stretches:
 
     @property
     def values(self) -> int:
-        """Number of values sought: parameters and changes of times."""
-        return len(self.sought) + len(self.times)
+        """Number of values sought: parameters, a current's two, and changes of times."""
+        return len(self.sought) + 2 * self.flowing + len(self.times)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

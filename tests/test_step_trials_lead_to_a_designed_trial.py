@@ -1,0 +1,70 @@
+"""From a craft that nobody has a model of to its parameters, by commands alone: steps, designed trial, estimate."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from expdesign.scenario import load_vessel
+from expdesign.vessel import VesselModel
+from step_case import GUESS, ROOT, TRUTH
+
+SCENARIOS = ROOT / "scenarios"
+
+
+def done(*words: object) -> None:
+    assert main([*map(str, words), "--quiet"]) == 0
+
+
+def planned(folder: Path, scenario: str, vessel: Path) -> Path:
+    """A verified plan of a scenario with a vessel file."""
+    done("run", SCENARIOS / scenario, "--vessel", vessel, "--seed", 1, "--out", folder)
+    plan = json.loads((folder / "plan.json").read_text())
+    assert plan["verification"]["verified"]
+    assert plan["leave_water_probability"] < 0.05
+    return folder / "plan.json"
+
+
+def scores(model: VesselModel) -> np.ndarray:
+    """(p,) errors in standard deviations."""
+    return np.asarray((model.parameters - load_vessel(TRUTH).model.parameters) / model.parameter_std)
+
+
+@pytest.mark.slow
+def test_the_trial_designed_after_the_steps_halves_what_they_left_uncertain(tmp_path: Path) -> None:
+    steps, trial = tmp_path / "steps", tmp_path / "trial"
+    plan = planned(steps, "fast-boat.toml", GUESS)
+    done("simulate", plan, "--truth", TRUTH, "--seed", 2, "--out", steps)
+    done("identify-steps", steps / "measured.csv", "--vessel", GUESS, "--steps", plan, "--out", steps)
+    stepped = load_vessel(steps / "vessel-steps.toml")
+    plan = planned(trial, "fast-boat-designed.toml", steps / "vessel-steps.toml")
+    done("simulate", plan, "--truth", TRUTH, "--seed", 3, "--out", trial)
+    vessel = ("--vessel", steps / "vessel-steps.toml")
+    data = trial / "measured.csv"
+    done(
+        "estimate",
+        data,
+        *vessel,
+        "--method",
+        "oe-current",
+        "--mean",
+        "none",
+        "--prior",
+        "parameter_std",
+        "--out",
+        trial,
+    )
+    found = load_vessel(trial / "vessel-estimated.toml")
+    ratio = found.model.parameter_std / stepped.model.parameter_std
+    assert (ratio < 1.0).all()
+    assert np.median(ratio) < 0.5
+    for model in (stepped.model, found.model):
+        assert np.mean(scores(model) ** 2) < 1 + 3 * np.sqrt(2 / 11) + 1.0  # parameters of one trial err together
+    truth = load_vessel(TRUTH)
+    for response, true, stated in zip(found.responses, truth.responses, stepped.responses, strict=True):
+        assert response.delay_s == pytest.approx(true.delay_s, abs=0.05)
+        assert abs(response.delay_s - true.delay_s) < 0.05 or abs(stated.delay_s - true.delay_s) < 0.05
