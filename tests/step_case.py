@@ -37,23 +37,29 @@ def noise(
 
 
 def craft_columns(
-    seed: int, *, steps: Sequence[tuple[float, float]] = STEPS, hold_s: float = HOLD_S, waves_mps: float = 0.1
+    seed: int,
+    *,
+    steps: Sequence[tuple[float, float]] = STEPS,
+    hold_s: float = HOLD_S,
+    waves_mps: float = 0.1,
+    current_to: tuple[float, float] = (0.0, 0.0),
 ) -> dict[str, np.ndarray]:
-    """The fast craft's steps, measured with noise in waves that move it about."""
+    """The fast craft's steps, measured with noise in waves that move it about, and in a current to north and east."""
     truth, rng = load_vessel(TRUTH), np.random.default_rng(seed)
     samples = round(hold_s / truth.sample_time_s)
     commands = Commands(
         sample_time_s=truth.sample_time_s, names=INPUTS, values=np.repeat(np.array(steps), samples, axis=0)
     )
-    sea = Environment(current_variation=Variation(std_mps=waves_mps, correlation_s=1.0))
+    waves = Variation(std_mps=waves_mps, correlation_s=1.0)
+    sea = Environment(current_to=np.array(current_to), current_variation=waves)
     met = draw_weather(sea, len(commands), sample_time_s=commands.sample_time_s, rng=rng)
     sailed = simulate(truth, commands, velocity=(1.5, 0.0, 0.05), environment=met)
     return measure(truth, commands, sailed, environment=met, rng=rng)
 
 
-def craft_record(seed: int, *, with_sway: bool = False) -> Record:
-    """The same as a record."""
-    columns = craft_columns(seed)
+def craft_record(seed: int, *, with_sway: bool = False, current_to: tuple[float, float] = (0.0, 0.0)) -> Record:
+    """The same as a record, headings unknown."""
+    columns = craft_columns(seed, current_to=current_to)
     sway = columns["v_mps"] if with_sway else np.full_like(columns["v_mps"], np.nan)
     batch = Batch(
         name="steps", sample_time_s=0.2, input_names=INPUTS,

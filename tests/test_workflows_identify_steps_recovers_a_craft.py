@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from expdesign.cli import main
 from expdesign.scenario import load_vessel
@@ -111,6 +112,30 @@ def test_steps_leave_no_parameter_more_uncertain_than_it_was() -> None:
     found = nominal_vessel(vessel, trial.samples, trial.delays, INPUTS).model
     assert (found.parameter_std <= guess.model.parameter_std * (1 + 1e-9)).all()
     assert (found.parameter_std < 0.6 * guess.model.parameter_std).sum() >= 5
+
+
+def squared_errors(seed: int, *, current_to: tuple[float, float]) -> float:
+    """Of all parameters by their covariance, sway measured: chi-square distributed where that is true."""
+    trial = identify_steps(craft_record(seed, with_sway=True, current_to=current_to), CONTROLS)
+    found = nominal_vessel(load_vessel(GUESS), trial.samples, trial.delays, INPUTS).model
+    errors = found.parameters - load_vessel(TRUTH).model.parameters
+    return float(errors @ np.linalg.solve(found.parameter_covariance, errors))
+
+
+def test_a_current_is_told_from_the_speed_it_adds() -> None:
+    """In each hold less than a whole turn is made, so that its mean speed contains some of it."""
+    assert squared_errors(5, current_to=(0.2, -0.1)) < scipy.stats.chi2.ppf(0.999, 11)
+
+
+@pytest.mark.slow
+def test_errors_in_currents_are_as_likely_as_their_covariance_says() -> None:
+    """The mean over 20 seeds of a chi-square variable of 11 degrees of freedom, give or take three standard errors.
+
+    What a time constant leaves out adds some: half as much again is allowed.
+    """
+    rng = np.random.default_rng(12)
+    found = [squared_errors(200 + seed, current_to=tuple(0.1 * rng.standard_normal(2))) for seed in range(20)]
+    assert np.mean(found) < 11 * (1.5 + 3 * np.sqrt(2 / 11 / len(found)))
 
 
 @pytest.mark.slow

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.signals import Batch
 from expdesign.step_trials.tuning import TUNING
-from expdesign.values import Array, seal
+from expdesign.values import Array, frozen_set, seal
 
 CHANNELS = ("throttle", "rudder")
 """Commands; the first drives the speed U, the second the yaw rate r."""
@@ -79,6 +79,7 @@ class Sailed:
         sway: (k,) [m/s], nan where it is not known.
         commands: (k, 2) throttle and rudder, in the units of their signals.
         inputs: (k, m) all inputs of the record.
+        heading: (k,) [rad]; when left out, the yaw rate summed up from an unknown heading.
     """
 
     name: str
@@ -87,9 +88,12 @@ class Sailed:
     sway: Array
     commands: Array
     inputs: Array
+    heading: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m")
+        if not len(self.heading):
+            frozen_set(self, "heading", np.cumsum(self.state[:, 1]) * self.sample_time_s)
+        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k")
 
     @property
     def time_s(self) -> Array:
@@ -112,6 +116,7 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
     """Speed, yaw rate and the two commands of a batch."""
     u, v, r = batch.velocity.T
     speed = np.where(np.isfinite(v), np.hypot(u, np.nan_to_num(v)), np.abs(u))
+    known = batch.pose is not None and np.isfinite(batch.pose[:, 2]).all()
     return Sailed(
         name=batch.name,
         sample_time_s=batch.sample_time_s,
@@ -119,6 +124,7 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
         sway=v,
         commands=commands_of(controls, batch.input_names, batch.inputs),
         inputs=batch.inputs,
+        heading=batch.pose[:, 2] if batch.pose is not None and known else np.zeros(0),
     )
 
 

@@ -35,8 +35,12 @@ DRIFT, MOST_DRIFT = 0.999, 0.99
 """Sine of the largest drift angle that is sought, and from which there counts as none."""
 MOST_STEPS = 60
 """Of Gauss and Newton, between two enlargements of errors."""
-NUISANCES = 4
+TIMES = 4
 """Errors of both dead times, and of both kinds of time constants by their definition."""
+FARTHEST = 5.0
+"""Of these at most, in standard deviations: steps far beyond lead where nothing changes any more."""
+CURRENT_STD_MPS = 0.2
+"""Of a steady current to north and to east, in each record a current of its own."""
 ROUNDS = 4
 """Of enlarging errors."""
 NUDGE = 1e-4
@@ -64,6 +68,12 @@ class States:
     sway: Array
     inputs: Array
 
+    def through_water(self, course: Array, to_mps: Array) -> States:
+        """The same through water that moves to north and east (n, 2), at mean headings' cosines and sines (n, 2)."""
+        ahead = (course * to_mps).sum(axis=1)
+        starboard = course[:, 0] * to_mps[:, 1] - course[:, 1] * to_mps[:, 0]
+        return replace(self, state=self.state - np.stack([ahead, 0.0 * ahead], axis=1), sway=self.sway - starboard)
+
     def motion(self, sway: Array) -> Array:
         """(n, 3) u, v, r."""
         surge = np.sqrt(np.maximum(self.state[:, 0] ** 2 - sway**2, 0.0))
@@ -75,7 +85,9 @@ class Evidence:
     """What the steps say about a model with three degrees of freedom.
 
     Attributes:
-        steady: the plateaus.
+        steady: the plateaus, over ground.
+        course: (n, 2) mean cosine and sine of their headings.
+        record: (n,) number of the record that each is in.
         steady_std: (n, 3) errors of U, v and r; infinite where v is not known.
         middle: of the steps that count.
         output: (k,) 0 where the throttle was stepped, 2 where the rudder was.
@@ -88,6 +100,8 @@ class Evidence:
     """
 
     steady: States
+    course: Array
+    record: npt.NDArray[np.int64]
     steady_std: Array
     middle: States
     output: Array
@@ -96,6 +110,11 @@ class Evidence:
     time_constant_s: Array
     log_std: Array
     delay_std_s: Array
+
+    @property
+    def records(self) -> int:
+        """Number of records, at least one."""
+        return int(self.record.max(initial=0)) + 1
 
     def without_sway(self) -> Evidence:
         """The same, had sway not been measured."""
@@ -133,7 +152,8 @@ def nominal_vessel(vessel: Vessel, samples: Sequence[StepSample], delays: Delays
 
 def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
     """Of all plateaus and of the steps that count."""
-    plateaus = [one.plateau for one in samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
+    held = [(one, one.plateau) for one in samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
+    plateaus = [part for _, part in held]
     sway_std = [part.sway_std if math.isfinite(part.sway_std) else math.inf for part in plateaus]
     std = np.array([[part.std[0], wide, part.std[1]] for part, wide in zip(plateaus, sway_std, strict=True)])
     steps = [(one, *middle) for one in samples if (middle := _middle(one)) is not None]
@@ -143,6 +163,8 @@ def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
             sway=np.array([part.sway for part in plateaus]),
             inputs=np.array([part.inputs for part in plateaus]),
         ),
+        course=np.array([part.course for part in plateaus]),
+        record=np.array([one.hold.batch for one, _ in held], dtype=np.int64),
         steady_std=np.maximum(std, 1e-9),
         middle=States(
             state=np.array([one.middle.state for one, *_ in steps if one.middle is not None]),
@@ -176,8 +198,9 @@ def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> t
     """(p,) parameters and (p, p) covariance, by Gauss and Newton from the vessel file's values.
 
     Errors of the two dead times, and of both kinds of time constants by their definition, are estimated beside the
-    parameters. Where sway is not measured its parameters are considered, not estimated: they stay, and their stated
-    errors count as errors of the data, in weights and covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
+    parameters, and a steady current in each record: speeds over less than a whole turn contain it. Where sway is not
+    measured its parameters are considered, not estimated: they stay, and their stated errors count as errors of the
+    data, in weights and covariance (S. F. Schmidt, Advances in Control Systems 3, 1966).
 
     Args:
         model: the vessel's, with what is known before.
@@ -190,12 +213,15 @@ def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> t
     _check_sway(model, known.steady)
     free, considered = _free(model, known)
     root = np.linalg.cholesky(model.parameter_covariance[np.ix_(free, free)])
-    estimated = len(free) - considered + NUISANCES
+    beside = TIMES + 2 * known.records
+    estimated = len(free) - considered + beside
 
     def parts(z: Array) -> tuple[Array, ...]:
         theta = model.parameters.copy()
-        theta[free] += root @ z[NUISANCES:]
-        return compared(model, theta, known, known.delay_std_s * z[:2], FORM_STD * z[2:NUISANCES])
+        theta[free] += root @ z[beside:]
+        own = FARTHEST * np.tanh(z[:beside] / FARTHEST)
+        late_s, form = known.delay_std_s * own[:2], FORM_STD * own[2:TIMES]
+        return compared(model, theta, known, late_s, form, CURRENT_STD_MPS * own[TIMES:].reshape(-1, 2))
 
     def with_considered(z: Array) -> Array:
         return np.append(z, np.zeros(considered))
@@ -203,10 +229,14 @@ def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> t
     z = np.zeros(estimated)
     if np.isfinite(known.steady.sway).all():
         begun, _ = posterior(model, known.without_sway(), rounds=1)
-        z[NUISANCES:] = np.linalg.solve(root, (begun - model.parameters)[free])
+        z[beside:] = np.linalg.solve(root, (begun - model.parameters)[free])
     enlarged, slopes = np.ones(5), _considered_slopes(parts, with_considered(z), considered)
+
+    def whitening(z: Array) -> Array:
+        return _whitening(np.repeat(enlarged, list(map(len, parts(with_considered(z))))), slopes)
+
     for _ in range(rounds):
-        white = _whitening(np.repeat(enlarged, list(map(len, parts(with_considered(z))))), slopes)
+        white = whitening(z)
         found = scipy.optimize.least_squares(
             lambda z, white=white: np.append(white @ np.concatenate(parts(with_considered(z))), z),
             z, x_scale="jac", max_nfev=MOST_STEPS,
@@ -214,14 +244,10 @@ def posterior(model: VesselModel, known: Evidence, *, rounds: int = ROUNDS) -> t
         z = found.x
         slopes = _considered_slopes(parts, with_considered(z), considered)
         enlarged = _enlarged(parts(with_considered(z)), estimated)
-    gain = np.linalg.inv(found.jac.T @ found.jac)
-    left = np.eye(estimated + considered)
-    left[:estimated, :estimated] = gain
-    left[:estimated, estimated:] = -gain @ found.jac[: len(white)].T @ white @ slopes
-    left[estimated:, :estimated] = left[:estimated, estimated:].T
+    left = _schmidt(np.linalg.solve(white, found.jac[: len(white)]), whitening(z), slopes)
     value, covariance = model.parameters.copy(), np.zeros((len(model.names),) * 2)
-    value[free] += root @ with_considered(z)[NUISANCES:]
-    covariance[np.ix_(free, free)] = root @ left[NUISANCES:, NUISANCES:] @ root.T
+    value[free] += root @ with_considered(z)[beside:]
+    covariance[np.ix_(free, free)] = root @ left[beside:, beside:] @ root.T
     return value, covariance
 
 
@@ -245,6 +271,20 @@ def _whitening(errors: Array, slopes: Array) -> Array:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(np.diag(errors**2) + slopes @ slopes.T)))
 
 
+def _schmidt(jacobian: Array, white: Array, slopes: Array) -> Array:
+    """(p + c, p + c) covariance of estimated and considered parameters, both of unit covariance before.
+
+    Args:
+        jacobian: (n, p) derivatives of distances by the estimated ones.
+        white: (n, n) as of `_whitening`, with these slopes.
+        slopes: (n, c) derivatives by the considered ones.
+    """
+    scaled = white @ jacobian
+    gain = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
+    cross = -gain @ scaled.T @ white @ slopes
+    return np.block([[gain, cross], [cross.T, np.eye(slopes.shape[1])]])
+
+
 def _enlarged(parts: Sequence[Array], parameters: int) -> Array:
     """By how much the errors of each part are too small, never less than 1.
 
@@ -256,7 +296,9 @@ def _enlarged(parts: Sequence[Array], parameters: int) -> Array:
     return np.array([max(1.0, math.sqrt(freedom * np.mean(part**2))) if len(part) else 1.0 for part in parts])
 
 
-def compared(model: VesselModel, theta: Array, known: Evidence, late_s: Array, form: Array) -> tuple[Array, ...]:
+def compared(
+    model: VesselModel, theta: Array, known: Evidence, late_s: Array, form: Array, to_mps: Array
+) -> tuple[Array, ...]:
     """Distances in standard errors: of the plateaus in U, v and r, of the steps of throttle and rudder.
 
     Args:
@@ -265,8 +307,10 @@ def compared(model: VesselModel, theta: Array, known: Evidence, late_s: Array, f
         known: from the steps.
         late_s: (2,) errors of the dead times of throttle and rudder [s].
         form: (2,) relative errors of all time constants of throttle and rudder.
+        to_mps: (records, 2) steady currents to north and east.
     """
-    errors = _steady_errors(model, theta, known.steady) / known.steady_std
+    steady = known.steady.through_water(known.course, to_mps[known.record])
+    errors = _steady_errors(model, theta, steady) / known.steady_std
     errors = LARGEST_ERROR * np.tanh(errors / LARGEST_ERROR)
     drift = np.isfinite(known.steady_std[:, 1])
     constants = np.maximum(known.time_constant_s + late_s[known.output // 2], SHORTEST_S)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Plateau:
         inputs: (m,) all inputs of the record.
         turns: whole turns over which the mean was taken, which cancel a current to first order; 0 for none.
         duration_s: time of the mean [s].
+        course: (2,) mean cosine and sine of the heading, near zero over whole turns.
     """
 
     state: Array
@@ -47,9 +48,10 @@ class Plateau:
     inputs: Array
     turns: int
     duration_s: float
+    course: Array = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
-        seal(self, state="2", std="2", inputs="m")
+        seal(self, state="2", std="2", inputs="m", course="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,6 +159,7 @@ def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
         inputs=np.median(batch.inputs[part], axis=0),
         turns=turns,
         duration_s=(end - begin) * batch.sample_time_s,
+        course=np.array([np.cos(batch.heading[part]).mean(), np.sin(batch.heading[part]).mean()]),
     )
 
 

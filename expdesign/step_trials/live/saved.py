@@ -79,4 +79,5 @@ def _plateau(table: dict[str, Any]) -> Plateau:
         inputs=np.array(table["inputs"], dtype=float),
         turns=int(table["turns"]),
         duration_s=float(table["duration_s"]),
+        course=np.array(table["course"], dtype=float),
     )
