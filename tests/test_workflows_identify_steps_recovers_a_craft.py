@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy
 
 from expdesign.cli import main
 from expdesign.scenario import load_vessel
-from expdesign.step_trials import controls_of, identify_steps, nominal_vessel
-from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, write_csv
+from expdesign.step_trials import controls_of, identify_steps, nominal, nominal_vessel
+from expdesign.step_trials.samples import standard_error
+from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, noise, write_csv
 
 NAMES = ("time_s", "u_mps", "r_radps", "n1_rps", "rudder1_rad")
 CONTROLS = controls_of(INPUTS)
@@ -114,28 +114,29 @@ def test_steps_leave_no_parameter_more_uncertain_than_it_was() -> None:
     assert (found.parameter_std < 0.6 * guess.model.parameter_std).sum() >= 5
 
 
-def squared_errors(seed: int, *, current_to: tuple[float, float]) -> float:
-    """Of all parameters by their covariance, sway measured: chi-square distributed where that is true."""
-    trial = identify_steps(craft_record(seed, with_sway=True, current_to=current_to), CONTROLS)
-    found = nominal_vessel(load_vessel(GUESS), trial.samples, trial.delays, INPUTS).model
-    errors = found.parameters - load_vessel(TRUTH).model.parameters
-    return float(errors @ np.linalg.solve(found.parameter_covariance, errors))
+@pytest.mark.parametrize("heading_rad", [0.0, 1.0, -2.5])
+def test_speeds_through_water_are_those_over_ground_without_the_current(heading_rad: float) -> None:
+    """To first order in the current: the rest is of the size of its square over the speed."""
+    current_to, water = np.array([0.1, -0.05]), np.array([5.0, -0.4])
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    ground = water + np.array([[c, s], [-s, c]]) @ current_to
+    measured = nominal.States(
+        state=np.array([[np.hypot(*ground), 0.1]]), sway=ground[1:], inputs=np.zeros((1, 2))
+    ).through_water(np.array([[c, s]]), current_to[None])
+    assert measured.state[0, 0] == pytest.approx(np.hypot(*water), abs=0.1 * np.hypot(*current_to))
+    assert measured.sway[0] == pytest.approx(water[1])
+    assert measured.state[0, 1] == 0.1
 
 
-def test_a_current_is_told_from_the_speed_it_adds() -> None:
-    """In each hold less than a whole turn is made, so that its mean speed contains some of it."""
-    assert squared_errors(5, current_to=(0.2, -0.1)) < scipy.stats.chi2.ppf(0.999, 11)
-
-
-@pytest.mark.slow
-def test_errors_in_currents_are_as_likely_as_their_covariance_says() -> None:
-    """The mean over 20 seeds of a chi-square variable of 11 degrees of freedom, give or take three standard errors.
-
-    What a time constant leaves out adds some: half as much again is allowed.
-    """
-    rng = np.random.default_rng(12)
-    found = [squared_errors(200 + seed, current_to=tuple(0.1 * rng.standard_normal(2))) for seed in range(20)]
-    assert np.mean(found) < 11 * (1.5 + 3 * np.sqrt(2 / 11 / len(found)))
+def test_errors_of_means_of_slow_noise_are_enlarged_as_drawn_noise_needs() -> None:
+    """Noise of correlation exp(-t / T), white noise sampled as slowly as T: the blocks' error times its factor."""
+    rng, samples, constant = np.random.default_rng(4), 150, 25.0
+    drawn = np.array([noise(rng, samples, sample_time_s=1.0, std=1.0, correlation_s=constant) for _ in range(2000)])
+    stated = np.array([standard_error(row) for row in drawn])
+    factor = nominal.correlated(np.array([[float(samples)]]), np.array([constant]))[0, 0]
+    actual = drawn.mean(axis=1).std()
+    assert np.sqrt(np.mean(stated**2)) * factor == pytest.approx(actual, rel=4 / np.sqrt(2 * len(drawn)) + 0.03)
+    assert nominal.correlated(np.array([[1000.0]]), np.array([0.1]))[0, 0] == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.slow
