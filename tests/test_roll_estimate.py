@@ -237,7 +237,7 @@ def test_halves_of_a_record_scatter_as_they_say() -> None:
 
 
 def test_rounds_settle_within_a_few() -> None:
-    """The thesis has four digits after five rounds; spectra are estimated anew in each here, and three digits settle."""
+    """The thesis has four digits after five rounds; here spectra are estimated anew in each, and three settle."""
     rounds = estimate_roll(ship_problem(three_cases())).rounds
     assert len(rounds) <= 7
     assert np.abs((rounds[-1] - rounds[-2]) / rounds[-1]).max() < 2e-3
