@@ -129,18 +129,21 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
 
 
 def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -> Offer:
-    """The offer round a day: a few runs more or fewer of each, by what the day's own runs and legs tell.
+    """The offer round a day: a run more or fewer of each, by what the day's own runs tell.
 
-    Other runs tell what they are taken to, (q, d, d), and legs the same whatever runs they join.
+    Each comes and goes with the average of the day's legs between runs: their turns and changes of speed are there for
+    runs, but what a leg tells depends on both its ends. Other runs tell what they are taken to, (q, d, d).
     """
-    had, matrices, legs = np.array(day.repeats, dtype=float), runs.copy(), day.draft.sailed.legs
+    had, legs = np.array(day.repeats, dtype=float), day.draft.sailed.legs
+    between = day.information[:-1][[leg.kind == "reposition" for leg in legs[:-1]]].sum(axis=0) / had.sum()
+    matrices = runs + between
     for index in np.flatnonzero(had).tolist():
         own = [leg.kind == "primitive" and leg.name == names[index] for leg in legs]
-        matrices[index] = day.information[own].mean(axis=0)
+        matrices[index] = day.information[own].mean(axis=0) + between
     return replace(
         offer,
         matrices=matrices,
-        known=day.information[[leg.kind != "primitive" for leg in legs]].sum(axis=0),
+        known=day.information[-1],
         fewest=np.clip(had - TUNING.other_runs, offer.fewest, offer.most),
         most=np.clip(had + TUNING.other_runs, offer.fewest, offer.most),
     )

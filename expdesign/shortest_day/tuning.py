@@ -40,13 +40,13 @@ class Tuning:
         most_runs: of one primitive.
     """
 
-    rounds: int = 6
+    rounds: int = 7
     first_share: float = 0.4
     courses: int = 4
     course_spread_rad: float = 0.5
     first_leg_s: float = 15.0
     nearest: int = 3
-    other_runs: int = 2
+    other_runs: int = 1
     level_step: float = 0.05
     level_steps: int = 10
     least_level: float = -4.0
