@@ -101,26 +101,26 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
 @pytest.mark.parametrize(
     ("typed", "name", "arguments", "options"),
     [
-        ("run a.toml", "run", (Path("a.toml"), None), {"seed": 0, **SHARED}),
+        ("run a.toml", "run", (Path("a.toml"), None), {"vessel": None, "seed": 0, **SHARED}),
         (
             "run a.toml --out o --seed 7 --jobs 1 --no-cache",
             "run",
             (Path("a.toml"), Path("o")),
-            {"seed": 7, "jobs": 1, "scheduler": None, "cache": False},
+            {"vessel": None, "seed": 7, "jobs": 1, "scheduler": None, "cache": False},
         ),
-        ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"seed": 1}),
+        ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"vessel": None, "seed": 1}),
         (
             "durations a.toml",
             "durations",
             (Path("a.toml"), None),
-            {"seed": 0, "grow": False, "monte_carlo": 0, "jobs": 0},
+            {"vessel": None, "seed": 0, "grow": False, "monte_carlo": 0, "jobs": 0},
         ),
-        ("plan a.toml", "plan", (Path("a.toml"), None), {"seed": 0, **SHARED, "durations": None}),
+        ("plan a.toml", "plan", (Path("a.toml"), None), {"vessel": None, "seed": 0, **SHARED, "durations": None}),
         (
-            "plan a.toml --durations d.json",
+            "plan a.toml --durations d.json --vessel v.toml",
             "plan",
             (Path("a.toml"), None),
-            {"seed": 0, **SHARED, "durations": Path("d.json")},
+            {"vessel": Path("v.toml"), "seed": 0, **SHARED, "durations": Path("d.json")},
         ),
         ("export p.json --format rtz gpx", "export", (Path("p.json"), None), {"formats": ("rtz", "gpx"), **PLAIN}),
         (

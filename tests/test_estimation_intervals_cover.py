@@ -49,7 +49,7 @@ def covered(case: str, trials: int, samples: int = 4000) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("case", "trials", "samples"), [("iv", 40, 2000), ("wandering", 30, 2500), ("short", 30, 12 * 300)]
+    ("case", "trials", "samples"), [("iv", 24, 2000), ("wandering", 16, 2500), ("short", 16, 12 * 300)]
 )
 def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
     shares = covered(case, trials, samples)

@@ -53,17 +53,28 @@ def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path],
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_a_ship_as_in_the_reference_raises_no_alarm(voyages: dict[str, Path], tmp_path: Path) -> None:
-    told = monitored(tmp_path, voyages["same"], "--reference", voyages["reference"])
+@pytest.fixture(scope="module")
+def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a watch over the voyage of the same ship."""
+    folder = tmp_path_factory.mktemp("watched")
+    monitored(folder, voyages["same"], "--reference", voyages["reference"])
+    return folder
+
+
+def told_in(folder: Path) -> dict[str, object]:
+    content: dict[str, object] = json.loads((folder / "monitor.json").read_text())
+    return content
+
+
+def test_a_ship_as_in_the_reference_raises_no_alarm(watched: Path) -> None:
+    told = told_in(watched)
     assert told["alarms"] == []
     assert "No alarm" in told["verdict"][0]
-    assert not (tmp_path / "since-change.csv").exists()
+    assert not (watched / "since-change.csv").exists()
 
 
-def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_stretch(
-    voyages: dict[str, Path], tmp_path: Path
-) -> None:
-    told = monitored(tmp_path, voyages["same"], "--reference", voyages["reference"])
+def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_stretch(watched: Path) -> None:
+    told = told_in(watched)
     budget = {entry["kind"]: entry for entry in told["budget"]}
     assert sum(entry["judged_h"] for entry in budget.values()) == pytest.approx(told["judged_h"])
     steady, turning = budget["steady course"], budget["turning"]
@@ -73,21 +84,21 @@ def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_
     assert damping[1] > 3.0 * damping[0]
     thrust = steady["mean_accelerations"]
     assert thrust["gain"]["surge"] == pytest.approx(thrust["theta:X_mu"]["surge"])  # its one term of the actuators
-    assert "Which manoeuvres tell which change" in (tmp_path / "monitor.html").read_text()
+    assert "Which manoeuvres tell which change" in (watched / "monitor.html").read_text()
 
 
 def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
-    voyages: dict[str, Path], tmp_path: Path
+    voyages: dict[str, Path], watched: Path, tmp_path: Path
 ) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
     first.write_text(header + "".join(rows[:1666]))  # ends within a stretch
     second.write_text(header + "".join(rows[1666:]))
-    whole = monitored(tmp_path / "whole", voyages["same"], "--reference", voyages["reference"])
+    whole = told_in(watched)
     monitored(tmp_path / "parts", first, "--reference", voyages["reference"])
     parts = monitored(tmp_path / "parts", second, "--resume")
     assert {**parts, "history": [], "notes": []} == {**whole, "history": [], "notes": []}
-    states = [json.loads((tmp_path / name / "monitor-state.json").read_text()) for name in ("whole", "parts")]
+    states = [json.loads((folder / "monitor-state.json").read_text()) for folder in (watched, tmp_path / "parts")]
     assert agree(states[0]["phase"]["state"], states[1]["phase"]["state"])
     assert states[0]["reading"]["pending"] == states[1]["reading"]["pending"]
 
@@ -160,9 +171,11 @@ def test_a_killed_watch_leaves_a_state_to_go_on_from(voyages: dict[str, Path], t
     assert told["judged_h"] > 1.0
 
 
-def test_a_file_that_grows_is_read_on_from_where_it_ended(voyages: dict[str, Path], tmp_path: Path) -> None:
+def test_a_file_that_grows_is_read_on_from_where_it_ended(
+    voyages: dict[str, Path], watched: Path, tmp_path: Path
+) -> None:
     lines, path = voyages["same"].read_text().splitlines(keepends=True), tmp_path / "log.csv"
-    whole = monitored(tmp_path / "whole", voyages["same"], "--reference", voyages["reference"])
+    whole = told_in(watched)
     path.write_text("".join(lines[:1000]) + lines[1000][:20])  # a row is being written
     monitored(tmp_path / "parts", path, "--reference", voyages["reference"])
     path.write_text("".join(lines))

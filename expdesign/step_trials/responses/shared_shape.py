@@ -26,6 +26,8 @@ WIDTH_S, POINTS, FINE = 0.8, 17, 801
 """Of the grid of dead times, to both sides of those of first order responses, and of that between its points."""
 OWN = 3
 """Parameters of each step: logarithm of T0, errors of both plateaus in their standard errors."""
+MOST_LOG = 20.0
+"""Logarithm at most on the way: times beyond have no effect that a hold could show."""
 
 
 def shared_delay(steps: Sequence[Transient], *, most_s: float) -> tuple[float, float]:
@@ -72,7 +74,7 @@ def _residuals(x: Array, delay: float, steps: Sequence[Transient], noise: Sequen
 
 def _apart(step: Transient, noise: float, delay: float, shape: Array, own: Array) -> Array:
     """Of one step in standard deviations, and of its plateaus."""
-    damping, zero, natural = np.exp([shape[0], shape[1], own[0]]).tolist()
+    damping, zero, natural = np.exp(np.minimum([shape[0], shape[1], own[0]], MOST_LOG)).tolist()
     before, after = step.before + own[1] * step.before_std, step.after + own[2] * step.after_std
     done = second_order(np.array([natural, damping, zero * natural, delay]), step.time_s)
     return np.append((before + (after - before) * done - step.values) / noise, own[1:])
