@@ -21,7 +21,10 @@ from expdesign.simulation import Environment, Variation, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Sensors, Vessel
 
-METHODS = ("ls", "iv", "iv-augmented", "iv-air", "iv-wind", "oe", "oe-air", "iv-current", "iv-air-current")
+METHODS = (
+    *("ls", "iv", "iv-augmented", "iv-air", "iv-wind", "oe", "oe-air"),
+    *("iv-current", "iv-air-current", "oe-air-current"),
+)
 FROM_POSE = Sensors(position_m=0.02, heading_rad=0.005, wind_mps=0.0316)
 AT_ONCE = 20
 
