@@ -1,0 +1,6 @@
+"""The nominal vessel model with three degrees of freedom that a step trial leaves."""
+
+from expdesign.step_trials.nominal.evidence import States, correlated
+from expdesign.step_trials.nominal.vessel import nominal_vessel, with_delays
+
+__all__ = ["States", "correlated", "nominal_vessel", "with_delays"]

@@ -1,0 +1,169 @@
+"""What the steps say about a vessel model: plateaus with their errors, and time constants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from expdesign.step_trials.samples import Delays, StepSample
+from expdesign.step_trials.tuning import TUNING
+from expdesign.values import Array
+
+SHORTEST_S = 1e-3
+"""Time constants below this, and negative ones, count as this [s]."""
+LEAST_LOG_STD = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class States:
+    """Motions that are compared with a model; n rows.
+
+    Attributes:
+        state: (n, 2) U and r.
+        sway: (n,) v, nan where it is not known.
+        inputs: (n, m).
+    """
+
+    state: Array
+    sway: Array
+    inputs: Array
+
+    def through_water(self, course: Array, to_mps: Array) -> States:
+        """The same through water that moves to north and east (n, 2), at mean headings' cosines and sines (n, 2)."""
+        ahead = (course * to_mps).sum(axis=1)
+        starboard = course[:, 0] * to_mps[:, 1] - course[:, 1] * to_mps[:, 0]
+        return replace(self, state=self.state - np.stack([ahead, 0.0 * ahead], axis=1), sway=self.sway - starboard)
+
+    def motion(self, sway: Array) -> Array:
+        """(n, 3) u, v, r."""
+        surge = np.sqrt(np.maximum(self.state[:, 0] ** 2 - sway**2, 0.0))
+        return np.stack([surge, sway, self.state[:, 1]], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """What the steps say about a model with three degrees of freedom.
+
+    Attributes:
+        steady: the plateaus, over ground.
+        course: (n, 2) mean cosine and sine of their headings.
+        record: (n,) number of the record that each is in.
+        steady_std: (n, 3) errors of U, v and r; infinite where v is not known.
+        middle: of the steps that count.
+        output: (k,) 0 where the throttle was stepped, 2 where the rudder was.
+        before: (k, m) inputs before the step.
+        change: (k,) of U or r.
+        time_constant_s: (k,) as measured.
+        log_std: (k,) its relative standard error.
+        delay_std_s: (2,) of the dead times of throttle and rudder; a dead time too long makes all time constants of its
+            command too short by as much.
+    """
+
+    steady: States
+    course: Array
+    record: npt.NDArray[np.int64]
+    steady_std: Array
+    middle: States
+    output: Array
+    before: Array
+    change: Array
+    time_constant_s: Array
+    log_std: Array
+    delay_std_s: Array
+
+    @property
+    def records(self) -> int:
+        """Number of records, at least one."""
+        return int(self.record.max(initial=0)) + 1
+
+    def without_sway(self) -> Evidence:
+        """The same, had sway not been measured."""
+        unknown = [replace(part, sway=np.full(len(part.sway), np.nan)) for part in (self.steady, self.middle)]
+        std = self.steady_std * [1.0, np.inf, 1.0]
+        return replace(self, steady=unknown[0], middle=unknown[1], steady_std=std)
+
+
+def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
+    """Of all plateaus and of the steps that count."""
+    held = [(one, one.plateau) for one in samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
+    plateaus = [part for _, part in held]
+    sway_std = [part.sway_std if math.isfinite(part.sway_std) else math.inf for part in plateaus]
+    std = np.array([[part.std[0], wide, part.std[1]] for part, wide in zip(plateaus, sway_std, strict=True)])
+    usual_s = np.array([_usual_s(samples, channel) for channel in (0, 1, 1)])
+    std *= correlated(np.array([part.duration_s for part in plateaus])[:, None], usual_s)
+    steps = [(one, *middle) for one in samples if (middle := _middle(one)) is not None]
+    return Evidence(
+        steady=States(
+            state=np.array([part.state for part in plateaus]),
+            sway=np.array([part.sway for part in plateaus]),
+            inputs=np.array([part.inputs for part in plateaus]),
+        ),
+        course=np.array([part.course for part in plateaus]),
+        record=np.array([one.hold.batch for one, _ in held], dtype=np.int64),
+        steady_std=np.maximum(std, 1e-9),
+        middle=States(
+            state=np.array([one.middle.state for one, *_ in steps if one.middle is not None]),
+            sway=np.array([one.middle.sway for one, *_ in steps if one.middle is not None]),
+            inputs=np.array([one.plateau.inputs for one, *_ in steps if one.plateau is not None]),
+        ),
+        output=np.array([2 * (one.hold.channel or 0) for one, *_ in steps]),
+        before=np.array([one.before.inputs for one, *_ in steps if one.before is not None]),
+        change=np.array([_change(one) for one, *_ in steps]),
+        time_constant_s=np.array([constant for _, constant, _ in steps]),
+        log_std=np.array([max(error, LEAST_LOG_STD) for *_, error in steps]),
+        delay_std_s=np.array([std for _, std in delays]),
+    )
+
+
+def correlated(duration_s: Array, constant_s: Array) -> Array:
+    """Factors on standard errors from the means of blocks, for a state that disturbances move as slowly as commands do.
+
+    Blocks shorter than the time constant T are correlated. With the variance over a time L of the mean of noise of
+    correlation exp(-t / T),
+
+        V(L) = 2 T / L (1 - T / L (1 - exp(-L / T))),
+
+    the blocks' own variance is V(L / b) - V(L), and b - 1 of it stand for V(L).
+
+    Args:
+        duration_s: of means, shape (n, 1).
+        constant_s: of states, shape (m,).
+
+    Returns:
+        (n, m), at least 1.
+
+    Source: M. B. Priestley, Spectral Analysis and Time Series (1981), 5.3.
+    """
+
+    def variance(share: Array) -> Array:
+        return np.asarray(2.0 / share * (1.0 + np.expm1(-share) / share))
+
+    shares, blocks = duration_s / constant_s, TUNING.steady_blocks
+    whole = variance(shares)
+    return np.maximum(np.sqrt((blocks - 1) * whole / (variance(shares / blocks) - whole)), 1.0)
+
+
+def _usual_s(samples: Sequence[StepSample], channel: int) -> float:
+    """Median time constant of the steps of a command that count [s]."""
+    own = [
+        one.response.time_constant_s for one in samples if one.counts and one.hold.channel == channel and one.response
+    ]
+    return float(np.median(own)) if own else SHORTEST_S
+
+
+def _middle(one: StepSample) -> tuple[float, float] | None:
+    """Time constant of a step that counts [s], and its relative standard error."""
+    if not one.counts or one.response is None or one.middle is None:
+        return None
+    constant = one.response.time_constant_s
+    return constant, one.response.time_constant_std_s / constant
+
+
+def _change(one: StepSample) -> float:
+    assert one.plateau is not None
+    assert one.before is not None
+    return float((one.plateau.state - one.before.state)[one.hold.channel or 0])
