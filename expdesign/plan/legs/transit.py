@@ -1,7 +1,7 @@
 """The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
 
 There is nothing to optimise about it. The program of a leg of a hundred hull lengths that contains it is large, and
-IPOPT often ends without an answer.
+IPOPT sometimes ends without an answer.
 """
 
 from __future__ import annotations
