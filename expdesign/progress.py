@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from itertools import accumulate, pairwise
 
@@ -16,6 +17,24 @@ def silent(activity: str, share: float) -> None:
 def within(progress: Progress, low: float, high: float) -> Progress:
     """Progress of a part of the work that begins at share `low` and ends at share `high`."""
     return lambda activity, share: progress(activity, low + (high - low) * share)
+
+
+def ending(progress: Progress, *, most_s: float, refusal: Callable[[str], Exception]) -> Progress:
+    """Progress of work that is given up where more time than this has passed by the clock.
+
+    Args:
+        progress: of the work.
+        most_s: time from now; work under way ends its present step first.
+        refusal: raised then, made of what was to be done next.
+    """
+    ends_s = time.monotonic() + most_s
+
+    def report(activity: str, share: float) -> None:
+        if time.monotonic() > ends_s:
+            raise refusal(activity)
+        progress(activity, share)
+
+    return report
 
 
 def in_phases(progress: Progress, *work: float) -> tuple[Progress, ...]:

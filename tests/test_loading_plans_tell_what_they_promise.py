@@ -1,6 +1,7 @@
 """Load plans: information is the weighted least-squares one, open directions are refused, files are taken on."""
 
 import json
+import types
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from design_case import SCENARIOS
 from expdesign.dictionary import build_dictionary
 from expdesign.durations import Aim
-from expdesign.errors import InputError, NotInformative
+from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads, run_information
 from expdesign.roll import coefficients
 from expdesign.scenario import load_cases, load_dictionary, load_repeats
@@ -154,6 +155,26 @@ def test_the_command_writes_what_plan_and_roll_read(tmp_path: Path) -> None:
         assert dict(zip(names, repeats, strict=True)) == {**dict.fromkeys(names, 0), **case["runs"]}
 
 
+def test_work_that_takes_too_long_is_given_up_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A clock that jumps where the runs of the first load case are placed; with no time at all nothing is begun."""
+    scenario, candidates = small(tmp_path)
+    said: list[str] = []
+    clock = types.SimpleNamespace(monotonic=lambda: 3600.0 * any("measuring the water" in one for one in said))
+    monkeypatch.setattr("expdesign.progress.time", clock)
+    with pytest.raises(
+        NoAnswer, match=r"^--minutes 20 are over, and placing runs, load case 1: .* is still to be done; expected more"
+    ):
+        roll_plan(
+            scenario, tmp_path / "out", loads=candidates, place=True, minutes=20.0,
+            progress=lambda what, _: said.append(what),
+        )  # fmt: skip
+    with pytest.raises(InputError, match=r"--minutes is 0, expected more than 0"):
+        roll_plan(scenario, tmp_path / "out", loads=candidates, minutes=0.0)
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_every_load_case_has_cards_that_name_its_load_and_the_same_runs_are_planned_once(tmp_path: Path) -> None:
     """A ship with samples of 0.1 s and five load cases of one run each."""
@@ -173,7 +194,7 @@ def test_every_load_case_has_cards_that_name_its_load_and_the_same_runs_are_plan
         assert folder / "commands.csv" in outcome.files
     runs = {json.dumps(case["runs"], sort_keys=True) for case in cases}
     assert len(runs) < len(cases)
-    assert said.count("sailing to the goal") == len(runs)
+    assert sum(what.startswith("sailing to the goal, load case") for what in said) == len(runs)
 
 
 @pytest.mark.parametrize("seeds", [range(101, 103), pytest.param(range(201, 221), marks=pytest.mark.slow)])

@@ -217,7 +217,15 @@ def roll_plan(
         bool,
         typer.Option("--place", help="Also plan each load case on the chart, with routes and run cards."),
     ] = False,
+    minutes: Annotated[
+        float,
+        typer.Option(
+            "--minutes", metavar="M", help="By the clock, after which it gives up with status 3 and writes nothing."
+        ),
+    ] = 30.0,
     out: Out = None,
+    jobs: Jobs = 0,
+    no_cache: NoCache = False,
     seed: Seed = 0,
 ) -> Asked:
     """Choose known loads, and manoeuvres at each, that tell most about roll and an unknown load.
@@ -229,5 +237,15 @@ def roll_plan(
     Example: expdesign roll-plan scenarios/roll-trial.toml --loads scenarios/loads/roll-trial.toml
     """
     return ask(
-        "roll_plan", scenario, out, loads=loads, most_loads=most_loads, interest=interest or (), place=place, seed=seed
+        "roll_plan",
+        scenario,
+        out,
+        loads=loads,
+        most_loads=most_loads,
+        interest=interest or (),
+        place=place,
+        minutes=minutes,
+        jobs=jobs,
+        cache=not no_cache,
+        seed=seed,
     )

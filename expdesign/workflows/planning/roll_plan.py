@@ -7,9 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.dictionary import build_dictionary
 from expdesign.durations import Aim, DurationDesign, with_repeats
-from expdesign.errors import FileError, UnknownName
+from expdesign.errors import FileError, InputError, NoAnswer, NoPlan, UnknownName
 from expdesign.export import write_files
 from expdesign.export.load_page import (
     CASE_HEADER,
@@ -23,9 +22,11 @@ from expdesign.export.load_page import (
     precision_rows,
     repeats_json,
 )
+from expdesign.information import PrimitiveInformation
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
+from expdesign.memory import remembering, user_memory
 from expdesign.plan.values import Plan
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Progress, ending, silent, within
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.workflows.command_text import command_text
@@ -35,8 +36,11 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, planned
 from expdesign.workflows.steps.scored import scored
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+from expdesign.workflows.steps.workers import load_planner, workers
 
-Paths = tuple[Path, ...]
+Files = dict[str, str | bytes]
+MOST_MINUTES = 30.0
+"""Default of `--minutes`."""
 
 
 def roll_plan(
@@ -47,7 +51,10 @@ def roll_plan(
     most_loads: int | None = None,
     interest: Sequence[str] = (),
     place: bool = False,
+    minutes: float = MOST_MINUTES,
     seed: int = 0,
+    jobs: int = 1,
+    cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
     """Load cases and runs, into `out` or runs/<scenario>; with `place` also a plan and run cards of each load case.
@@ -59,14 +66,20 @@ def roll_plan(
         most_loads: at most so many load cases; None for the fewest that tell nearly as much as all.
         interest: parameters whose precision is to be best; all of them when empty.
         place: whether each load case is planned on the chart, too.
+        minutes: by the clock, after which the command gives up and writes nothing.
         seed: of the planner.
+        jobs: processes; 0 for one per core. The results do not depend on it.
+        cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
-        NoAnswer: the candidates leave a combination of parameters open, or a load case has no plan.
+        NoAnswer: the candidates leave a combination of parameters open, a load case has no plan, or time is up.
     """
-    case = loaded(scenario, progress)
+    if not minutes > 0:
+        raise InputError(f"--minutes is {minutes:g}, expected more than 0")
+    limited = ending(progress, most_s=60.0 * minutes, refusal=lambda now: _too_long(minutes, now, cache=cache))
+    case = loaded(scenario, limited)
     pendulum = case.vessel.pendulum
     if pendulum is None:
         raise FileError(
@@ -76,35 +89,48 @@ def roll_plan(
         check_plannable(case)
     asked = load_cases(loads, case.vessel)
     question = build_question(case.vessel, asked.loads, known=asked.known, guess=asked.start)
-    progress("simulating manoeuvres", 0.05)
-    primitives = build_dictionary(case.vessel, case.dictionary)
-    plan = choose_loads(
-        question, primitives, total_s=case.design.total_s, aim=_aim(question, interest), most_loads=most_loads,
-        progress=within(progress, 0.1, 0.4 if place else 0.9),
-    )  # fmt: skip
-    folder = out or Path("runs") / case.name
-    options = {
-        "--loads": loads,
-        "--most-loads": most_loads,
-        "--interest": tuple(interest),
-        "--place": place,
-        "--seed": seed,
-    }
-    content = LoadContent(
-        scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
-        commands=_commands(scenario, folder, plan),
-        command=command_text("roll-plan", [scenario], options, usual={"--seed": 0}), version=__version__,
-    )  # fmt: skip
-    names = {_runs_name(case): repeats_json(content, case) for case in range(len(plan.repeats))}
+    with remembering(user_memory() if cache else None), workers(jobs, load=load_planner if place else None):
+        information = scored(case, progress=within(limited, 0.05, 0.1))
+        plan = choose_loads(
+            question, [item.primitive for item in information], total_s=case.design.total_s,
+            aim=_aim(question, interest), most_loads=most_loads, progress=within(limited, 0.1, 0.3 if place else 0.9),
+        )  # fmt: skip
+        folder = out or Path("runs") / case.name
+        options = {
+            "--loads": loads,
+            "--most-loads": most_loads,
+            "--interest": tuple(interest),
+            "--place": place,
+            "--minutes": minutes,
+            "--seed": seed,
+        }
+        content = LoadContent(
+            scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
+            commands=_commands(scenario, folder, plan),
+            command=command_text("roll-plan", [scenario], options, usual={"--seed": 0, "--minutes": MOST_MINUTES}),
+            version=__version__,
+        )  # fmt: skip
+        placing = within(limited, 0.3, 1.0)
+        placed = _placed(case, information, content, seed, placing) if place else ()
+    names = {_runs_name(number): repeats_json(content, number) for number in range(len(plan.repeats))}
     files = {
         "roll-plan.json": load_plan_json(content), "roll-plan.html": load_plan_html(content),
         "loads.toml": loads_toml(content), **names,
     }  # fmt: skip
     paths = write_files(folder, files)
-    if place:
-        paths += _placed(case, plan, content, folder, seed, within(progress, 0.4, 1.0))
+    for number, own in enumerate(placed, start=1):
+        paths += write_files(folder / f"case-{number}", own)
     progress("done", 1.0)
     return Outcome(files=paths, summary=_summary(content), tables=_tables(content))
+
+
+def _too_long(minutes: float, activity: str, *, cache: bool) -> NoAnswer:
+    """The refusal of work that takes longer than asked."""
+    again = ", or the same command again, which goes on from the load cases that were planned" if cache else ""
+    return NoAnswer(
+        f"--minutes {minutes:g} are over, and {activity} is still to be done; expected more minutes, fewer load cases "
+        f"(--most-loads), no --place{again}"
+    )
 
 
 def _aim(question: Question, interest: Sequence[str]) -> Aim:
@@ -136,30 +162,50 @@ def _commands(scenario: Path, folder: Path, plan: LoadPlan) -> tuple[str, ...]:
     return (*each, command_text("roll", data, {"--loads": folder / "loads.toml", "--vessel": "VESSEL.toml"}))
 
 
-def _placed(case: Scenario, plan: LoadPlan, told: LoadContent, folder: Path, seed: int, progress: Progress) -> Paths:
-    """A plan with routes, run cards and report for every load case, in folders of their own.
+def _placed(
+    case: Scenario, information: tuple[PrimitiveInformation, ...], told: LoadContent, seed: int, progress: Progress
+) -> list[Files]:
+    """Files of every load case: a plan with routes, run cards and report.
 
     Loads do not change the ship's path: load cases with the same runs are sailed alike, and planned once.
     """
-    information = scored(case, progress=within(progress, 0.0, 0.1))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.2))
-    order = [list(plan.manoeuvres).index(item.primitive.name) for item in information]
+    design = designed(case, information, seed=seed, progress=within(progress, 0.0, 0.1))
+    order = [list(told.plan.manoeuvres).index(item.primitive.name) for item in information]
+    rows = told.plan.repeats.astype(int).tolist()
     trips: dict[tuple[int, ...], tuple[DurationDesign, Plan]] = {}
-    paths: Paths = ()
-    for number, row in enumerate(plan.repeats.astype(int).tolist()):
-        part = within(progress, 0.2 + 0.8 * number / len(plan.repeats), 0.2 + 0.8 * (number + 1) / len(plan.repeats))
+    found = []
+    for number, row in enumerate(rows):
+        part = within(progress, 0.1 + 0.9 * number / len(rows), 0.1 + 0.9 * (number + 1) / len(rows))
+        name = f"load case {number + 1}: {told.options[number].name}"
         repeats = tuple(row[place] for place in order)
         if repeats not in trips:
             runs = with_repeats(design, list(repeats))
-            trips[repeats] = runs, planned(case, information, runs, seed=seed, progress=within(part, 0.0, 0.8))
+            sailing = within(_of_case(name, part), 0.0, 0.8)
+            trips[repeats] = runs, _trip(case, information, runs, name=name, seed=seed, progress=sailing)
         runs, trip = trips[repeats]
-        loaded_case = replace(case, name=f"{case.name}, load case {number + 1}: {told.options[number].name}")
+        loaded_case = replace(case, name=f"{case.name}, {name}")
         route = built_route(loaded_case, trip)
         content = report_content(loaded_case, information, runs, trip, seed)
         content = replace(content, route=route, command=told.commands[number])
-        files = trial_files(loaded_case, None, content, route, progress=within(part, 0.8, 1.0))
-        paths += write_files(folder / f"case-{number + 1}", files)
-    return paths
+        drawing = within(_of_case(name, part), 0.8, 1.0)
+        found.append(trial_files(loaded_case, None, content, route, progress=drawing))
+    return found
+
+
+def _of_case(name: str, progress: Progress) -> Progress:
+    return lambda activity, share: progress(f"{activity}, {name}", share)
+
+
+def _trip(
+    case: Scenario, information: Sequence[PrimitiveInformation], runs: DurationDesign, *, name: str, seed: int,
+    progress: Progress,
+) -> Plan:  # fmt: skip
+    """The plan of a load case; a refusal names it."""
+    try:
+        return planned(case, information, runs, seed=seed, progress=progress)
+    except NoPlan as error:
+        error.obstacle = f"{name}: {error.obstacle}"
+        raise
 
 
 def _summary(content: LoadContent) -> dict[str, object]:
