@@ -104,10 +104,11 @@ def _prepared(run: Run, filter_: LowPass, name: str) -> Run:
     least = len(filter_.taps) + filter_.every * (TUNING.left_out_samples + TUNING.least_samples)
     if len(run.signals) < least:
         raise NotInformative(f"{name} has a run of {len(run.signals)} samples, expected {least} or more")
+    exact = min(TUNING.unwarped_periods * 2.0 / filter_.samples_per_period, TUNING.most_unwarped)
     if len(filter_.taps) == 1:
-        return run
+        return replace(run, unwarped=exact)
     planned = None if run.planned is None else _passed(run.planned[:, None], filter_)[:, 0]
-    return Run(step_s=filter_.step_s, signals=_passed(run.signals, filter_), planned=planned)
+    return Run(step_s=filter_.step_s, signals=_passed(run.signals, filter_), planned=planned, unwarped=exact)
 
 
 def _passed(signals: Array, filter_: LowPass) -> Array:

@@ -55,8 +55,38 @@ def build_rows(run: Run, noise: NoiseModel) -> Rows:
     """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
     table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
     table[:2] = 0.0
+    table[:, :3] = unwarped(table[:, :3], run.unwarped)
     table = without_start(noise.whitened(table)[TUNING.left_out_samples :], noise)
     return Rows(y=table[:, 0], X=table[:, 1:])
+
+
+def unwarped(columns: Array, share: float) -> Array:
+    """(k, 3) columns y(t), -y(t-1), -y(t-2) with derivatives and integrals as they are at low frequencies.
+
+    The bilinear map takes (2 / T) tan(w T / 2) for w. In the equation y(t) - 2 y(t-1) + y(t-2) stands for the
+    derivative of roll rate, y(t) + 2 y(t-1) + y(t-2) for its integral: they are passed, without a shift in time,
+    through the ratio of w to what is taken for it, and its inverse. At high frequencies, where samples alias the kinks
+    of signals, the trapezoids of the bilinear map are the better rule.
+
+    Args:
+        columns: of one run.
+        share: of half the sample rate, below which frequencies are corrected; none are at 0.
+    """
+    if not share:
+        return columns
+    now, one, two = columns.T * [[1.0], [-1.0], [-1.0]]
+    half = np.linspace(0.0, np.pi / 2, len(columns) + 1)  # w T / 2 of a run that goes back at its end
+    gone = np.clip(2.0 - half / (share * np.pi / 2), 0.0, 1.0)
+    ratio = 1.0 + gone * (np.r_[1.0, half[1:] / np.tan(half[1:])] - 1.0)
+    bent, middle = _mirrored(now - 2.0 * one + two, ratio), now - two
+    slow = _mirrored(now + 2.0 * one + two, 1.0 / ratio)
+    return np.column_stack([bent + 2 * middle + slow, bent - slow, 2 * middle - bent - slow]) / 4.0
+
+
+def _mirrored(signal: Array, gain: Array) -> Array:
+    """A signal (k,), followed by itself in reverse, through a gain (k + 1,) at its frequencies."""
+    both = np.fft.rfft(np.r_[signal, signal[::-1]])
+    return np.asarray(np.fft.irfft(both * gain, 2 * len(signal))[: len(signal)])
 
 
 def without_start(table: Array, noise: NoiseModel) -> Array:

@@ -20,11 +20,13 @@ class Run:
         signals: (k, 4) roll rate [rad/s], positive to starboard; reading of the accelerometer to port, gravity in it
             [m/s2]; yaw rate [rad/s], positive to starboard; rudder, of any sign and unit.
         planned: (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself.
+        unwarped: share of half the sample rate, below which the bilinear map of the equation is made exact.
     """
 
     step_s: float
     signals: Array
     planned: Array | None = None
+    unwarped: float = 0.0
 
     def __post_init__(self) -> None:
         seal(self, signals="k 4", **({} if self.planned is None else {"planned": "k"}))

@@ -11,6 +11,8 @@ class Tuning:
 
     Attributes:
         samples_per_period: of roll, at least; fewer bias the bilinear map by a share of about (pi / samples)^2 / 3.
+        unwarped_periods: frequencies, in that of roll, up to which the bilinear map is made exact; none above twice it.
+        most_unwarped: of these, in half the sample rate.
         passed_gain: least gain of the low-pass filter at the roll frequency.
         cutoff_share: of the rate after thinning out, at which the low-pass filter before it leaves half.
         taps_per_period: length of that filter, in periods of its cut-off, to each side.
@@ -42,6 +44,8 @@ class Tuning:
     """
 
     samples_per_period: float = 80.0
+    unwarped_periods: float = 3.0
+    most_unwarped: float = 0.45
     passed_gain: float = 0.9
     cutoff_share: float = 0.4
     taps_per_period: float = 2.0

@@ -8,6 +8,9 @@ autopilot: the same under a moderate one, with an autopilot that moves the rudde
 feedback: the same and waves, with a rudder that answers the roll rate too; instruments from it, or from its orders.
 fullscale: ten minutes for each load of the ship 24 times as long, whose rudder is slow.
 loads: what load cases determine.
+claims: the thesis's own pendulum study, 25 minutes for each load, in stages, after its strong filter and ours.
+records: errors under a narrow-band roll moment by the length of the record.
+tilting: its tilting test, whose geometry is not stated and follows from two of its three rows.
 
 All tell how often 95 % intervals hold the truth, how many estimates say that theirs are not to be trusted, and how many
 misses no estimate warned of. Parameters are those of the thesis where it states them; excitation, sensor noise of the
@@ -23,6 +26,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import scipy
 
 from expdesign.roll import (
     NOMINAL,
@@ -33,6 +37,8 @@ from expdesign.roll import (
     RollProblem,
     build_problem,
     estimate_roll,
+    low_pass,
+    prepared,
     relative_sensitivity,
 )
 from expdesign.values import Array
@@ -222,6 +228,70 @@ def loads(runs: int, seed: int) -> None:
         print(f"| {what} | {np.count_nonzero(sizes > 1e-9 * sizes[0])} of 9 | {sizes[-1]:.1e} |")
 
 
+def claims(runs: int, seed: int) -> None:
+    """Inertia and damping of the pendulum, then its load from them, sensors with standard deviations of 0.01."""
+    sea, tables = Sea(roll_rate=0.01, sensed=0.01), dict[str, list[list[float]]]()
+    for number in range(runs):
+        rng = np.random.default_rng([seed, number])
+        raw = pendulum_case(NOMINAL, sea, 150_000, rng), pendulum_case(None, sea, 150_000, rng)
+        for cutoff_hz in (3.3, None):
+            both = prepared(raw, low_pass(raw, roll_hz=1.0, cutoff_hz=cutoff_hz))
+            for method in ("ls", "iv"):
+                own = estimate_roll(pendulum_problem(both[:1], OWN, PENDULUM_TRUTH), method=method)
+                load = estimate_roll(pendulum_problem(both[1:], LOADED, own.theta), method=method)
+                row = [*(own.values[name] for name in OWN), *(load.values[name] for name in LOADED)]
+                tables.setdefault(f"{f'{cutoff_hz:g} Hz' if cutoff_hz else 'ours'} | {method}", []).append(row)
+    for what, rows in tables.items():
+        found = np.array(rows)
+        wanted = [truth(PENDULUM_TRUTH, name) for name in (*OWN, *LOADED)]
+        told = zip(np.mean(found - wanted, axis=0), found.std(axis=0, ddof=1), strict=True)
+        near = 100 * np.mean(np.abs(found[:, 2] - LOAD.mass_kg) < 0.1)
+        shares = f"{100 * np.mean(found[:, 2] > 0):.0f} % | {near:.0f} % | {100 * np.mean(found[:, 2] > 0.1):.0f} %"
+        print(f"| {what} | {' | '.join(f'{bias:+.1e} ± {std:.1e}' for bias, std in told)} | {shares} |")
+
+
+def records(runs: int, seed: int) -> None:
+    """Mean error of inertia and damping, in percent, with its standard error, by the length of the record."""
+    sea = Sea(moment=0.1, frequency_hz=1.0, damping=0.1)
+    wanted = np.array([truth(PENDULUM_TRUTH, name) for name in OWN])
+    for samples in (6000, 24_000, 96_000):
+        for method in ("ls", "iv"):
+            cases = [pendulum_case(NOMINAL, sea, samples, np.random.default_rng([seed, n])) for n in range(runs)]
+            rows = [estimate_roll(pendulum_problem((case,), OWN, PENDULUM_TRUTH), method=method) for case in cases]
+            errors = 100 * (np.array([[one.values[name] for name in OWN] for one in rows]) / wanted - 1)
+            told = zip(errors.mean(axis=0), errors.std(axis=0, ddof=1) / np.sqrt(runs), strict=True)
+            cells = " | ".join(f"{mean:+.2f} ± {error:.2f}" for mean, error in told)
+            print(f"| {samples // 6000} min | {method} | {cells} |", flush=True)
+
+
+def tilting(runs: int, seed: int) -> None:
+    """Height of the centre of mass by the third row of table 6.2, with levers and angle that the other two give.
+
+    Supports at x_1 = -x_2 and so far below the reference line; nothing is drawn.
+    """
+    total, loads, readings = 22.685, [0.0, 0.2, 0.4], [(11.57, 14.690), (11.67, 14.850), (11.77, 15.015)]
+    load_heights, centre = [0.0, -0.256, -0.268], [(-0.00178, 0.00728), (-0.00181, 0.00734), (-0.00185, None)]
+    lever = total * centre[0][0] / (2 * readings[0][0] - total)
+
+    def sums(row: int) -> tuple[float, float]:
+        """Moments of the tilted ship along, and those of the load across, both over the cosine of the angle."""
+        mass = total + loads[row]
+        place = (lever * (2 * readings[row][0] - mass) - total * centre[row][0]) / (loads[row] or 1.0)
+        along = lever * (2 * readings[row][1] - mass) - loads[row] * place - total * centre[row][0]
+        return along, loads[row] * load_heights[row]
+
+    def left(unknown: Array) -> list[float]:
+        depth, slope = unknown.tolist()
+        rows = [(sums(row), centre[row][1] or 0.0, total + loads[row]) for row in (0, 1)]
+        return [along + slope * (up + total * z_g - mass * depth) for (along, up), z_g, mass in rows]
+
+    depth, slope = scipy.optimize.fsolve(left, np.array([0.05, -0.4]))
+    along, up = sums(2)
+    height = ((total + loads[2]) * depth - up - along / slope) / total
+    angle = np.degrees(np.arctan(slope))
+    print(f"levers {lever:+.3f} m, {depth:+.3f} m, {angle:.1f} degrees; height {height:.4f} m, printed 0.0073 m")
+
+
 STUDIES = {
     "moment": moment,
     "pendulum": pendulum,
@@ -231,6 +301,9 @@ STUDIES = {
     "feedback": feedback,
     "fullscale": fullscale,
     "loads": loads,
+    "claims": claims,
+    "records": records,
+    "tilting": tilting,
 }
 
 if __name__ == "__main__":
