@@ -71,11 +71,11 @@ def test_every_hidden_effect_is_named_by_uncertain_parameters(case):
 SMALL, WHOLE = {"batches": 2, "samples": 80}, {"batches": 6, "samples": 300}
 
 
-@pytest.mark.parametrize(("trials", "size"), [(12, SMALL), pytest.param(20, WHOLE, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("trials", "size"), [(8, SMALL), pytest.param(20, WHOLE, marks=pytest.mark.slow)])
 def test_clean_data_are_called_clean(trials, size):
     """At most one false alarm in twenty trials is expected.
 
-    Four or more among 12 have a probability of 0.2 per cent, among 20 of 1.6; one false alarm in two trials would pass
+    Four or more among 8 have a probability of 0.04 per cent, among 20 of 1.6; one false alarm in two trials would pass
     with 7 per cent and 0.1.
     """
     alarms = 0

@@ -49,7 +49,7 @@ def covered(case: str, trials: int, samples: int = 4000) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("case", "trials", "samples"), [("iv", 24, 2000), ("wandering", 16, 2500), ("short", 16, 12 * 300)]
+    ("case", "trials", "samples"), [("iv", 24, 2000), ("wandering", 12, 2500), ("short", 12, 12 * 300)]
 )
 def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
     shares = covered(case, trials, samples)
@@ -68,7 +68,7 @@ TABLE = [
 """Not of methods that estimate a steady current, whose intervals are not promised: see `benchmarks/README.md`."""
 
 
-@pytest.mark.parametrize("case", TABLE[::5], ids=str)
+@pytest.mark.parametrize("case", TABLE[::8], ids=str)
 def test_intervals_of_every_method_cover_small(case: Case) -> None:
     """All parameters together; those of an equation err together, which the chance of four standard errors allows."""
     trials = 12

@@ -67,7 +67,7 @@ def test_inputs_that_follow_disturbances_are_found() -> None:
 
 @pytest.mark.parametrize("correlation_s", [0.0, 100.0], ids=["white", "wandering"])
 def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: float) -> None:
-    count = 100
+    count = 60
     calm = [sailed(1000 + seed, 400, steered=np.zeros(400), correlation_s=correlation_s) for seed in range(count)]
     found = chances([estimate(trial, MODEL) for trial in calm])
     assert len(found) == count

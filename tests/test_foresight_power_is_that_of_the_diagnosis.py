@@ -192,7 +192,7 @@ EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m
 @pytest.mark.parametrize(
     ("name", "trials"),
     [
-        *((name, 12) for name in EFFECTS[:2]),
+        (EFFECTS[0], 12),
         *(pytest.param(name, 100, marks=pytest.mark.slow) for name in EFFECTS),
     ],
 )

@@ -106,6 +106,7 @@ def test_more_room_is_tried_once_whatever_the_work_budget(attempts):
     assert abs(crossing_m(track) - ASIDE_M) < 45.0
 
 
+@pytest.mark.slow
 def test_where_runs_have_the_same_room_the_confidence_named_accepts_the_first_plan(attempts):
     case = problem((0.0, 9.2))  # a short run does not stray as far as the clearance
     case = replace(

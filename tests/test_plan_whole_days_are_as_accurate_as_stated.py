@@ -36,7 +36,10 @@ def planned():
 
 @pytest.fixture(
     scope="module",
-    params=[("calm", CALM, "iv"), ("unknown current", UNKNOWN, "iv-current")],
+    params=[
+        pytest.param(("calm", CALM, "iv"), marks=pytest.mark.slow),
+        ("unknown current", UNKNOWN, "iv-current"),
+    ],
     ids=lambda item: item[0],
 )
 def days(planned, request):

@@ -61,6 +61,12 @@ def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
     return folder
 
 
+@pytest.fixture
+def no_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that look at no page: drawing it takes longer than an hour's watch."""
+    monkeypatch.setattr("expdesign.workflows.data.monitor.monitor_html", lambda content: "")
+
+
 def told_in(folder: Path) -> dict[str, object]:
     content: dict[str, object] = json.loads((folder / "monitor.json").read_text())
     return content
@@ -87,6 +93,7 @@ def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_
     assert "Which manoeuvres tell which change" in (watched / "monitor.html").read_text()
 
 
+@pytest.mark.usefixtures("no_page")
 def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
 ) -> None:
@@ -134,6 +141,7 @@ def streamed(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *words: o
     return main(["monitor", "-", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"])
 
 
+@pytest.mark.usefixtures("no_page")
 @pytest.mark.parametrize("lines", [1999])
 @pytest.mark.parametrize("learning", [False, True])
 def test_a_watch_that_is_ended_by_force_goes_on_as_if_it_had_not_been(
@@ -171,6 +179,7 @@ def test_a_killed_watch_leaves_a_state_to_go_on_from(voyages: dict[str, Path], t
     assert told["judged_h"] > 1.0
 
 
+@pytest.mark.usefixtures("no_page")
 def test_a_file_that_grows_is_read_on_from_where_it_ended(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
 ) -> None:
@@ -185,6 +194,7 @@ def test_a_file_that_grows_is_read_on_from_where_it_ended(
     assert "log.csv: its first 3600 rows had been watched before" in again["notes"]
 
 
+@pytest.mark.usefixtures("no_page")
 def test_results_do_not_depend_on_the_number_of_processes(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -195,6 +205,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
     assert table[0] == table[1]
 
 
+@pytest.mark.usefixtures("no_page")
 def test_a_stream_is_watched_as_its_file_is(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -221,6 +232,7 @@ def test_the_example_of_the_readme_finds_the_change(
     assert alarm["effect"] == "theta:N_r"
 
 
+@pytest.mark.usefixtures("no_page")
 def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
     names = header.strip().split(",")
@@ -278,6 +290,7 @@ def test_the_reference_may_be_the_beginning_of_the_data(voyages: dict[str, Path]
     assert told["judged_h"] == pytest.approx(0.4, abs=0.05)
 
 
+@pytest.mark.usefixtures("no_page")
 def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path, voyages["same"], voyages["reference"], "--reference", voyages["reference"])
     assert told["judged_h"] == pytest.approx(2.5, abs=0.05)
@@ -285,6 +298,7 @@ def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path
     assert told["history"][-1]["time_s"] > 3.4 * HOUR
 
 
+@pytest.mark.usefixtures("no_page")
 def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
     path = voyage_csv(tmp_path / "half.csv", tender(X_mu=0.5, Y_mu=0.5, N_mu=0.5), HOUR // 2, seed=9)
     told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
@@ -293,6 +307,7 @@ def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[st
     assert alarm["value"] == pytest.approx(-0.5, abs=max(5 * alarm["std"], 0.02))
 
 
+@pytest.mark.usefixtures("no_page")
 def test_data_unlike_the_reference_are_not_called_the_same_ship(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
     column = header.strip().split(",").index("v_mps")
@@ -317,6 +332,7 @@ def heavier(factor: float) -> Vessel:
     return tender(**{name: 1.0 / factor for name in names if name not in ("X_vr", "Y_ur")})
 
 
+@pytest.mark.usefixtures("no_page")
 def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[str, Path], tmp_path: Path) -> None:
     loaded = voyage_csv(tmp_path / "loaded.csv", heavier(1.15), HOUR, seed=7, begin_s=9.0 * HOUR)
     both = [voyages["same"], loaded, "--reference", voyages["reference"]]
