@@ -112,6 +112,7 @@ def test_a_goal_that_land_cuts_off_comes_with_the_nearest_one_that_can_be_reache
     plan_trial(moved)
 
 
+@pytest.mark.slow
 def test_the_confidence_named_where_it_cannot_be_estimated_can_be():
     case = problem(WIDE, confidence=0.99999)
     text = refusal(case)
@@ -127,7 +128,9 @@ def test_the_speed_named_against_a_current_overcomes_it():
     plan_trial(changed(case, transit_speed_mps=None))
 
 
-@pytest.mark.parametrize("settings", [{"transit_speed_mps": 50.0}, {"turning_radius_m": 1.0}])
+@pytest.mark.parametrize(
+    "settings", [{"transit_speed_mps": 50.0}, pytest.param({"turning_radius_m": 1.0}, marks=pytest.mark.slow)]
+)
 def test_without_a_speed_or_a_radius_beyond_the_ship_there_is_a_plan(settings):
     case = problem(WIDE, **settings)
     ((key, _),) = settings.items()
@@ -178,6 +181,7 @@ def test_the_clearance_named_where_no_leg_is_found_is_one_with_which_runs_are_sa
     plan_trial(changed(case, clearance_m=setting(text, "clearance_m")))
 
 
+@pytest.mark.slow
 def test_the_seed_named_where_verification_fails_gives_a_plan_that_passes(monkeypatch):
     verify, asked = checked.verify_plan, []
 

@@ -53,6 +53,7 @@ def mirrored(primitive):
     )
 
 
+@pytest.mark.slow
 def test_a_mirrored_chart_with_mirrored_runs_costs_the_same(problem, cost_s):
     assert problem.vessel.model.inputs == ("tau_x", "tau_y", "tau_psi")
     other = moved(problem, lambda xy: xy * (-1.0, 1.0), lambda pose: pose * FLIP)

@@ -103,6 +103,7 @@ def test_a_mirrored_trial_gives_the_same_model() -> None:
         assert a(states) == pytest.approx(b(states * [1.0, -1.0]), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_steps_leave_no_parameter_more_uncertain_than_it_was() -> None:
     """Although sway, which is not measured, adds errors to what the plateaus say of surge and yaw."""
     trial = identify_steps(craft_record(9000), CONTROLS)

@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.errors import InputError
-from expdesign.estimation.methods import steady_current_method
+from expdesign.estimation.methods import method_named, steady_current_method
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
 from expdesign.information import estimated_parameters
@@ -52,6 +52,8 @@ def validate_design(
         raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
     case = load_scenario(scenario)
     method = _method(case, method)
+    method_named(method)  # refused before the dictionary is scored
+    ship = case.vessel if truth is None else load_vessel(truth)
     if case.vessel.model.roll is not None:
         raise InputError(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate beside; "
@@ -61,7 +63,7 @@ def validate_design(
     design = designed(case, information, seed=seed)
     primitives = tuple(item.primitive for item in information)
     rehearsal = Rehearsal(
-        truth=case.vessel if truth is None else load_vessel(truth),
+        truth=ship,
         nominal=case.vessel,
         primitives=primitives,
         designs={OPTIMISED: design.repeats, EQUAL: equal_runs(primitives, case.design.total_s), RANDOM: None},
