@@ -38,9 +38,10 @@ class ClearanceField:
 
     def index(self, points: Array) -> tuple[np.ndarray, np.ndarray]:
         """Nearest cell's row and column of (..., 2) north/east points; outside the grid they are clipped."""
-        cells = np.rint((points - self.origin) / self.cell_m).astype(int)
+        cells = np.rint((points - self.origin) / self.cell_m)
         rows, columns = self.clearance_m.shape
-        return np.clip(cells[..., 0], 0, rows - 1), np.clip(cells[..., 1], 0, columns - 1)
+        row, column = np.fmax(cells[..., 0], 0.0), np.fmax(cells[..., 1], 0.0)  # quicker than clip for few points
+        return np.fmin(row, rows - 1).astype(np.intp), np.fmin(column, columns - 1).astype(np.intp)
 
     def at(self, points: Array) -> Array:
         """(...,) clearance of (..., 2) points; the grid's rim is forbidden, so points outside have none."""
