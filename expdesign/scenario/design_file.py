@@ -33,6 +33,7 @@ class BudgetTable(Table):
 
 
 LONGEST_TOTAL_S = 1e6
+MOST_STARTS = 100
 
 
 class AccuracyTable(Table):
@@ -58,6 +59,13 @@ class AccuracyTable(Table):
     grow: bool = Field(
         default=True,
         description="whether manoeuvres are searched for, and added, that shorten the day; [design.grow] limits them",
+    )
+    starts: int = Field(
+        default=1,
+        ge=1,
+        le=MOST_STARTS,
+        description="how many independent searches for manoeuvres and day are made, side by side where there are "
+        "processes; the day whose drawn trials end soonest is taken. More take longer and depend less on luck",
     )
 
 
@@ -256,6 +264,8 @@ def _accuracy(
     _check_keys(table.outcomes_95, OUTCOMES, entry.at("outcomes_95"))
     if not (table.as_ or table.std or table.relative_std or table.outcomes_95):
         raise entry.error("is empty, expected as = 'durations', std, relative_std or outcomes_95")
+    if table.starts > 1 and not table.grow:
+        raise entry.at("starts").error(f"is {table.starts} without a search for manoeuvres, expected 1 or grow = true")
     nominal = dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))
     for name in table.relative_std:
         if name in table.std:
@@ -270,6 +280,7 @@ def _accuracy(
         outcome_speed_mps=speed_mps,
         most_s=table.most_s,
         grow=table.grow,
+        starts=table.starts,
     )
 
 

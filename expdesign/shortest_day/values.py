@@ -24,6 +24,7 @@ class AccuracySettings:
         outcome_speed_mps: approach speed of these trials, or None for the nominal model's.
         most_s: longest day [s], or None for no limit.
         grow: whether manoeuvres are added that shorten the day, or tell more in it.
+        starts: independent searches, from other candidates of manoeuvres; the shortest day of all is taken.
         day_s: length of the day [s] in which as much is to be told as can be, or None where an accuracy is asked for.
     """
 
@@ -34,6 +35,7 @@ class AccuracySettings:
     outcome_speed_mps: float | None = None
     most_s: float | None = None
     grow: bool = True
+    starts: int = 1
     day_s: float | None = None
 
 

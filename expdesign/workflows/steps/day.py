@@ -11,15 +11,16 @@ import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NoAnswer
 from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
-from expdesign.memory import recalled
+from expdesign.memory import Memory, memory_in_use, recalled, remembering
 from expdesign.plan.assembly import check_start, ship_on_legs
 from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan, PlanSettings
+from expdesign.processes import begin, in_order, told_together
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
@@ -82,17 +83,75 @@ def planned_day(
     if asked is None:
         plan = planned(case, information, design, seed=seed, progress=progress)
         return Day(information=information, design=design, plan=plan)
-    from expdesign.shortest_day import check_way_fits, day_bound, fullest_day, shortest_day, stated_accuracy
+    from expdesign.shortest_day import check_way_fits, stated_accuracy
 
     runs = tuple(item.primitive for item in information)
     accuracy = stated_accuracy(asked, design, case.vessel, runs, case.environment)
     case = replace(case, plan=with_leg_speed(case))
-    searching, planning = in_phases(progress, *WORK)
     problem = plan_problem(case, information, design, seed=seed)
     check_start(problem, ship_on_legs(problem))
     if asked.day_s is not None:
         check_way_fits(problem, asked.day_s)
-    added = _added(case, problem, accuracy, seed, searching)
+    if asked.starts == 1:
+        return _searched(case, information, design, accuracy, seed, 0, progress)
+    return _shortest_of(asked.starts, (case, information, design, accuracy, seed), progress)
+
+
+def _shortest_of(
+    starts: int,
+    shared: tuple[Scenario, tuple[PrimitiveInformation, ...], DurationDesign, Accuracy, int],
+    progress: Progress,
+) -> Day:
+    """The day of several searches whose drawn trials end soonest, by their median; that of the first of equal ones.
+
+    Raises:
+        NoAnswer: no search has an answer; what the first says.
+    """
+    begin()
+    with told_together(progress, starts) as together:
+        tasks = list(enumerate(together.tellers))
+        found = list(in_order(_answered, (memory_in_use(), *shared), tasks))
+    days = [item for item in found if isinstance(item, Day)]
+    if not days:
+        raise next(item for item in found if isinstance(item, NoAnswer))
+    return min(days, key=lambda day: np.nan_to_num(day.plan.day.median_s, nan=np.inf))
+
+
+def _answered(
+    memory: Memory | None,
+    case: Scenario,
+    information: tuple[PrimitiveInformation, ...],
+    design: DurationDesign,
+    accuracy: Accuracy,
+    seed: int,
+    start: int,
+    progress: Progress,
+) -> Day | NoAnswer:
+    """The outcome of one search, perhaps in another process."""
+    with remembering(memory):
+        try:
+            return _searched(case, information, design, accuracy, seed, start, progress)
+        except NoAnswer as error:
+            return error
+
+
+def _searched(
+    case: Scenario,
+    information: tuple[PrimitiveInformation, ...],
+    design: DurationDesign,
+    accuracy: Accuracy,
+    seed: int,
+    start: int,
+    progress: Progress,
+) -> Day:
+    """The day of one search; each start searches for manoeuvres from other candidates."""
+    from expdesign.shortest_day import day_bound, fullest_day, shortest_day
+
+    asked = case.design.accuracy
+    assert asked is not None  # there is an accuracy
+    searching, planning = in_phases(progress, *WORK)
+    problem = plan_problem(case, information, design, seed=seed)
+    added = _added(case, problem, accuracy, (seed, start), searching)
     if added:
         case = _with_additions(case, added)
         information = scored(case)
@@ -123,16 +182,20 @@ def with_leg_speed(case: Scenario) -> PlanSettings:
 
 
 def _added(
-    case: Scenario, problem: PlanProblem, accuracy: Accuracy, seed: int, progress: Progress
+    case: Scenario, problem: PlanProblem, accuracy: Accuracy, seed_start: tuple[int, int], progress: Progress
 ) -> tuple[PrimitiveSpec, ...]:
-    """Manoeuvres that would shorten the day; none where the scenario wants none, or the vessel can do none."""
+    """Manoeuvres that would shorten the day; none where the scenario wants none, or the vessel can do none.
+
+    The first start takes the seed itself, the others seeds drawn from it.
+    """
     from expdesign.shortest_day import manoeuvres_worth_adding
 
     if case.design.accuracy is None or not case.design.accuracy.grow:
         return ()
     settings = case.design.grow or GrowSettings(pool=FEW_CANDIDATES)
-    if settings.seed is None:
-        settings = replace(settings, seed=seed)
+    seed, start = seed_start
+    seed = seed if settings.seed is None else settings.seed
+    settings = replace(settings, seed=int(np.random.default_rng([seed, start]).integers(2**31)) if start else seed)
     try:
         day_s = case.design.accuracy.day_s
         return recalled(manoeuvres_worth_adding, problem, accuracy, settings, day_s, progress=progress)
