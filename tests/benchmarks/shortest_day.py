@@ -1,7 +1,8 @@
 """The shortest day of the accuracy that the optimal durations in total_s would have, beside their own plan.
 
-``python tests/benchmarks/shortest_day.py [SCENARIO.toml ...] [--seed N] [--charts FOLDER] [--alone]``; each scenario is
-planned as it is and with ``[design.accuracy]`` added, both with the same seed; with ``--alone`` only the latter.
+``python tests/benchmarks/shortest_day.py [SCENARIO.toml ...] [--seed N] [--charts FOLDER] [--alone] [--starts N]``;
+each scenario is planned as it is and with ``[design.accuracy]`` added, both with the same seed; with ``--alone`` only
+the latter. With ``--starts`` it is the shortest of so many searches, made one after another here.
 Information is that of the whole track as a share of what is needed. The median and the 95th percentile are of the 500
 drawn trials that end at the goal. The bound is that on every day of the class that day.json describes. With
 ``--charts`` the real charts of `planner.py` that the folder holds are planned on instead.
@@ -42,14 +43,14 @@ def processor_s() -> float:
     return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
-def compared(path: Path, seed: int, ways: tuple[str, ...]) -> None:
+def compared(path: Path, seed: int, ways: tuple[str, ...], starts: int) -> None:
     """Print a row for each way to plan a scenario."""
     first_s = None
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(shutil.copytree(path.parent, Path(folder) / "scenarios")) / path.name
         for what in ways:
             if what != "total_s":
-                copy.write_text(path.read_text("utf-8") + ASKED, "utf-8")
+                copy.write_text(f"{path.read_text('utf-8')}{ASKED}starts = {starts}\n", "utf-8")
             plan, summary, seconds = planned(copy, Path(folder) / what, seed)
             day_s, median_s, most_s = days(plan, summary)
             if what == "total_s":
@@ -70,6 +71,7 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--charts", type=Path)
     parser.add_argument("--alone", action="store_true")
+    parser.add_argument("--starts", type=int, default=1)
     asked = parser.parse_args()
     print(
         "| scenario | seed | planned for | day | median | 95 % | in runs | information | of the plan | over the bound ",
@@ -79,4 +81,5 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as drawn:
         given = asked.scenarios or [SCENARIOS / f"{name}.toml" for name in ("story", "helsinki")]
         for scenario in charted(asked.charts, Path(drawn)) if asked.charts else given:
-            compared(scenario, asked.seed, ("shortest day",) if asked.alone else ("total_s", "shortest day"))
+            ways = ("shortest day",) if asked.alone else ("total_s", "shortest day")
+            compared(scenario, asked.seed, ways, asked.starts)
