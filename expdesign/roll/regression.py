@@ -154,7 +154,7 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     """Estimate by averaged periodograms of whitened residuals (k,) of each run of one case.
 
     Whitening before keeps a narrow peak, and the zero at frequency zero, from leaking into what lies beside them. The
-    segments are as long as some degrees of freedom allow, so that the resolution grows with the record.
+    segments are as long as some degrees of freedom allow; resolution and freedom grow with the record.
 
     Source: P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967), 70-73; R. B. Blackman and J. W. Tukey, The
     Measurement of Power Spectra (1958), for whitening before.
@@ -179,8 +179,10 @@ def cross_spectrum(first: Sequence[Array], second: Sequence[Array]) -> Array:
 
 
 def _segments(signals: Sequence[Array]) -> list[int]:
-    """Samples of a segment in each run."""
-    return [min(len(e), sum(map(len, signals)) // TUNING.spectral_segments) for e in signals]
+    """Samples of a segment in each run: resolution and degrees of freedom both grow with the root of the record."""
+    total = sum(map(len, signals))
+    count = max(TUNING.spectral_segments, round(float(np.sqrt(total / TUNING.samples_per_segment))))
+    return [min(len(e), total // count) for e in signals]
 
 
 def _freedom(segments: int) -> float:

@@ -24,7 +24,8 @@ class Tuning:
         lags: of each simulated signal among the instruments.
         rudder_lags: of the rudder's difference.
         noise_order: of the autoregression in the noise model of a case.
-        spectral_segments: lengths of a segment in all runs of a case, where spectra of residuals are estimated.
+        spectral_segments: least number of segments in all runs of a case, where spectra of residuals are estimated.
+        samples_per_segment: there are as many segments as the root of all samples over this.
         least_density: of that of its peak, in such a spectrum, below which no frequency weighs more.
         noise_ratios: of the noise of roll rates to that of other signals, as they enter the equation, that are tried.
         repeated: share of variance below which a combination of instruments repeats others.
@@ -58,6 +59,7 @@ class Tuning:
     rudder_lags: int = 2
     noise_order: int = 12
     spectral_segments: int = 4
+    samples_per_segment: float = 1600.0
     least_density: float = 1e-14
     noise_ratios: tuple[float, ...] = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
     repeated: float = 1e-10
