@@ -78,9 +78,9 @@ def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: fl
 def test_a_wrong_model_alone_is_not_taken_for_feedback() -> None:
     """The drag is linear, the model's quadratic: past inputs take up what is wrong."""
     quadratic = replace(MODEL, terms=(Term("u", "X_u", "u*abs(u)"), MODEL.terms[1]), parameters=np.array([-0.05, 0.02]))
-    calm = [sailed(3000 + seed, 400, steered=np.zeros(400)) for seed in range(100)]
+    calm = [sailed(3000 + seed, 400, steered=np.zeros(400)) for seed in range(60)]
     found = chances([estimate(trial, quadratic) for trial in calm])
-    assert (found < 0.05).mean() < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 100)
+    assert (found < 0.05).mean() < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 60)
 
 
 def test_marked_samples_are_not_suspected() -> None:

@@ -161,7 +161,7 @@ def test_damping_and_coriolis_are_one_unless_the_ship_goes_astern(turned: Voyage
 
 
 def test_halves_of_a_poor_voyage_disagree_and_those_of_a_rich_one_do_not(turned: Voyage) -> None:
-    rich = measured(harbour(seconds=800.0, seed=5), count=1, seed=6, every=4)
+    rich = measured(harbour(seconds=500.0, seed=5), count=1, seed=6, every=4)
     poor = measured(turned, count=1, seed=6, every=4)
     known = [FULL.parameters.index(name) for name in ("I_r", "N_rv", "A")]
     differ = []

@@ -20,7 +20,7 @@ from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
-FEW = GrowSettings(families=("zigzag", "telegraph"), pool=8, rounds=3, seed=1)
+FEW = GrowSettings(families=("zigzag", "telegraph"), pool=8, rounds=2, seed=1)
 
 
 @pytest.fixture(scope="module")
