@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.accuracy.simulated_fit import accuracy, clipped
 from expdesign.diagnosis.accuracy.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -27,3 +28,12 @@ def test_errors_of_simulations_that_hold_are_not_touched():
     measured = rng.standard_normal((3, 50, 2))
     error = rng.standard_normal((3, 50, 2))
     np.testing.assert_array_equal(clipped(error, measured), error)
+
+
+def test_a_diagnosis_says_that_the_model_diverges_and_how_it_begins():
+    """Anti-damping of 0.3 per second, where the vessel file allows damping: what is fitted to short windows holds."""
+    record, ship = hidden_record("barge", seed=1, batches=2, samples=150), vessel_of("barge", relative_std=0.5)
+    wild = replace(ship, model=ship.model.with_parameters({"N_r": 0.3}))
+    (note,) = (note for note in diagnose(wild, record).notes if "diverges" in note)
+    assert "begins with the model re-estimated within its standard deviations" in note
+    assert not any("diverges" in note for note in diagnose(ship, record).notes)

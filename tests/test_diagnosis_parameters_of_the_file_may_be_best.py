@@ -30,7 +30,8 @@ def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
             beside += 1
             np.testing.assert_array_equal(found.extended.model.parameters, vessel.model.parameters)
             np.testing.assert_array_equal(found.extended.model.parameter_std, vessel.model.parameter_std)
-    assert beside >= 1  # in the other trials, parameters fitted with the fault simulate no worse than the file's
+    # the file's parameters have to be better for certain, as they are with seeds 2, 4 and 6 of 1 to 6
+    assert beside >= 1
 
 
 def held_out(ship, windows):

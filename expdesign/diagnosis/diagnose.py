@@ -21,6 +21,7 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,
     finding_of,
+    note_on_divergence,
     note_on_nuisance,
     note_on_random_current,
     note_on_stretches,
@@ -158,6 +159,7 @@ def diagnose(
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
+            *note_on_divergence(before, windows, re_estimated=begun is not ship),
             *_notes_on_selection(chosen, unit, seed),
             *not_written,
         ),

@@ -2,6 +2,7 @@
 
 from expdesign.diagnosis.conclusions.findings import error_reductions_of, finding_of
 from expdesign.diagnosis.conclusions.notes import (
+    note_on_divergence,
     note_on_nuisance,
     note_on_random_current,
     note_on_stretches,
@@ -31,6 +32,7 @@ __all__ = [
     "has_diverged",
     "manoeuvre",
     "missing_effect",
+    "note_on_divergence",
     "note_on_nuisance",
     "note_on_random_current",
     "note_on_stretches",

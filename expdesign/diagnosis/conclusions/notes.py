@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import rounded
-from expdesign.diagnosis.conclusions.verdict import missing_effect
+from expdesign.diagnosis.conclusions.verdict import has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
 from expdesign.diagnosis.select import SELECTION_TUNING, Selection
@@ -47,6 +48,24 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file has no parameter_std. Its parameters count as known.")
     return tuple(notes)
+
+
+def note_on_divergence(before: Accuracy, windows: Windows, *, re_estimated: bool) -> tuple[str, ...]:
+    """What is done about a model that cannot be simulated over whole runs.
+
+    Args:
+        before: accuracy of the model in use.
+        windows: the data as compared.
+        re_estimated: the search began with the model re-estimated, instead of as it is.
+    """
+    if not has_diverged(before):
+        return ()
+    begin = "re-estimated within its standard deviations in windows that grow" if re_estimated else "as it is"
+    return (
+        "Simulated over whole runs, the model in use diverges from the ship. So data and simulation are compared in "
+        f"windows of {windows.steps * windows.step_s:.0f} s, each simulated from its first measured state, and the "
+        f"search for causes begins with the model {begin}.",
+    )
 
 
 def note_on_random_current(noise: Noise) -> tuple[str, ...]:
