@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import mean_current
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import estimate
@@ -218,6 +218,14 @@ def test_a_shorter_horizon_agrees_with_whole_runs() -> None:
     short = estimate(data, NOMINAL, method="oe", settings=Settings(horizon_s=60.0))
     assert (np.abs(short.values - truth(short.names)) < 4.5 * short.std).all()
     assert (np.abs(short.values - whole.values) < 4.5 * short.std).all()
+
+
+def test_a_model_whose_slopes_overflow_is_no_answer(capfd: pytest.CaptureFixture[str]) -> None:
+    """Held so, the yaw rate grows to 1e150 within 15 s: squares of errors are numbers still, those of slopes are not."""
+    wild = NOMINAL.with_parameters({"N_r": 5.8})
+    with pytest.raises(NoAnswer, match="diverges within 15 s"):
+        estimate(trials(TRUE, seeds=(1,), samples=60), wild, method="oe", settings=Settings(fixed=("N_r",)))
+    assert capfd.readouterr().err == ""
 
 
 def test_a_steady_force_nobody_recorded_is_found_and_leaves_the_parameters_alone() -> None:

@@ -38,16 +38,16 @@ def minimised(
         told: of every step.
 
     Raises:
-        NoAnswer: the model to begin with diverges.
+        NoAnswer: the model to begin with diverges, or its derivatives do.
     """
     damping = 1e-4
     before: list[tuple[Point, Move]] = []
     with np.errstate(over="ignore", invalid="ignore"):
         point = _point(problem, values, starts)
-        if not np.isfinite(point.cost):
-            raise NoAnswer(_RUNS_AWAY.format(seconds=len(point.states) * problem.compiled.stretches.sample_time_s))
+        _check_bounded(problem, np.array(point.cost))
         for _ in range(TUNING.most_steps):
             normal, least = _normal(problem, point.values, point.states), settled * unit(problem, point.states)
+            _check_bounded(problem, normal.S, normal.C, normal.V)
             newer = None
             while newer is None:
                 move = _step(normal, damping)
@@ -59,6 +59,12 @@ def minimised(
             before = [*before, (point, move)][-TUNING.remembered_steps :]
             point = newer
     return point.values, point.starts
+
+
+def _check_bounded(problem: Problem, *parts: Array) -> None:
+    """Raise NoAnswer unless all are finite: a simulation may stay just below what a float holds, its slopes beyond."""
+    if not all(np.isfinite(part).all() for part in parts):
+        raise NoAnswer(_RUNS_AWAY.format(seconds=len(problem.measured) * problem.compiled.stretches.sample_time_s))
 
 
 @dataclass(frozen=True, eq=False)
