@@ -221,7 +221,7 @@ def test_a_shorter_horizon_agrees_with_whole_runs() -> None:
 
 
 def test_a_model_whose_slopes_overflow_is_no_answer(capfd: pytest.CaptureFixture[str]) -> None:
-    """Held so, the yaw rate grows to 1e150 within 15 s: squares of errors are numbers still, those of slopes are not."""
+    """Held so, the yaw rate grows to 1e150 in 15 s: squares of errors are numbers still, those of slopes are not."""
     wild = NOMINAL.with_parameters({"N_r": 5.8})
     with pytest.raises(NoAnswer, match="diverges within 15 s"):
         estimate(trials(TRUE, seeds=(1,), samples=60), wild, method="oe", settings=Settings(fixed=("N_r",)))
