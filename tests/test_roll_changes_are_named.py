@@ -84,6 +84,13 @@ def test_a_load_is_written_into_the_file_as_a_mass_at_a_height() -> None:
     assert "kg on board at a height of 0.2" in roll_sentences(RollTold(judgement=told))[0]
 
 
+def test_a_run_that_is_too_short_is_left_out() -> None:
+    run = measured(SHIP, NOMINAL, 9100, 2000)
+    short = replace(run, signals=run.signals[:60])
+    one, both = (judge_roll(KNOWN, runs, beam_m=SHIP.beam_m).p_value for runs in ([run], [run, short]))
+    assert one == both
+
+
 def known_file(folder: Path) -> Path:
     """The vessel file without the standard deviations of its roll."""
     path = folder / "ship.toml"

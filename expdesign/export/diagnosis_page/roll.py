@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from expdesign.export.files import plus_minus
-from expdesign.roll import G_MPS2, UNITS
-from expdesign.roll.record import ALARM_P, CAUSES, LOAD, RollChange, RollJudgement
+from expdesign.export.roll_words import change_words, stability_words
+from expdesign.roll import UNITS
+from expdesign.roll.record import RollChange, RollJudgement
 from expdesign.vessel import Vessel
 
 UNCHANGED = "She rolls as her file says"
@@ -60,34 +61,14 @@ def _sentences(found: RollJudgement) -> Iterator[str]:
 
 
 def _words(found: RollJudgement, change: RollChange) -> str:
-    return ", and ".join(
-        _cause(found, change, *one) for one in zip(change.causes, change.sizes, change.stds, strict=True)
-    )
-
-
-def _cause(found: RollJudgement, change: RollChange, cause: str, size: float, std: float) -> str:
-    if cause != LOAD:
-        value = found.pendulum.parameters[cause]
-        share = f" ({100 * size / abs(value):+.3g} %)" if value else ""
-        return f"{CAUSES[cause]}, {cause} by {plus_minus(size, std)} {UNITS[cause]}{share}"
-    assert change.load is not None
-    mass, height = change.load
-    on = "on board" if mass > 0 else "taken off"
-    return (
-        f"{CAUSES[LOAD]}, a moment about the rotation axis of {plus_minus(-size, std)} kg m upwards, as of "
-        f"{abs(mass):.3g} kg {on} at a height of {height:.3g} m"
-    )
+    values = found.pendulum.parameters
+    return change_words(change.causes, change.sizes, change.stds, load=change.load, values=values)
 
 
 def _stability(found: RollJudgement, change: RollChange) -> str:
     before = found.pendulum
-    mass = before.body.mass_kg + before.load.mass_kg
-    after = mass + (change.load[0] if change.load is not None else 0.0)
-    heights = f"{before.metacentric_height_m:.3g} to {change.righting_nm / (G_MPS2 * after):.3g} m"
-    return (
-        f"Her righting moment goes from {before.righting_nm:.4g} to {change.righting_nm:.4g} N m/rad "
-        f"({100 * (change.righting_nm / before.righting_nm - 1):+.3g} %), her metacentric height from {heights}."
-    )
+    mass_kg = before.body.mass_kg + before.load.mass_kg
+    return stability_words(before.righting_nm, change.righting_nm, mass_kg=mass_kg, load=change.load)
 
 
 def roll_entry(told: RollTold | None) -> dict[str, Any]:
@@ -100,7 +81,7 @@ def roll_entry(told: RollTold | None) -> dict[str, Any]:
         entry |= {
             "p_value": found.p_value,
             "changed": found.changed,
-            "alarm_below": ALARM_P,
+            "alarm_below": found.alarm_p,
             "explanations": [_change(one) for one in found.changes],
             "estimate": {
                 name: {"value": found.estimate.values[name], "std": std} for name, std in found.estimate.std.items()

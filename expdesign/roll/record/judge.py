@@ -85,32 +85,37 @@ class RollJudgement:
         pendulum: of the file.
         estimate: of the five parameters that one record determines, K_vd and z_f as in the file.
         p_value: chance of as large a difference where nothing changed.
+        alarm_p: chance below which a change is certain.
         changes: explanations with as few causes as explain it, the best first; none where nothing changed for certain.
     """
 
     pendulum: RollPendulum
     estimate: RollEstimate
     p_value: float
+    alarm_p: float
     changes: tuple[RollChange, ...]
 
     @property
     def changed(self) -> bool:
         """Whether a change is certain."""
-        return self.p_value < ALARM_P
+        return self.p_value < self.alarm_p
 
 
-def judge_roll(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float) -> RollJudgement:
+def judge_roll(
+    pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float, alarm_p: float = ALARM_P
+) -> RollJudgement:
     """The judgement of a record.
 
     Args:
         pendulum: of the vessel file, with the load that was on board.
-        runs: at one load.
+        runs: at one load; those that are too short are left out, if others are not.
         beam_m: of the ship.
+        alarm_p: chance of a change that is told where there is none.
 
     Raises:
         InputError, NotInformative: the record tells nothing that may be believed, and why.
     """
-    estimate = _estimate(pendulum, runs, beam_m)
+    estimate = record_estimate(pendulum, runs, beam_m=beam_m)
     problem, load = estimate.problem, pendulum.load
     stated = np.array([pendulum.parameters.get(name, 0.0) for name in PARAMETERS])
     file, found = coefficients(stated, problem.body, load), coefficients(estimate.theta, problem.body, load)
@@ -120,7 +125,7 @@ def judge_roll(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float) ->
     differ = scipy.linalg.solve_triangular(root, found.values - file.values, lower=True)
     p_value = _chance(float(differ @ differ), len(differ), estimate.freedom)
     changes: tuple[RollChange, ...] = ()
-    for count in range(1, MOST_CAUSES + 1) if p_value < ALARM_P else ():
+    for count in range(1, MOST_CAUSES + 1) if p_value < alarm_p else ():
         all_ = (
             _explained(pendulum, stated, found.values, root, causes, estimate.freedom)
             for causes in combinations(CAUSES, count)
@@ -130,7 +135,7 @@ def judge_roll(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float) ->
         if changes:
             break
     best = [one for one in changes if _price(one) < _price(changes[0]) + ALIKE]
-    return RollJudgement(pendulum=pendulum, estimate=estimate, p_value=p_value, changes=tuple(best))
+    return RollJudgement(pendulum=pendulum, estimate=estimate, p_value=p_value, alarm_p=alarm_p, changes=tuple(best))
 
 
 def _chance(total: float, numbers: int, freedom: float) -> float:
@@ -144,7 +149,7 @@ def _price(change: RollChange) -> float:
     return change.left + 2.0 * (len(change.causes) + (LOAD in change.causes))
 
 
-def _estimate(pendulum: RollPendulum, runs: Sequence[Run], beam_m: float) -> RollEstimate:
+def record_estimate(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float) -> RollEstimate:
     """By instruments from the rudder, with what one record cannot tell as in the file.
 
     Raises:
@@ -152,10 +157,12 @@ def _estimate(pendulum: RollPendulum, runs: Sequence[Run], beam_m: float) -> Rol
     """
     if not np.isfinite(pendulum.period_s):
         raise InputError("[roll] is of a ship that does not stay upright, expected one that does")
-    cases, roll_hz = (Case(name="the record", load=pendulum.load, runs=tuple(runs)),), 1.0 / pendulum.period_s
+    roll_hz, case = 1.0 / pendulum.period_s, Case(name="the record", load=pendulum.load, runs=tuple(runs))
+    filter_ = low_pass((case,), roll_hz=roll_hz)
+    long = tuple(run for run in runs if len(run.signals) >= filter_.least_samples)
     start = dict(pendulum.parameters)
     known = {name: start.pop(name) for name in ("K_vd", "z_f")}
-    ready = prepared(cases, low_pass(cases, roll_hz=roll_hz))
+    ready = prepared((replace(case, runs=long or case.runs),), filter_)
     problem = build_problem(pendulum.body, ready, beam_m=beam_m, roll_hz=roll_hz, known=known, start=start)
     found = estimate_roll(problem)
     if not found.trusted:
