@@ -113,6 +113,7 @@ class RollPendulum:
         parameter_std: standard deviations; 0, for known, where there is none.
         parameter_correlation: of pairs of them, by their names; 0 where there is none.
         waves: that roll the ship in simulated trials; None for still water.
+        heel_max_rad: that plans keep to, infinite for none.
     """
 
     body: Body
@@ -121,6 +122,7 @@ class RollPendulum:
     parameter_std: Mapping[str, float] = field(default_factory=dict, hash=False)
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict, hash=False)
     waves: Waves | None = None
+    heel_max_rad: float = math.inf
 
     def __post_init__(self) -> None:
         if set(self.parameters) != set(ROLL_PARAMETERS):
