@@ -1,13 +1,17 @@
 """A simulation that runs away is told in words, with numbers that stay numbers."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.accuracy.simulated_fit import accuracy, clipped
 from expdesign.diagnosis.accuracy.tuning import TUNING
+from expdesign.diagnosis.conclusions import note_on_divergence
+from expdesign.diagnosis.data import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
 
 
@@ -37,3 +41,15 @@ def test_a_diagnosis_says_that_the_model_diverges_and_how_it_begins():
     (note,) = (note for note in diagnose(wild, record).notes if "diverges" in note)
     assert "begins with the model re-estimated within its standard deviations" in note
     assert not any("diverges" in note for note in diagnose(ship, record).notes)
+
+
+@pytest.mark.parametrize(
+    ("uncertain", "why"),
+    [(True, "its parameters re-estimated .* diverge too"), (False, "nothing .* has a standard deviation")],
+)
+def test_a_diagnosis_says_why_it_begins_with_a_model_that_diverges(uncertain: bool, why: str):
+    record, ship = hidden_record("barge", seed=1, batches=2, samples=150), vessel_of("barge")
+    wild = extended_model(replace(ship, model=ship.model.with_parameters({"N_r": 2.0})), record)
+    short = cut_windows(ship.model, record, longest_s=12.0)
+    (note,) = note_on_divergence(accuracy(wild, record), short, re_estimated=False, uncertain=uncertain)
+    assert re.search(f"begins with the model as it is, because {why}", note)

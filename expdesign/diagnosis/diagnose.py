@@ -40,6 +40,7 @@ from expdesign.diagnosis.fit import (
     HeldOut,
     held_out_gain,
     judged,
+    uncertain_keys,
     unmeasured_force_share,
     with_longer_windows,
     within_stated_std,
@@ -159,7 +160,7 @@ def diagnose(
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
-            *note_on_divergence(before, windows, re_estimated=begun is not ship),
+            *note_on_divergence(before, windows, re_estimated=begun is not ship, uncertain=bool(uncertain_keys(ship))),
             *_notes_on_selection(chosen, unit, seed),
             *not_written,
         ),

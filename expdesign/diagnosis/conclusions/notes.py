@@ -50,17 +50,26 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
     return tuple(notes)
 
 
-def note_on_divergence(before: Accuracy, windows: Windows, *, re_estimated: bool) -> tuple[str, ...]:
+def note_on_divergence(before: Accuracy, windows: Windows, *, re_estimated: bool, uncertain: bool) -> tuple[str, ...]:
     """What is done about a model that cannot be simulated over whole runs.
 
     Args:
         before: accuracy of the model in use.
         windows: the data as compared.
         re_estimated: the search began with the model re-estimated, instead of as it is.
+        uncertain: something in the vessel file has a standard deviation.
     """
     if not has_diverged(before):
         return ()
-    begin = "re-estimated within its standard deviations in windows that grow" if re_estimated else "as it is"
+    begin = "as it is"
+    if re_estimated:
+        begin = "re-estimated within its standard deviations in windows that grow"
+    elif windows.steps * windows.step_s < AHEAD_S:
+        begin += (
+            ", because its parameters re-estimated within their standard deviations diverge too"
+            if uncertain
+            else ", because nothing in the vessel file has a standard deviation to re-estimate it within"
+        )
     return (
         "Simulated over whole runs, the model in use diverges from the ship. So data and simulation are compared in "
         f"windows of {windows.steps * windows.step_s:.0f} s, each simulated from its first measured state, and the "

@@ -24,6 +24,7 @@ from expdesign.diagnosis.fit.fit import (
     likeliest,
     log_likelihood_gain,
     profile_cost,
+    uncertain_keys,
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
@@ -72,6 +73,7 @@ __all__ = [
     "prediction_gain",
     "profile_cost",
     "sensitivities_to",
+    "uncertain_keys",
     "unmeasured_force_share",
     "validation_units",
     "window_information",

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.estimation.noise import Fitted, Stretch, coupled_covariance, fit_coupled, stretches
-from expdesign.estimation.output_error.gauss_newton import regular
+from expdesign.estimation.output_error.gauss_newton import regular, runs_away
 from expdesign.estimation.output_error.problem import Problem
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, Regression, headings_at
 from expdesign.estimation.solve import Solution, Weighting, changing_variance, misfit_note, solve_ls, widening
@@ -45,6 +45,9 @@ def with_covariance(
     """A last Gauss-Newton step as a least-squares problem, with its covariance and null space.
 
     Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
+
+    Raises:
+        NoAnswer: the model grows so fast that what the starts make up for cannot be told.
     """
     simulated, seen = _linearised(problem, values, starts), np.isfinite(problem.measured)
     batch, step, order = _places(problem)
@@ -120,7 +123,10 @@ def _linearised(problem: Problem, values: Array, starts: Array) -> _Linearised:
     weights = np.where(np.isfinite(problem.measured), problem.weights, 0.0)
     weighted = by_start * weights[..., None]
     S, C = (np.einsum("lwna,lwnb->wab", weighted, rows, optimize=True) for rows in (by_start, slopes))
-    near = np.linalg.solve(regular(S), C)
+    try:
+        near = np.linalg.solve(regular(S), C)
+    except np.linalg.LinAlgError:  # one growing motion hides all others of a start
+        raise runs_away(problem) from None
     for sample in range(length):  # in place: these are the largest arrays
         slopes[sample] -= by_start[sample] @ near
     return _Linearised(_between_readings(problem, states), slopes, steps[1:])

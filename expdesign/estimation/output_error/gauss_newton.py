@@ -64,7 +64,12 @@ def minimised(
 def _check_bounded(problem: Problem, *parts: Array) -> None:
     """Raise NoAnswer unless all are finite: a simulation may stay just below what a float holds, its slopes beyond."""
     if not all(np.isfinite(part).all() for part in parts):
-        raise NoAnswer(_RUNS_AWAY.format(seconds=len(problem.measured) * problem.compiled.stretches.sample_time_s))
+        raise runs_away(problem)
+
+
+def runs_away(problem: Problem) -> NoAnswer:
+    """That the best model found diverges within a stretch."""
+    return NoAnswer(_RUNS_AWAY.format(seconds=len(problem.measured) * problem.compiled.stretches.sample_time_s))
 
 
 @dataclass(frozen=True, eq=False)
