@@ -54,6 +54,12 @@ class Sea:
     damping: float = 0.1
 
 
+LITTLE = Sea(roll_rate=0.002, sensed=0.005, yaw_rate=0.002, moment=0.01, frequency_hz=0.8, damping=0.3)
+ROUGH = parameters(k=9, A_x=0.5, d=0.1, K_r=-0.4, K_vd=1, K_delta=-0.4, z_f=-0.018, m=0.1, z_m=-0.2)
+"""Where searches begin, and typical sizes of the parameters."""
+SIZES = np.array([10, 0.2, 0.3, 2, 1, 0.5, 0.03, 0.3, 0.3])
+
+
 def switching(count: int, hold: int, rng: np.random.Generator, *, levels: tuple[float, ...] = (-1.0, 1.0)) -> Array:
     """A rudder (k,) that takes one of the levels at random for so many samples each."""
     return np.repeat(rng.choice(levels, size=count // hold + 1), hold)[:count]

@@ -300,6 +300,8 @@ def test_every_command_explains_itself(name: str, capsys: pytest.CaptureFixture[
     assert f"expdesign {name}" in told
     assert "--out" in told
     assert "--json" in told
+    named = {"roll": "[roll]", "incline": "[roll]", "durations": "[design.grow]"}
+    assert named.get(name, "") in told  # no markup that is left out
 
 
 def test_help_loads_no_solver() -> None:

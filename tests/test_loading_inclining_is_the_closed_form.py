@@ -43,9 +43,18 @@ def test_four_shifts_halve_the_error_and_no_decay_leaves_the_inertia_open() -> N
     assert one.inertia_std_kgm2 == np.inf
 
 
-def test_nothing_that_is_not_positive_is_taken() -> None:
-    with pytest.raises(InputError, match="shift_m is 0, expected more than 0"):
-        inclining(**{**TEST, "shift_m": 0.0}, heel_std_rad=1e-4)
+@pytest.mark.parametrize(
+    ("name", "value", "line"),
+    [
+        ("shift_m", 0.0, "shift_m is 0, expected more than 0"),
+        ("period_std_s", -0.1, "period_std_s is -0.1, expected more than 0"),
+        ("mass_kg", 4e6, "mass_kg is 4e\\+06, expected a weight on board, of less than all 3.7e\\+06 kg"),
+        ("shift_m", 100.0, "20000 kg shifted by 100 m heel the ship by 23 degrees, expected 10 or less"),
+    ],
+)
+def test_what_is_no_inclining_test_is_not_taken(name: str, value: float, line: str) -> None:
+    with pytest.raises(InputError, match=line):
+        inclining(**{**TEST, "heel_std_rad": 1e-4, name: value})
 
 
 def inclined(*more: str, vessel: Path = ROLL_MODEL) -> int:

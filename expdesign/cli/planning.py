@@ -56,7 +56,7 @@ def durations(
     out: Out = None,
     grow: Annotated[
         bool,
-        typer.Option("--grow", help="Also search for manoeuvres to add, as the table [design.grow] does."),
+        typer.Option("--grow", help="Also search for manoeuvres to add, as the table \\[design.grow] does."),
     ] = False,
     monte_carlo: Annotated[
         int,
@@ -230,7 +230,7 @@ def roll_plan(
 ) -> Asked:
     """Choose known loads, and manoeuvres at each, that tell most about roll and an unknown load.
 
-    The vessel file has [roll]; parameters with a standard deviation there are sought. Writes roll-plan.html and
+    The vessel file has a table of roll, whose uncertain parameters are sought. Writes roll-plan.html and
     roll-plan.json, loads.toml for expdesign roll, and durations-N.json of each load case for expdesign plan. Ends with
     status 3 where no candidate tells a combination of the parameters, and names it.
 

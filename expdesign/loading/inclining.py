@@ -18,6 +18,9 @@ from dataclasses import dataclass
 from expdesign.errors import InputError
 from expdesign.vessel.masses import G_MPS2
 
+MOST_HEEL_RAD = math.radians(10.0)
+"""Beyond which righting moments are not those of the metacentric height; rules ask for 4 degrees at most."""
+
 
 def heel_of_shift(*, mass_kg: float, shift_m: float, displacement_kg: float, metacentric_height_m: float) -> float:
     """Heel [rad] of a mass shifted across the ship; positive towards it."""
@@ -59,18 +62,26 @@ def inclining(
         shifts: how often the mass is shifted and heel read, each with an error of its own.
 
     Raises:
-        InputError: a quantity is not positive.
+        InputError: a quantity is not positive, the mass is not a part of the ship, or the heel is too large.
     """
     given = {
         "mass_kg": mass_kg, "shift_m": shift_m, "displacement_kg": displacement_kg, "period_s": period_s,
         "metacentric_height_m": metacentric_height_m, "heel_std_rad": heel_std_rad, "shifts": shifts,
+        "period_std_s": period_std_s,
     }  # fmt: skip
     for name, value in given.items():
-        if not 0 < value < math.inf:
+        if not (0 < value < math.inf or (name == "period_std_s" and value == math.inf)):
             raise InputError(f"{name} is {value:g}, expected more than 0")
+    if not mass_kg < displacement_kg:
+        raise InputError(f"mass_kg is {mass_kg:g}, expected a weight on board, of less than all {displacement_kg:g} kg")
     heel = heel_of_shift(
         mass_kg=mass_kg, shift_m=shift_m, displacement_kg=displacement_kg, metacentric_height_m=metacentric_height_m
     )
+    if heel > MOST_HEEL_RAD:
+        raise InputError(
+            f"{mass_kg:g} kg shifted by {shift_m:g} m heel the ship by {math.degrees(heel):.0f} degrees, expected "
+            f"{math.degrees(MOST_HEEL_RAD):.0f} or less, where metacentric height tells the heel"
+        )
     height_share = heel_std_rad / math.sqrt(shifts) / (math.sin(heel) * math.cos(heel))
     inertia = displacement_kg * G_MPS2 * metacentric_height_m * (period_s / (2.0 * math.pi)) ** 2
     return Inclining(

@@ -18,6 +18,7 @@ from expdesign.monitoring.changes import Change, watched_changes
 from expdesign.monitoring.cusum import estimates, threshold, watch
 from expdesign.monitoring.evidence import KINDS, Grams, grams_of, joined, stretch_length
 from expdesign.monitoring.load import calls_of
+from expdesign.monitoring.rolled import RollEvent, RollWatch, restored_roll, roll_learnt, roll_watched
 from expdesign.monitoring.saved import restored_alarm, restored_calibration, restored_changes, restored_state, saved
 from expdesign.monitoring.state import Alarm, Call, Rules, State, Step
 from expdesign.monitoring.tuning import TUNING
@@ -30,6 +31,8 @@ __all__ = [
     "Call",
     "Change",
     "Grams",
+    "RollEvent",
+    "RollWatch",
     "Rules",
     "State",
     "Step",
@@ -41,7 +44,10 @@ __all__ = [
     "restored_alarm",
     "restored_calibration",
     "restored_changes",
+    "restored_roll",
     "restored_state",
+    "roll_learnt",
+    "roll_watched",
     "saved",
     "stretch_length",
     "threshold",

@@ -144,6 +144,7 @@ class Verification:
         reproduction_error_m: largest distance between the track and the re-simulated commands [m].
         limit_excess: largest violation of an actuator limit or rate, relative to its range.
         problems: one sentence for each failed check; empty when the plan is verified.
+        heel_max_rad: largest roll angle of the re-simulated commands, in still water; None without [roll].
     """
 
     clearance_min_m: float
@@ -151,6 +152,7 @@ class Verification:
     reproduction_error_m: float
     limit_excess: float
     problems: tuple[str, ...]
+    heel_max_rad: float | None = None
 
     @property
     def verified(self) -> bool:

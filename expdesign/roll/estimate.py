@@ -137,6 +137,7 @@ class RollEstimate:
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
         unanswered: how often a rudder that answers nothing goes with what rolls the ship as much as this one, 0 to 1;
             nan for least squares and a ship that does not stay upright.
+        freedom: degrees of freedom of the noise's power, of the case with the fewest, at each frequency.
     """
 
     problem: RollProblem
@@ -151,6 +152,7 @@ class RollEstimate:
     strength: float
     surprise: float
     unanswered: float
+    freedom: float
 
     def __post_init__(self) -> None:
         seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c")
@@ -228,6 +230,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         strength=_strength(problem, weighted, theta, sensed, covariance) if method == "iv" else float("nan"),
         surprise=_surprise(left, len(problem.free) - len(held)),
         unanswered=_unanswered(problem, weighted, theta, sensed) if method == "iv" else float("nan"),
+        freedom=min(spectrum(residuals).freedom for residuals in _noise(problem, weighted, theta)),
     )
 
 

@@ -3,10 +3,11 @@
 Noise of the equation knows nothing of a rudder that was set beforehand, neither of what it did nor of what it will do.
 A rudder that answers roll goes with the noise somewhat later:
 
-    h = sum over cases of W' (y - X c(theta)),          W: the rudder some time later, weighed as instruments are
+    h = sum over cases of W' (y - X c(theta)),          W: changes of the rudder some time later, weighed as instruments
 
-With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h has the chi-square distribution if nothing
-answers.
+With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h is distributed as chi-square if nothing
+answers. Changes, as the equation takes them: the rudder itself would weigh frequency zero most, where noise has its
+zero and no spectrum tells how much is left.
 
 Source: L. Ljung, System Identification (1999), 16.6, for residuals that go with later inputs; L. P. Hansen,
 Econometrica 50 (1982), 1029-1054, for the covariance of moments at an estimate.
@@ -20,7 +21,7 @@ import numpy as np
 import scipy
 
 from expdesign.roll.instruments import Weighted
-from expdesign.roll.regression import Spectrum, spectrum, without_start
+from expdesign.roll.regression import Spectrum, difference, spectrum, without_start
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array
@@ -61,11 +62,11 @@ def chance_of_answers(
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:
-    """(n, l) of each run: the rudder up to a period of roll later, as it will be, and then as at the end."""
+    """(n, l) of each run: changes of the rudder up to a period of roll later, as they will be, and then as the last."""
     first = TUNING.left_out_samples
     result = []
     for run in case.runs:
-        rudder = run.source - run.source.mean()
+        rudder = difference(run.source)
         ahead = np.rint(period / TUNING.leads * np.arange(1, TUNING.leads + 1)).astype(int)
         places = np.minimum(np.arange(len(rudder))[:, None] + ahead, len(rudder) - 1)
         weighed = left.divided(part.noise.whitened(rudder[places])[first:])

@@ -48,6 +48,11 @@ class LowPass:
         return _gain(self.taps, frequency_hz, self.step_s / self.every)
 
     @property
+    def least_samples(self) -> int:
+        """Of a run, before it."""
+        return len(self.taps) + self.every * (TUNING.left_out_samples + TUNING.least_samples)
+
+    @property
     def samples_per_period(self) -> float:
         """Of roll."""
         return 1.0 / (self.roll_hz * self.step_s)
@@ -101,9 +106,10 @@ def prepared(cases: Sequence[Case], filter_: LowPass) -> tuple[Case, ...]:
 
 
 def _prepared(run: Run, filter_: LowPass, name: str) -> Run:
-    least = len(filter_.taps) + filter_.every * (TUNING.left_out_samples + TUNING.least_samples)
-    if len(run.signals) < least:
-        raise NotInformative(f"{name} has a run of {len(run.signals)} samples, expected {least} or more")
+    if len(run.signals) < filter_.least_samples:
+        raise NotInformative(
+            f"{name} has a run of {len(run.signals)} samples, expected {filter_.least_samples} or more"
+        )
     exact = min(TUNING.unwarped_periods * 2.0 / filter_.samples_per_period, TUNING.most_unwarped)
     if len(filter_.taps) == 1:
         return replace(run, unwarped=exact)

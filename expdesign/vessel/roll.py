@@ -96,7 +96,10 @@ NOT_FOLLOWED = (
 
 ROLL_PARAMETERS = ("k", "A_x", "d", "K_r", "K_vd", "K_delta", "z_f")
 """Of a pendulum; see `roll.MEANINGS` and `roll.UNITS`."""
-NOT_ACTING_BACK = "roll, [roll] of the vessel file, is left out here: it does not act back on the ship's path"
+NOT_ACTING_BACK = (
+    "roll, [roll] of the vessel file, is left out here: it does not act back on the ship's path, so that results are "
+    "those without it; diagnose and monitor judge it, expdesign roll estimates it"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +113,7 @@ class RollPendulum:
         parameter_std: standard deviations; 0, for known, where there is none.
         parameter_correlation: of pairs of them, by their names; 0 where there is none.
         waves: that roll the ship in simulated trials; None for still water.
+        heel_max_rad: that plans keep to, infinite for none.
     """
 
     body: Body
@@ -118,6 +122,7 @@ class RollPendulum:
     parameter_std: Mapping[str, float] = field(default_factory=dict, hash=False)
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict, hash=False)
     waves: Waves | None = None
+    heel_max_rad: float = math.inf
 
     def __post_init__(self) -> None:
         if set(self.parameters) != set(ROLL_PARAMETERS):

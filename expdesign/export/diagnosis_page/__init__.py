@@ -2,5 +2,6 @@
 
 from expdesign.export.diagnosis_page.page import diagnosis_html
 from expdesign.export.diagnosis_page.results import diagnosis_json, diagnosis_tables, extended_vessel
+from expdesign.export.diagnosis_page.roll import RollTold, roll_sentences
 
-__all__ = ["diagnosis_html", "diagnosis_json", "diagnosis_tables", "extended_vessel"]
+__all__ = ["RollTold", "diagnosis_html", "diagnosis_json", "diagnosis_tables", "extended_vessel", "roll_sentences"]

@@ -27,6 +27,7 @@ from expdesign.export.diagnosis_page.figures import (
     suspect_figure,
     window_figure,
 )
+from expdesign.export.diagnosis_page.roll import RollTold, roll_sentences
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import cause_title, estimate_words
 from expdesign.export.files import plus_minus
@@ -38,7 +39,9 @@ from expdesign.progress import Progress, silent
 NO_NUMBER = "\N{EN DASH}"
 
 
-def diagnosis_html(found: Diagnosis, *, command: str, version: str, progress: Progress = silent) -> str:
+def diagnosis_html(
+    found: Diagnosis, *, command: str, version: str, roll: RollTold | None = None, progress: Progress = silent
+) -> str:
     """One HTML page without any outside reference."""
     figures = _figures(found, progress)
     page = page_templates("expdesign.export.diagnosis_page").get_template("diagnosis.html")
@@ -54,6 +57,7 @@ def diagnosis_html(found: Diagnosis, *, command: str, version: str, progress: Pr
         tested=[(cause_title(cause), p_value) for cause, p_value in found.screened],
         accuracy=_accuracy(found),
         data=_data(found),
+        roll=roll_sentences(roll),
         figures=figures,
         command=command,
         version=version,

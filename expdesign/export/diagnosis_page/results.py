@@ -8,6 +8,7 @@ from typing import Any
 
 from expdesign.diagnosis import Accuracy, Diagnosis, Finding, Unexplained
 from expdesign.diagnosis.accuracy import Residuals, dependence
+from expdesign.export.diagnosis_page.roll import RollTold, roll_entry, roll_sentences, with_roll
 from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
 
@@ -15,8 +16,8 @@ SMALL = 1e-99
 """p-values below are printed as this bound: they are beyond floating-point accuracy."""
 
 
-def diagnosis_json(found: Diagnosis) -> str:
-    """The whole diagnosis; numbers that are not finite are null."""
+def diagnosis_json(found: Diagnosis, roll: RollTold | None = None) -> str:
+    """The whole diagnosis, with that of roll; numbers that are not finite are null."""
     return strict_json(
         {
             "baseline": accuracy_entry(found.before),
@@ -27,6 +28,7 @@ def diagnosis_json(found: Diagnosis) -> str:
             "tested": [{"cause": cause, "p_value": _finite(p_value)} for cause, p_value in found.screened],
             "notes": [*found.notes, *found.record.notes],
             "residuals": _residuals(found.residuals),
+            **roll_entry(roll),
         }
     )
 
@@ -106,10 +108,11 @@ def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str,
     return ("cause", "estimate", "p", "gain of fit [points]", "not distinguishable from"), rows
 
 
-def extended_vessel(found: Diagnosis, *, command: str) -> str:
+def extended_vessel(found: Diagnosis, *, command: str, roll: RollTold | None = None) -> str:
     """The vessel file with all findings."""
     comments = [f"Extended by a diagnosis: {found.verdict}", *(item.explanation for item in found.findings)]
-    return vessel_toml(found.extended, comments=[*comments, *found.notes, f"Made by: {command}"])
+    comments += roll_sentences(roll)
+    return vessel_toml(with_roll(found.extended, roll), comments=[*comments, *found.notes, f"Made by: {command}"])
 
 
 def _named(outputs: Sequence[str], values: Array) -> dict[str, float | None]:

@@ -78,6 +78,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "drawn_trials": _risk_entry(plan.risk),
             "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
+            **({} if check.heel_max_rad is None else {"heel_max_rad": check.heel_max_rad}),
             "verified": check.verified,
             "verification": {
                 "clearance_time_s": check.clearance_time_s,

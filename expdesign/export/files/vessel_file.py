@@ -140,6 +140,8 @@ def _pendulum(pendulum: RollPendulum) -> Iterator[str]:
     heights: dict[str, str | float] = {
         "mass_kg": body.mass_kg, "mass_height_m": -body.z_g, "sensor_height_m": -body.z_s,
     }  # fmt: skip
+    if math.isfinite(pendulum.heel_max_rad):
+        heights["heel_max_deg"] = math.degrees(pendulum.heel_max_rad)
     yield from ("", *_table("[roll]", heights))
     if body.sensor_from_axis:
         yield "sensor_above_axis = true"

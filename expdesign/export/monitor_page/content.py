@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
-from expdesign.monitoring import Alarm, Calibration, Call, Change, State, calls_of
+from expdesign.export.monitor_page.roll import roll_entry, roll_sentences
+from expdesign.monitoring import Alarm, Calibration, Call, Change, RollWatch, State, calls_of
 from expdesign.values import Array
 
 ALIKE = 0.95
@@ -55,6 +56,7 @@ class MonitorContent:
         left_out_rows: of the data, which lacked a number; unread_rows: in pieces that could not be read.
         notes: on the data.
         command, version: to reproduce it.
+        roll: of a vessel file with [roll].
     """
 
     vessel: str
@@ -71,6 +73,7 @@ class MonitorContent:
     notes: tuple[str, ...]
     command: str
     version: str
+    roll: RollWatch | None = None
 
     @property
     def found(self) -> tuple[Alarm, ...]:
@@ -99,7 +102,7 @@ def told(content: MonitorContent, alarm: Alarm, number: int | None = None) -> st
 
 def sentences(content: MonitorContent) -> tuple[str, ...]:
     """The verdict."""
-    return tuple(_sentences(content))
+    return (*_sentences(content), *roll_sentences(content.roll, false_alarm_days=content.false_alarm_days))
 
 
 def _sentences(content: MonitorContent) -> Iterator[str]:
@@ -114,9 +117,10 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
         )
     elif not found:
         largest = max((moment.statistic for moment in content.moments), default=0.0)
+        where = " in surge, sway and yaw" if content.roll is not None else ""
         yield (
-            f"No alarm in {judged_h:.1f} h: the ship is the one of the reference, {rate}. The largest statistic is "
-            f"{largest:.1f}, the threshold {content.limit:.1f}."
+            f"No alarm in {judged_h:.1f} h{where}: the ship is the one of the reference, {rate}. The largest "
+            f"statistic is {largest:.1f}, the threshold {content.limit:.1f}."
         )
     for alarm in found:
         yield _alarm(content, alarm)
@@ -248,6 +252,7 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
             "budget": budget,
             "history": [{"time_s": m.time_s, "statistic": m.statistic} for m in content.moments],
             "notes": content.notes,
+            **roll_entry(content.roll, false_alarm_days=content.false_alarm_days),
         }
     )
 

@@ -50,9 +50,24 @@ def checks(content: ReportContent) -> list[Check]:
             passed=None,
         ),
     ]
+    if found.heel_max_rad is not None:
+        rows.append(_heel_check(content, found.heel_max_rad))
     if plan.risk is None:
         return rows
     return [*rows, *_risk_checks(plan.risk, 1.0 - content.confidence), *_conditioned_prior(content.vessel.model)]
+
+
+def _heel_check(content: ReportContent, heel_rad: float) -> Check:
+    """The roll of [roll], which does not act back on the path."""
+    pendulum = content.vessel.pendulum
+    limit = float("inf") if pendulum is None else pendulum.heel_max_rad
+    stated = np.isfinite(limit)
+    return Check(
+        what="Largest roll angle of the independent simulation, in still water",
+        found=f"{words.number(float(np.degrees(heel_rad)), 1)}\N{DEGREE SIGN}",
+        required=f"at most {words.number(float(np.degrees(limit)), 1)}\N{DEGREE SIGN}" if stated else "",
+        passed=bool(heel_rad <= limit + 1e-9) if stated else None,
+    )
 
 
 def _conditioned_prior(model: VesselModel) -> list[Check]:

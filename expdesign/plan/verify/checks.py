@@ -16,7 +16,7 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.values import Leg, SailedTrial, UnderWay, Verification
 from expdesign.plan.verify.tuning import TUNING
 from expdesign.sea_area import SeaArea
-from expdesign.signals import Commands, Trajectory
+from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, NUMPY, Vessel
@@ -67,6 +67,7 @@ def verify_plan(
     standing = np.zeros(len(vessel.limits)) if under_way is None else under_way.inputs
     excess, excess_signal = _limit_excess(vessel, commands, standing)
     begin = None if under_way is None else under_way.velocity
+    heel = _heel(again)
     problems = [
         *_motion_problems(vessel, trajectory, again),
         *_end_problems(vessel, environment, trajectory, (start, goal), begin),
@@ -79,6 +80,7 @@ def verify_plan(
         *_if(excess > 1e-6, f"{excess_signal} by {excess:.2g} of its range"),
         *_standing_problems(vessel, commands, standing),
         *_engine_problems(vessel, commands),
+        *_heel_problems(vessel, heel, legs, commands.sample_time_s),
         *_repeat_problems(legs, repeats),
         *(() if misfit else _speed_problems(environment, trajectory, legs, transit_mps)),
         *(() if misfit else _speed_problems(environment, again, legs, transit_mps, "re-simulated ")),
@@ -91,6 +93,25 @@ def verify_plan(
         reproduction_error_m=float(np.hypot(*(again.pose - trajectory.pose)[:, :2].T).max()),
         limit_excess=excess,
         problems=tuple(problems),
+        heel_max_rad=None if heel is None else float(heel.max()),
+    )
+
+
+def _heel(again: Trajectory) -> Array | None:
+    """(k + 1,) size of the roll angle; None without roll."""
+    return None if again.auxiliary is None else np.abs(again.auxiliary[:, AUXILIARY.index("roll_rad")])
+
+
+def _heel_problems(vessel: Vessel, heel: Array | None, legs: Sequence[Leg], step_s: float) -> tuple[str, ...]:
+    """A heel beyond what the vessel file allows."""
+    if heel is None or vessel.pendulum is None:
+        return ()
+    worst, most = int(np.argmax(heel)), vessel.pendulum.heel_max_rad
+    leg = next((leg for leg in legs if leg.first <= worst < leg.last), legs[-1])
+    return _if(
+        bool(heel[worst] > most + 1e-9),
+        f"she heels by {np.degrees(heel[worst]):.1f} deg at {worst * step_s:.0f} s, in {leg.name}, more "
+        f"than heel_max_deg of [roll], {np.degrees(most):.3g} deg",
     )
 
 

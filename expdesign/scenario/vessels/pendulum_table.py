@@ -50,6 +50,9 @@ class PendulumTable(Table):
     sensor_height_m: Number = Field(
         description="the height of the accelerometer [m] above the origin, or above the rotation axis"
     )
+    heel_max_deg: Positive | None = Field(
+        default=None, description="the largest roll angle of a plan, in still water [deg]; none when not given"
+    )
     sensor_above_axis: bool = Field(
         default=False, description="whether sensor_height_m is counted from the rotation axis, which has been located"
     )
@@ -104,6 +107,7 @@ def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
                 table.parameter_correlation, ROLL_PARAMETERS, entry.at("parameter_correlation")
             ),
             waves=_waves(table.waves),
+            heel_max_rad=math.inf if table.heel_max_deg is None else math.radians(table.heel_max_deg),
         )  # fmt: skip
     except InputError as error:
         raise entry.error(str(error)) from None

@@ -297,7 +297,7 @@ class VesselTable(Table):
     roll: PendulumTable | None = Field(
         default=None,
         description="a table [roll]: roll as a pendulum that does not act back on the path. simulate measures it, "
-        "expdesign roll and roll-plan read it; all else leaves it out",
+        "diagnose and monitor judge it, plans keep to its heel_max_deg, expdesign roll and roll-plan read it",
     )
     environment: EnvironmentTable | None = Field(
         default=None, description="the weather that simulations of this vessel meet and a diagnosis found"

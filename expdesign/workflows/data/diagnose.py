@@ -11,19 +11,27 @@ from expdesign import __version__
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.regression import model_for
 from expdesign.export import write_files
-from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json, diagnosis_tables, extended_vessel
+from expdesign.export.diagnosis_page import (
+    RollTold,
+    diagnosis_html,
+    diagnosis_json,
+    diagnosis_tables,
+    extended_vessel,
+    roll_sentences,
+)
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
 from expdesign.progress import Estimated, Progress, silent
+from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
 from expdesign.scenario import load_scenario, load_vessel
-from expdesign.signals import Commands
+from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.measured import measured
 from expdesign.workflows.steps.workers import workers
 
@@ -69,6 +77,7 @@ def diagnose(
     with workers(jobs if samples > FEW_SAMPLES else 1, load=None):
         found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=told)
     told.after = 0.0
+    roll = _roll(ship, record)
     command = command_text(
         "diagnose",
         data,
@@ -76,13 +85,30 @@ def diagnose(
         usual={"--velocity": "auto"},
     )
     files = {
-        "diagnosis.json": diagnosis_json(found),
-        "diagnosis.html": diagnosis_html(found, command=command, version=__version__, progress=told.part(drawing, 0.0)),
-        "vessel-extended.toml": extended_vessel(found, command=command),
+        "diagnosis.json": diagnosis_json(found, roll),
+        "diagnosis.html": diagnosis_html(
+            found, command=command, version=__version__, roll=roll, progress=told.part(drawing, 0.0)
+        ),
+        "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary={**_summary(found), **note_on_roll(ship)}, tables=_tables(found))
+    summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
+    return Outcome(files=written, summary=summary, tables=_tables(found))
+
+
+def _roll(ship: Vessel, record: Record) -> RollTold | None:
+    """Whether the ship rolls as [roll] says; None without it."""
+    if ship.pendulum is None:
+        return None
+    missing = dict.fromkeys(name for batch in record.batches for name in missing_columns(batch))
+    if missing:
+        return RollTold(reason=f"the data do not measure {' and '.join(missing)}")
+    try:
+        runs = with_one_source([roll_run(batch, ship=ship) for batch in record.batches])
+        return RollTold(judgement=judge_roll(ship.pendulum, runs, beam_m=ship.beam_m))
+    except (InputError, NotInformative) as error:
+        return RollTold(reason=str(error))
 
 
 def _proposals(scenario: Path, model: VesselModel) -> tuple[Proposal, ...]:

@@ -23,7 +23,7 @@ from expdesign.export.monitor_page import (
     sentences,
 )
 from expdesign.export.monitor_page.content import HEADER
-from expdesign.monitoring import TUNING, saved
+from expdesign.monitoring import TUNING, RollWatch, saved
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, pieces
@@ -45,7 +45,7 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.workers import workers
 
 STATE = "monitor-state.json"
@@ -127,7 +127,7 @@ def monitor(
     content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now))
     progress("done", 1.0)
-    return Outcome(files=written, summary={**_summary(content), **note_on_roll(asked.vessel)}, tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,6 +219,7 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
         notes=now.reading.notes,
         command=command,
         version=__version__,
+        roll=None if asked.vessel.pendulum is None else now.roll,
     )
 
 
@@ -239,7 +240,7 @@ def _state(now: Watch) -> str:
     if isinstance(now.phase, Learning):
         lines = (*now.phase.lines, *now.reading.pending[bool(now.phase.lines) :])
         reading = replace(now.reading, pending=lines, now_s=-np.inf, offset_s=0.0)
-        now = replace(now, phase=Learning(), reading=reading)
+        now = replace(now, phase=Learning(), reading=reading, roll=RollWatch())
     return json.dumps({**saved(now), "version": __version__})
 
 
@@ -263,7 +264,7 @@ def _resumed(path: Path) -> Watch:
 def _summary(content: MonitorContent) -> dict[str, object]:
     return {
         "judged_h": content.state.judged * content.calibration.stretch_s / HOUR,
-        "alarms": len(content.found),
+        "alarms": len(content.found) + (0 if content.roll is None else len(content.roll.alarms)),
         "remarks": list(sentences(content)),
     }
 

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from expdesign.export.monitor_page import Moment
-from expdesign.monitoring import restored_alarm, restored_calibration, restored_changes, restored_state
+from expdesign.monitoring import (
+    restored_alarm,
+    restored_calibration,
+    restored_changes,
+    restored_roll,
+    restored_state,
+)
 from expdesign.records import Taken
 from expdesign.workflows.data.watching import Learning, Reading, Ready, Watch, Watching
 
@@ -23,6 +29,7 @@ def restored_watch(table: Mapping[str, Any]) -> Watch:
         changes=restored_changes(table["changes"]),
         reading=_reading(table["reading"]),
         phase=_phase(table["phase"]),
+        roll=restored_roll(table["roll"]),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,16 +16,23 @@ from expdesign.monitoring import (
     Calibration,
     Change,
     Grams,
+    RollWatch,
     Rules,
     State,
     calibrate,
     estimates,
     joined,
+    roll_learnt,
+    roll_watched,
     threshold,
     watch,
 )
 from expdesign.records import STREAM, Piece, Taken
+from expdesign.roll import Run
+from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
+from expdesign.signals import Record
 from expdesign.values import Array
+from expdesign.vessel import Vessel
 from expdesign.workflows.data.prepared import PIECE, Asked, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
@@ -131,11 +138,13 @@ class Watch:
         changes: watched for; none before the first piece.
         reading: how far the data have been read.
         phase: what is known of the ship.
+        roll: what is known of its roll.
     """
 
     changes: tuple[Change, ...] = ()
     reading: Reading = Reading()
     phase: Learning | Ready | Watching = Learning()
+    roll: RollWatch = field(default_factory=RollWatch)
 
 
 def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:
@@ -175,8 +184,9 @@ def with_piece(now: Watch, piece: Piece, read: Read | Unread | None, asked: Aske
     if not isinstance(read, Read):
         return now
     if not isinstance(now.phase, Learning):
-        return _watched(now, piece, read, asked)
-    learning = with_reference(now, piece, read, asked).phase
+        return _roll_watched(now, _watched(now, piece, read, asked), piece, read, asked)
+    now = with_reference(now, piece, read, asked)
+    learning = now.phase
     assert isinstance(learning, Learning)
     *before, grams = learning.learnt
     first = (*before, grams)[0].time_s
@@ -187,10 +197,45 @@ def with_piece(now: Watch, piece: Piece, read: Read | Unread | None, asked: Aske
     return _watched(calibrated(now), piece, read, asked, first_s=float(grams.time_s[inside]))
 
 
+def _roll_watched(before: Watch, now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
+    """With what a piece tells of roll."""
+    runs = roll_runs(read.record, asked.vessel)
+    if runs is None:
+        return replace(now, roll=replace(now.roll, reason=f"the data do not measure {' and '.join(NEEDED)}"))
+    offset_s, calls = now.reading.offset_s, [_last_call_s(watch) for watch in (before, now)]
+    begin_s, end_s = (float(piece.time_s[place]) + offset_s for place in (0, -1))
+    mean_time_s = roll_days(asked) * DAY
+    roll = roll_watched(
+        now.roll, asked.vessel, runs, begin_s=begin_s, end_s=end_s, mean_time_s=mean_time_s,
+        called=calls[0] != calls[1],
+    )  # fmt: skip
+    return replace(now, roll=roll)
+
+
+def _last_call_s(watch: Watch) -> float | None:
+    """End of the last port call."""
+    load = watch.phase.state.load if isinstance(watch.phase, Watching) else None
+    return load.since_s if load is not None and load.stay_s else None
+
+
+def roll_runs(record: Record, ship: Vessel) -> tuple[Run, ...] | None:
+    """Of a record; None where [roll] is not in the vessel file, or not measured."""
+    if ship.pendulum is None or any(missing_columns(batch) for batch in record.batches):
+        return None
+    return with_one_source([roll_run(batch, ship=ship) for batch in record.batches])
+
+
+def roll_days(asked: Asked) -> float:
+    """Average time between false alarms of roll, and of the path where roll is watched: each has a half of the rate."""
+    return 2.0 * asked.false_alarm_days
+
+
 def with_reference(now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
     """With a piece that belongs to the reference."""
     assert isinstance(now.phase, Learning)
     learning = now.phase
+    if (runs := roll_runs(read.record, asked.vessel)) is not None:
+        now = replace(now, roll=roll_learnt(now.roll, asked.vessel, runs))
     grams = read.at(now.changes, np.zeros(len(now.changes)), asked, offset_s=now.reading.offset_s)
     lines = (*(learning.lines or (piece.header,)), *piece.lines) if piece.source == STREAM else ()
     return replace(now, phase=Learning(learnt=(*learning.learnt, grams), lines=lines))
@@ -221,7 +266,8 @@ def calibrated(now: Watch) -> Watch:
 
 def rules_of(calibration: Calibration, asked: Asked) -> Rules:
     """The threshold for so many days between false alarms, and the length of port calls."""
-    limit = threshold(int(calibration.watched.sum()), asked.false_alarm_days * DAY / calibration.stretch_s)
+    days = asked.false_alarm_days if asked.vessel.pendulum is None else roll_days(asked)
+    limit = threshold(int(calibration.watched.sum()), days * DAY / calibration.stretch_s)
     return Rules(limit=limit, port_s=asked.port_s)
 
 

@@ -39,9 +39,8 @@ def written(
     left = _undeleted(folder) if PLAN in files else ()
     note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
-    return Outcome(
-        files=paths, summary={"scenario": case.name, **summary, **note, **note_on_roll(case.vessel)}, tables=tables
-    )
+    roll = {} if "heel_max_deg" in summary else note_on_roll(case.vessel)
+    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note, **roll}, tables=tables)
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
 from expdesign.errors import InputError, NoPlan
 from expdesign.export import (
@@ -23,6 +24,7 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
+from expdesign.signals import AUXILIARY
 from expdesign.vessel import NOT_SUPPORTED
 
 
@@ -45,6 +47,7 @@ def plan_problem(
 
     Raises:
         InputError: plans cannot be made for the vessel, or the design has more runs than a plan can have.
+        NoPlan: a run heels the ship more than her file allows.
     """
     check_plannable(case)
     runs = sum(design.repeats)
@@ -53,12 +56,14 @@ def plan_problem(
             f"the design has {runs} runs, expected at most {PLAN.most_runs} in one plan: shorten design.total_s or "
             "lengthen the manoeuvres"
         )
+    primitives = tuple(item.primitive for item in information)
+    _check_heel(case, [item for item, times in zip(primitives, design.repeats, strict=True) if times])
     return PlanProblem(
         vessel=case.vessel,
         area=case.area,
         environment=case.environment,
         settings=case.plan,
-        primitives=tuple(item.primitive for item in information),
+        primitives=primitives,
         design=design,
         start=case.start,
         goal=case.goal,
@@ -110,11 +115,33 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         **_lattice_summary(plan.lattice),
         "distance_m": plan.trajectory.distance_m,
         "least_clearance_m": plan.verification.clearance_min_m,
+        **_heel_summary(plan),
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
         **({"chart_remarks": list(plan.area.notes)} if plan.area.notes else {}),
     }
+
+
+def _heel_summary(plan: Plan) -> dict[str, object]:
+    """The largest roll angle of a ship with [roll]."""
+    heel = plan.verification.heel_max_rad
+    return {} if heel is None else {"heel_max_deg": float(np.degrees(heel))}
+
+
+def _check_heel(case: Scenario, used: Sequence[Primitive]) -> None:
+    """Raise NoPlan for runs that heel the ship more than her file allows."""
+    most = np.inf if case.vessel.pendulum is None else case.vessel.pendulum.heel_max_rad
+    for item in used:
+        told = item.trajectory.auxiliary
+        heel = 0.0 if told is None else float(np.abs(told[:, AUXILIARY.index("roll_rad")]).max())
+        if heel > most:
+            raise NoPlan(
+                f"{item.name} heels the ship by {np.degrees(heel):.1f} deg, more than heel_max_deg of [roll] in the "
+                f"vessel file, {np.degrees(most):.3g} deg",
+                which=item.name,
+                remedy="leave it out of the dictionary, or lower its angles or its speed",
+            )
 
 
 def _lattice_summary(proof: LatticeProof | None) -> dict[str, object]:

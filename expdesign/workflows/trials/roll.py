@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from expdesign import __version__
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import vessel_toml, write_files
@@ -37,15 +35,12 @@ from expdesign.roll import (
     prepared,
     roll_frequency,
 )
+from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases, load_vessel
-from expdesign.signals import AUXILIARY, Batch
-from expdesign.simulation import delivered_at_samples, steering_signals
-from expdesign.values import Array
-from expdesign.vessel import IDEAL, Vessel
+from expdesign.signals import Batch
+from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
-
-NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
 
 
 def roll(
@@ -144,7 +139,7 @@ def _cases(
         cases.append(Case(name=path.stem, load=load, runs=runs))
         notes += record.notes
         followed |= any(batch.steered is not None and batch.steered.any() for batch in record.batches)
-    if all(run.planned is not None and run.planned.std() > 0 for case in cases for run in case.runs):
+    if planned_everywhere([run for case in cases for run in case.runs]):
         return tuple(cases), (*notes, AS_PLANNED)
     cases = [replace(case, runs=tuple(replace(run, planned=None) for run in case.runs)) for case in cases]
     return tuple(cases), (*notes, *((FOLLOWED,) if followed else ()))
@@ -158,42 +153,12 @@ FOLLOWED = (
 
 
 def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -> Run:
-    """Signals of a batch; the accelerometer counts to port in the room of roll."""
-    for name in NEEDED:
-        if not batch.measures(name):
-            raise InputError(f"{path}: {name}: is missing, expected it beside r_radps and the rudder")
-    assert batch.auxiliary is not None
-    roll_rate, sensed = (batch.auxiliary[:, AUXILIARY.index(name)] for name in NEEDED)
-    chosen = [batch.input_names.index(name) for name in _rudders(batch.input_names, rudder)]
-    steering = _delivered(batch, batch.inputs, ship)[:, chosen].mean(axis=1)
-    signals = np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], steering])
-    planned = None
-    if batch.planned is not None and batch.planned.shape[1] == len(batch.input_names):
-        planned = _delivered(batch, batch.planned, ship)[:, chosen].mean(axis=1)
-    return Run(step_s=batch.sample_time_s, signals=signals, planned=planned)
-
-
-def _delivered(batch: Batch, given: Array, ship: Vessel | None) -> Array:
-    """(k, m) inputs at the samples, with the lags and dead times that the vessel file states for its signals."""
-    inputs = np.array(given)
-    if ship is None:
-        return inputs
-    for signal, response in zip(ship.model.inputs, ship.responses, strict=True):
-        if signal in batch.input_names and response != IDEAL:
-            column = batch.input_names.index(signal)
-            told = inputs[:, [column]]
-            inputs[:, column] = delivered_at_samples([response], told, sample_time_s=batch.sample_time_s)[:-1, 0]
-    return inputs
-
-
-def _rudders(names: tuple[str, ...], asked: Sequence[str]) -> tuple[str, ...]:
-    for name in asked:
-        if name not in names:
-            raise UnknownName("rudder signal", name, known=names)
-    chosen = tuple(asked) or steering_signals(names)
-    if not chosen:
-        raise InputError(f"the inputs {', '.join(names)} have no rudder, expected rudder1 or a1, or --rudder")
-    return chosen
+    try:
+        return roll_run(batch, rudder=rudder, ship=ship)
+    except UnknownName:
+        raise
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _check_passed(estimate: RollEstimate, used: LowPass) -> None:

@@ -1,0 +1,109 @@
+"""What a diagnosis tells of roll: sentences, JSON, and the vessel that it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from expdesign.export.files import plus_minus
+from expdesign.export.roll_words import change_words, stability_words
+from expdesign.roll import UNITS
+from expdesign.roll.record import RollChange, RollJudgement
+from expdesign.vessel import Vessel
+
+UNCHANGED = "She rolls as her file says"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollTold:
+    """The judgement of the roll of a vessel file.
+
+    Attributes:
+        judgement: None where roll was not judged.
+        reason: why not.
+    """
+
+    judgement: RollJudgement | None = None
+    reason: str = ""
+
+
+def roll_sentences(told: RollTold | None) -> tuple[str, ...]:
+    """The verdict; nothing for a vessel file without [roll]."""
+    if told is None:
+        return ()
+    if told.judgement is None:
+        return (f"Roll, [roll] of the vessel file, was not judged: {told.reason}.",)
+    return tuple(_sentences(told.judgement))
+
+
+def _sentences(found: RollJudgement) -> Iterator[str]:
+    pendulum, estimate = found.pendulum, found.estimate
+    if not found.changed:
+        near = ", ".join(f"{name} {plus_minus(estimate.values[name], estimate.std[name])}" for name in ("k", "d"))
+        yield (
+            f"{UNCHANGED}: one that rolls so differs as much in {100 * found.p_value:.2g} % of records. "
+            f"This record alone gives {near}; the file has k {pendulum.parameters['k']:.4g} {UNITS['k']}, "
+            f"d {pendulum.parameters['d']:.4g} {UNITS['d']}."
+        )
+        return
+    if not found.changes:
+        yield (
+            "She does not roll as her file says, by more than two causes: expdesign roll estimates all parameters. "
+            "No cause is named."
+        )
+        return
+    best, *others = found.changes
+    yield f"She does not roll as her file says. What explains it: {_words(found, best)}."
+    yield _stability(found, best)
+    if others:
+        yield f"Explained about as well by: {'; or '.join(_words(found, one) for one in others)}."
+
+
+def _words(found: RollJudgement, change: RollChange) -> str:
+    values = found.pendulum.parameters
+    return change_words(change.causes, change.sizes, change.stds, load=change.load, values=values)
+
+
+def _stability(found: RollJudgement, change: RollChange) -> str:
+    before = found.pendulum
+    mass_kg = before.body.mass_kg + before.load.mass_kg
+    return stability_words(before.righting_nm, change.righting_nm, mass_kg=mass_kg, load=change.load)
+
+
+def roll_entry(told: RollTold | None) -> dict[str, Any]:
+    """For diagnosis.json; nothing for a vessel file without [roll]."""
+    if told is None:
+        return {}
+    entry: dict[str, Any] = {"verdict": list(roll_sentences(told))}
+    found = told.judgement
+    if found is not None:
+        entry |= {
+            "p_value": found.p_value,
+            "changed": found.changed,
+            "alarm_below": found.alarm_p,
+            "explanations": [_change(one) for one in found.changes],
+            "estimate": {
+                name: {"value": found.estimate.values[name], "std": std} for name, std in found.estimate.std.items()
+            },
+        }
+    return {"roll": entry}
+
+
+def _change(one: RollChange) -> dict[str, Any]:
+    load = None if one.load is None else {"mass_kg": one.load[0], "height_m": one.load[1]}
+    sizes = zip(one.causes, one.sizes, one.stds, strict=True)
+    return {
+        "causes": {cause: {"size": size, "std": std} for cause, size, std in sizes},
+        "p_value": one.p_value,
+        "righting_nm": one.righting_nm,
+        "load": load,
+    }
+
+
+def with_roll(ship: Vessel, told: RollTold | None) -> Vessel:
+    """The vessel with the change of roll, where a single explanation is left and a file can hold it."""
+    changes = () if told is None or told.judgement is None else told.judgement.changes
+    if len(changes) != 1 or changes[0].pendulum is None:
+        return ship
+    return replace(ship, pendulum=changes[0].pendulum)
