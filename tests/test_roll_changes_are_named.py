@@ -64,6 +64,14 @@ def test_what_changed_is_named_with_its_size(change: str) -> None:
         assert best.righting_nm == pytest.approx(right, rel=0.02)
 
 
+def test_a_change_of_the_path_is_none_of_roll() -> None:
+    """Another yaw damping and rudder force move the ship otherwise, and the roll follows as her file says."""
+    truth = replace(SHIP, model=SHIP.model.with_parameters({"N_ur": -2.5, "Y_ud": -0.14}))
+    for seed in (9301, 9302, 9303):
+        found = judge_roll(KNOWN, [measured(truth, NOMINAL, seed, 2000)], beam_m=SHIP.beam_m)
+        assert not found.changed
+
+
 def test_a_file_that_does_not_know_is_not_contradicted() -> None:
     """The file has k to a fifth: a loss of a tenth of k is within what it says, and sharper files notice it."""
     rough = replace(KNOWN, parameter_std={"k": 1.8})

@@ -175,7 +175,7 @@ def _why(found: RollEstimate) -> str:
         return "waves and sensors hide what the rudder does; use larger rudder angles or a longer run"
     if found.answering:
         chance = f"one that answers nothing seems so in {100 * found.unanswered:.1g} % of records"
-        return f"the rudder seems to answer roll ({chance}); steer by hand, or record what was planned as planned_..."
+        return f"the rudder seems to answer roll ({chance}); steer by hand, or record planned_rudder1_rad"
     if found.reached:
         return f"{' and '.join(found.reached)} is nowhere near what the file says"
     return "no roll pendulum fits it" if found.settled else "the estimate did not settle; use a longer run"
