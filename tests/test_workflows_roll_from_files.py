@@ -82,11 +82,26 @@ def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
     found = roll(three(tmp_path), tmp_path / "out", loads=loads).summary
     assert (found["rank"], found["free"], found["held"]) == (8, 8, [])
+    assert "wrong sign" not in str(found["remarks"])
     values, stds = found["parameters"], found["std"]
     assert isinstance(values, dict)
     assert isinstance(stds, dict)
     for name, std in stds.items():
         assert abs(values[name] - truth(name)) < 4 * std, name
+
+
+def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
+    files, loads = three(tmp_path), stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
+    for path in files:
+        table = np.genfromtxt(path, delimiter=",", names=True)
+        table["imu_lateral_mps2"] *= -1.0
+        names = ",".join(table.dtype.names or ())
+        np.savetxt(
+            path, np.column_stack([table[n] for n in names.split(",")]), delimiter=",", header=names, comments=""
+        )
+    remarks = roll(files, tmp_path / "out", loads=loads).summary["remarks"]
+    assert "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign" in str(remarks)
+    assert "wrong sign" in (tmp_path / "out" / "roll.html").read_text()
 
 
 def test_a_model_tells_of_the_ship_by_froude_s_law(tmp_path: Path) -> None:

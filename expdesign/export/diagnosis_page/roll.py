@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from expdesign.export import words
 from expdesign.export.files import plus_minus
 from expdesign.export.roll_words import change_words, stability_words
 from expdesign.roll import UNITS
@@ -40,11 +41,17 @@ def roll_sentences(told: RollTold | None) -> tuple[str, ...]:
 def _sentences(found: RollJudgement) -> Iterator[str]:
     pendulum, estimate = found.pendulum, found.estimate
     if not found.changed:
-        near = ", ".join(f"{name} {plus_minus(estimate.values[name], estimate.std[name])}" for name in ("k", "d"))
+        names = ("k", "d")
+        near = ", ".join(
+            f"{name} {plus_minus(estimate.values[name], estimate.std[name])} {UNITS[name]}" for name in names
+        )
+        stated = ", ".join(
+            f"{name} {plus_minus(pendulum.parameters[name], pendulum.parameter_std.get(name, 0.0))}" for name in names
+        )
         yield (
-            f"{UNCHANGED}: one that rolls so differs as much in {100 * found.p_value:.2g} % of records. "
-            f"This record alone gives {near}; the file has k {pendulum.parameters['k']:.4g} {UNITS['k']}, "
-            f"d {pendulum.parameters['d']:.4g} {UNITS['d']}."
+            f"{UNCHANGED}, within the standard deviations that the file states: a ship that rolls so differs at least "
+            f"as much in {words.percent(found.p_value)} of records. This record alone, with K_vd and z_f of the file, "
+            f"gives {near}; the file has {stated}."
         )
         return
     if not found.changes:

@@ -94,6 +94,7 @@ def roll(
     progress("estimating", 0.3)
     estimate = estimate_roll(problem, method=method)
     _check_passed(estimate, filter_)
+    notes += _turned(estimate)
     options = {
         "--loads": loads,
         "--vessel": vessel,
@@ -161,6 +162,24 @@ def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -
         raise InputError(f"{path}: {error}") from None
 
 
+def _turned(estimate: RollEstimate) -> tuple[str, ...]:
+    """A note where the model misses something, and misses nothing with the other sign of the accelerometer."""
+    if not estimate.surprise > TUNING.most_surprise:
+        return ()
+    cases = [
+        replace(case, runs=tuple(replace(run, signals=run.signals * [1.0, -1.0, 1.0, 1.0]) for run in case.runs))
+        for case in estimate.problem.cases
+    ]
+    other = estimate_roll(replace(estimate.problem, cases=tuple(cases)), method=estimate.method)
+    if other.surprise > TUNING.most_surprise or other.reached:
+        return ()
+    return (
+        "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign, both expected positive to starboard: "
+        f"residuals follow the rudder {estimate.surprise:.2g} times as much as noise would, and {other.surprise:.2g} "
+        "times with one of the two turned.",
+    )
+
+
 def _check_passed(estimate: RollEstimate, used: LowPass) -> None:
     """Raise where the filter takes from the roll that was found."""
     for case in estimate.problem.cases:
@@ -181,12 +200,14 @@ def _summary(content: RollContent) -> dict[str, object]:
         "held": list(estimate.held),
         "rank": content.report.rank,
         "free": len(content.report.free),
-        "remarks": list(roll_sentences(content)),
+        "remarks": [*roll_sentences(content), *content.notes],
     }
 
 
 def _tables(content: RollContent) -> tuple[TextTable, ...]:
-    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
+    found = TextTable(
+        title="Roll", header=("finding",), rows=tuple((text,) for text in (*roll_sentences(content), *content.notes))
+    )
     values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
     cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
     return (found, values, cures) if cures.rows else (found, values)
