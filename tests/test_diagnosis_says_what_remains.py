@@ -15,6 +15,8 @@ from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 from expdesign.diagnosis.motion import linearise
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
 from expdesign.diagnosis.select import forward_selection
+from expdesign.diagnosis.select.forward_selection import fit_nuisance
+from expdesign.diagnosis.select.selection_round import selection_round
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -93,6 +95,22 @@ def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.Monkey
     )
     assert found.steps == ()
     assert found.untried == ("further causes",)
+
+
+def test_a_second_round_from_the_same_fit_costs_no_simulations():
+    record = hidden_record("barge", seed=6, batches=2, samples=120, effects={"gain": -0.3})
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    base, work, validation = fit_nuisance(ship, windows, initial_states(windows)), Work(), CrossValidation(windows)
+    costs = []
+    for _ in range(2):
+        before = work.simulations
+        step, _ = selection_round(base, windows, (), np.random.default_rng(0), work, validation)
+        assert step is not None
+        assert step.chosen.candidate.cause == "thrust_gain"
+        costs.append(work.simulations - before)
+    assert costs[0] > 0
+    assert costs[1] == 0
 
 
 def test_parameters_within_their_standard_deviations_are_re_estimated_and_nothing_is_called_missing():

@@ -63,6 +63,7 @@ def round_tests(
 ) -> tuple[ScoreTest, ...]:
     """Score tests of a round, with arguments as in `selection_round`."""
     work.tell("testing causes", TUNING.round_work)
+    work.fits_beside(base)  # before the tests, which need the memory of others
     candidates = [
         c for c in open_candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most
     ]
@@ -102,17 +103,7 @@ def best_step(
     if not work.allows("further causes"):
         return None
     points, far = _starting_points(base, windows, tests)
-    rough: list[FittedCandidate] = []
-    fits = [(TUNING.first_steps + 1) * work_of_simulation(base.ship.with_effects(point.effects)) for point in points]
-    results = in_order(_rough_fit, (base, windows, far), [(point,) for point in points])
-    for index, point in enumerate(points):
-        work.tell(f"fitting {point.test.candidate.cause}", sum(fits[index:]))
-        if not work.allows(f"{point.test.candidate.cause} beside {len(base.free_keys)} effects"):
-            continue  # nor will it allow the others
-        candidate = next(results)
-        if candidate is not None:
-            work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
-            rough.append(candidate)
+    rough = _rough_fits(base, windows, points, work, far=far)
     possible = [item for item in rough if _is_possible(item)]
     astray = leads_away(validation.of(base))
     fitted = _significant(base, windows, ranked_by_gain(base, possible), work, all_of_them=astray)
@@ -132,6 +123,32 @@ def best_step(
         tests=tests,
         outranked=outranked,
     )
+
+
+def _rough_fits(
+    base: Fit, windows: Windows, points: Sequence[StartingPoint], work: Work, *, far: bool
+) -> list[FittedCandidate]:
+    """Fits of few steps from these points; those of an earlier round from the same base are not made again."""
+    known = work.fits_beside(base)
+    keys = [(far, point.keys, tuple(sorted(point.effects.items()))) for point in points]
+    waiting = {key: point for key, point in zip(keys, points, strict=True) if key not in known}
+    efforts = [
+        (TUNING.first_steps + 1) * work_of_simulation(base.ship.with_effects(p.effects)) for p in waiting.values()
+    ]
+    results = in_order(_rough_fit, (base, windows, far), [(point,) for point in waiting.values()])
+    for index, (key, point) in enumerate(waiting.items()):
+        work.tell(f"fitting {point.test.candidate.cause}", sum(efforts[index:]))
+        if not work.allows(f"{point.test.candidate.cause} beside {len(base.free_keys)} effects"):
+            continue  # nor will it allow the others
+        candidate = known[key] = next(results)
+        if candidate is not None:
+            work.spend(candidate.fit.simulations, work_of_simulation(candidate.fit.ship))
+    fitted = [(known.get(key), point.test) for key, point in zip(keys, points, strict=True)]
+    return [
+        replace(one, candidate=test.candidate, multiplicity=test.multiplicity)
+        for one, test in fitted
+        if one is not None
+    ]
 
 
 def _is_possible(item: FittedCandidate) -> bool:
@@ -216,15 +233,28 @@ def _significant(
     """
     while rough:
         leading = rough if all_of_them else _leading(rough)
-        converged = list(in_order(fit_to_convergence, (base, windows), [(item,) for item in leading]))
-        for new, old in zip(converged, leading, strict=True):
-            if not old.fit.converged:
-                work.spend(new.fit.simulations, work_of_simulation(new.fit.ship))
+        converged = _converged(base, windows, leading, work)
         significant = [item for item in converged if wald_p_value(item, item.fit) <= TUNING.level]
         if significant or not leading:  # nothing gains anything
             return ranked_by_gain(base, significant)
         rough = [item for item in rough if item not in leading]
     return []
+
+
+def _converged(base: Fit, windows: Windows, rough: Sequence[FittedCandidate], work: Work) -> list[FittedCandidate]:
+    """Fits continued to convergence; those of an earlier round from the same base are not made again."""
+    known = work.fits_beside(base)
+    waiting = [item for item in rough if not item.fit.converged and item.fit not in known]
+    for old, new in zip(
+        waiting, in_order(fit_to_convergence, (base, windows), [(item,) for item in waiting]), strict=True
+    ):
+        known[old.fit] = new
+        work.spend(new.fit.simulations, work_of_simulation(new.fit.ship))
+    continued = [(item, None if item.fit.converged else known[item.fit]) for item in rough]
+    return [
+        item if new is None else replace(new, candidate=item.candidate, multiplicity=item.multiplicity)
+        for item, new in continued
+    ]
 
 
 def _leading(rough: list[FittedCandidate]) -> list[FittedCandidate]:
