@@ -115,6 +115,14 @@ def test_interest_in_the_load_tells_the_load_better() -> None:
 def test_what_cannot_be_asked_is_one_line() -> None:
     with pytest.raises(InputError, match=r"start\.m is missing, expected a rough m of the unknown load"):
         build_question(SHIP, [None], known={}, guess={})
+    with pytest.raises(InputError, match=r"start\.m is -0\.4, expected more than 0"):
+        build_question(SHIP, [None], known={}, guess={"m": -0.4, "z_m": -0.2})
+    with pytest.raises(InputError, match=r"a load has 30 kg, expected less than the ship's own 22\.04 kg"):
+        asked(NOMINAL, Load(mass_kg=30.0, z_m=0.05))
+    with pytest.raises(
+        InputError, match=r"a load of 0\.4 kg is at height -3 m, expected within the length of the ship"
+    ):
+        asked(NOMINAL, Load(mass_kg=0.4, z_m=3.0))
     with pytest.raises(InputError, match=r"two candidate loads are the same, the ship alone"):
         asked(NOMINAL, NOMINAL)
     with pytest.raises(InputError, match=r"has no table \[roll\]"):

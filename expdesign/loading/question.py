@@ -12,7 +12,7 @@ from expdesign.loading.information import LoadOption
 from expdesign.loading.tuning import TUNING
 from expdesign.roll import PARAMETERS, parameters
 from expdesign.values import Array, seal
-from expdesign.vessel import Load, Vessel
+from expdesign.vessel import NOMINAL, Load, Vessel
 
 WEIGHED = ("m", "z_m")
 """Parameters of an unknown load."""
@@ -66,7 +66,7 @@ def build_question(
         guess: m and z_m of the unknown load, roughly.
 
     Raises:
-        InputError: there is no [roll], nothing is sought, or the unknown load is not guessed.
+        InputError: no [roll] is there, nothing is sought, the unknown load is not guessed, or one is too heavy or high.
     """
     pendulum = vessel.pendulum
     if pendulum is None:
@@ -75,6 +75,11 @@ def build_question(
     for name in WEIGHED:
         if weighed and not guess.get(name):
             raise InputError(f"start.{name} is missing, expected a rough {name} of the unknown load")
+    if weighed and not guess["m"] > 0:
+        raise InputError(f"start.m is {guess['m']:g}, expected more than 0")
+    unknown = Load(mass_kg=guess["m"], z_m=guess["z_m"]) if weighed else NOMINAL
+    for load in loads:
+        _check_on_board(vessel, pendulum.body.mass_kg, unknown if load is None else load)
     theta = parameters(**{**pendulum.parameters, **known, **({n: guess[n] for n in WEIGHED} if weighed else {})})
     std = {name: value for name, value in pendulum.parameter_std.items() if value > 0 and name not in known}
     free = tuple(name for name in PARAMETERS if name in std or (weighed and name in WEIGHED and name not in known))
@@ -101,6 +106,17 @@ def build_question(
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"two candidate loads are the same, {twice}, expected each once")
     return Question(vessel=vessel, options=options, free=free, theta=theta, size=size, prior=(prior + prior.T) / 2)
+
+
+def _check_on_board(vessel: Vessel, own_kg: float, load: Load) -> None:
+    """Raise where a load sinks the ship or floats above her."""
+    if not load.mass_kg < own_kg:
+        raise InputError(f"a load has {load.mass_kg:g} kg, expected less than the ship's own {own_kg:g} kg")
+    if not abs(load.z_m) <= vessel.length_m:
+        raise InputError(
+            f"a load of {load.mass_kg:g} kg is at height {-load.z_m:g} m, expected within the length of the ship, "
+            f"{vessel.length_m:g} m, of the line of the vessel file"
+        )
 
 
 def _name(load: Load | None) -> str:
