@@ -14,7 +14,7 @@ from expdesign.simulation import Environment, delivered
 from outside_check import columns
 from short_examples import copied
 
-ASKED = "total_s = 250.0\naccuracy = {as = 'durations'}"
+ASKED = "total_s = 250.0\naccuracy = {as = 'durations'}\ngrow = {families = ['zigzag', 'multisine'], pool = 16}"
 
 
 @pytest.fixture(scope="module")
