@@ -27,7 +27,9 @@ class Work:
     untried: list[str] = field(default_factory=list)
     rounds_left: int = TUNING.first_rounds
     progress: Estimated = field(default_factory=lambda: Estimated(silent))
-    _fits: tuple[Fit | None, dict[Hashable, FittedCandidate | None]] = field(default=(None, {}), repr=False)
+    _fits: tuple[Fit | None, dict[Hashable, FittedCandidate | None]] = field(
+        default_factory=lambda: (None, {}), repr=False
+    )
 
     def fits_beside(self, base: Fit) -> dict[Hashable, FittedCandidate | None]:
         """Fits of candidates beside this one, for another round from it; those beside others are forgotten."""
