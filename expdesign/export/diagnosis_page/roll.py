@@ -11,7 +11,7 @@ from expdesign.export.files import plus_minus
 from expdesign.export.roll_words import change_words, stability_words
 from expdesign.roll import UNITS
 from expdesign.roll.record import RollChange, RollJudgement
-from expdesign.vessel import Vessel
+from expdesign.vessel import RollPendulum, Vessel
 
 UNCHANGED = "She rolls as her file says"
 
@@ -41,17 +41,14 @@ def roll_sentences(told: RollTold | None) -> tuple[str, ...]:
 def _sentences(found: RollJudgement) -> Iterator[str]:
     pendulum, estimate = found.pendulum, found.estimate
     if not found.changed:
-        names = ("k", "d")
         near = ", ".join(
-            f"{name} {plus_minus(estimate.values[name], estimate.std[name])} {UNITS[name]}" for name in names
-        )
-        stated = ", ".join(
-            f"{name} {plus_minus(pendulum.parameters[name], pendulum.parameter_std.get(name, 0.0))}" for name in names
+            f"{name} {plus_minus(estimate.values[name], estimate.std[name])} {UNITS[name]}" for name in ("k", "d")
         )
         yield (
             f"{UNCHANGED}, within the standard deviations that the file states: a ship that rolls so differs at least "
-            f"as much in {words.percent(found.p_value)} of records. This record alone, with K_vd and z_f of the file, "
-            f"gives {near}; the file has {stated}."
+            f"as much in {words.percent(found.p_value)} of records. The file has {_stated(pendulum, 'k', 'd')}. This "
+            f"record alone gives {near}, if K_vd and z_f are exactly those of the file, which has "
+            f"{_stated(pendulum, 'K_vd', 'z_f')}."
         )
         return
     if not found.changes:
@@ -65,6 +62,12 @@ def _sentences(found: RollJudgement) -> Iterator[str]:
     yield _stability(found, best)
     if others:
         yield f"Explained about as well by: {'; or '.join(_words(found, one) for one in others)}."
+
+
+def _stated(pendulum: RollPendulum, *names: str) -> str:
+    """Parameters as the file has them."""
+    stds = pendulum.parameter_std
+    return ", ".join(f"{name} {plus_minus(pendulum.parameters[name], stds.get(name, 0.0))}" for name in names)
 
 
 def _words(found: RollJudgement, change: RollChange) -> str:
