@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -51,7 +52,7 @@ class Helm:
             if name.startswith(("n", "tau_x")) and not (math.isfinite(limit.low) and math.isfinite(limit.high)):
                 raise InputError(f"vessel {self.vessel.name!r}: {name} has no limits, expected finite ones")
 
-    @property
+    @cached_property
     def means(self) -> str:
         """Kind of steering: "rudder", "azimuth", "force", "propeller", or "" where nothing does."""
         kinds = [actuator.kind for actuator in self.vessel.actuators]
@@ -59,7 +60,7 @@ class Helm:
         kinds = [kind for kind in kinds if kind != "propeller"] + ["propeller"] * ({-1.0, 1.0} <= sides)
         return next((kind for kind in ("rudder", "azimuth", "force", "propeller") if kind in kinds), "")
 
-    @property
+    @cached_property
     def steering(self) -> tuple[Actuator, ...]:
         """The actuators that turn with the helm."""
         able = tuple(actuator for actuator in self.vessel.actuators if actuator.kind == self.means)
@@ -229,14 +230,16 @@ def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
     def gain(speed: float) -> float:
         return helm.acceleration((speed, 0.0, 0.0), SERVICE_SHARE, 0.0)[0]
 
-    grid = np.linspace(0.0, FASTEST_MPS, 601)
-    gains = [gain(speed) for speed in grid.tolist()]
-    for low, high, before, after in zip(grid[:-1], grid[1:], gains[:-1], gains[1:], strict=True):
+    first, *speeds = np.linspace(0.0, FASTEST_MPS, 601).tolist()
+    low, before = first, gain(first)
+    for high in speeds:  # up to the first that is too high
+        after = gain(high)
         if before > 0 >= after:
             return float(scipy.optimize.brentq(gain, low, high, xtol=1e-12))
+        low, before = high, after
     raise InputError(
         f"vessel {vessel.name!r}: the model has no steady speed below {FASTEST_MPS:g} m/s at 85 % power: "
-        f"du/dt is {gains[0]:.3g} m/s2 at rest; give the approach speed"
+        f"du/dt is {gain(first):.3g} m/s2 at rest; give the approach speed"
     )
 
 

@@ -25,6 +25,8 @@ from expdesign.vessel import Vessel
 Trial = tuple[Commands, Trajectory]
 LONGEST = 300.0
 """Ship lengths at approach speed after which an unfinished trial ends."""
+STILL = np.zeros((1, 4))
+"""Calm water and air."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,19 +108,23 @@ def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: st
     state: Array = np.array(begun(vessel.model, (0.0, 0.0, 0.0, *approach.velocity.tolist())))
     rows: list[list[float]] = []
     states, began_s, finished = [state], 0.0, False
-    standing = approach.inputs[:, None]
-    shares = step_shares(vessel.responses, sample_time_s=step_s, substeps=SUBSTEPS)
-    actuators = ActuatorState.standing(vessel.responses, standing, sample_time_s=step_s, substeps=shares)
+    motion = _Sample(vessel, step_s)
+    actuators = ActuatorState.standing(
+        vessel.responses, approach.inputs[:, None], sample_time_s=step_s, substeps=motion.shares
+    )
     while not finished and len(rows) < round(end_s / step_s):
         stage, since_s = waiting[0], len(rows) * step_s - began_s
         row, moved = orders.toward(stage, stage, 1.0)
-        share = _share_left(vessel, _delivered(actuators, row), state, stage, since_s, step_s)
+        given = _delivered(actuators, row)
+        after = motion.end(state, given)
+        share = motion.share_left(stage, since_s, (state, given, after))
         if share is not None and len(waiting) > 1:
             waiting, began_s = waiting[1:], len(rows) * step_s + share * step_s
             row, moved = orders.toward(stage, waiting[0], share)
+            after = motion.end(state, _delivered(actuators, row))
         elif share is not None:
             finished = conduct.duration_s is None
-        orders, state = moved, _stepped(vessel, _delivered(actuators, row), state, step_s, step_s)
+        orders, state = moved, after
         actuators = actuators.after(np.array(row)[:, None])
         rows.append(row)
         states.append(state)
@@ -135,31 +141,52 @@ def _delivered(actuators: ActuatorState, row: list[float]) -> Array:
     return np.broadcast_to(given, (actuators.substeps, len(row)))
 
 
-def _share_left(
-    vessel: Vessel, given: Array, state: Array, stage: Stage, since_s: float, step_s: float
-) -> float | None:
-    """The share of a sample after which a stage is over, or None when it goes on."""
+class _Sample:
+    """The motion within one sample, by the integrator steps of `simulate`."""
 
-    def left(share: float) -> float:
-        return stage.left(since_s + share * step_s, _stepped(vessel, given, state, step_s, share * step_s))
+    def __init__(self, vessel: Vessel, step_s: float) -> None:
+        from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
 
-    if left(1.0) > 1e-9:
-        return None
-    if left(1.0) > 0:
-        return 1.0
-    return 0.0 if left(0.0) <= 0 else float(scipy.optimize.brentq(left, 0.0, 1.0, xtol=1e-12))
+        self.shares = step_shares(vessel.responses, sample_time_s=step_s, substeps=SUBSTEPS)
+        self._vessel, self._step_s = vessel, step_s
+        self._integrator = compiled_integrator(vessel.model, "rk4")
 
+    def end(self, state: Array, given: Array) -> Array:
+        """The state a sample later, with the delivered values (substeps, m) of each step."""
+        return self._stepped(state, given, self._step_s, self.shares)
 
-def _stepped(vessel: Vessel, given: Array, state: Array, step_s: float, until_s: float) -> Array:
-    """The state a time into a sample, by the steps of `simulate`, with the delivered values of each."""
-    from expdesign.simulation._casadi import compiled_integrator  # CasADi is loaded when a motion is integrated
+    def share_left(self, stage: Stage, since_s: float, sailed: tuple[Array, Array, Array]) -> float | None:
+        """The share of a sample after which a stage is over, or None when it goes on.
 
-    shares = step_shares(vessel.responses, sample_time_s=step_s, substeps=SUBSTEPS)
-    steps_s, integrator, still = step_s * shares, compiled_integrator(vessel.model, "rk4"), np.zeros((1, 4))
-    begins_s = np.cumsum(steps_s) - steps_s
-    for begin_s, each_s, held in zip(begins_s.tolist(), steps_s.tolist(), given, strict=True):
-        part_s = min(max(until_s - begin_s, 0.0), each_s)
-        state = integrator.states(state, held[None, None], sea=still, sample_time_s=part_s, substeps=1)[-1]
-    if not (np.abs(state[3:]) < LARGEST_SPEED).all():
-        raise Diverged(f"vessel {vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s")
-    return state
+        Args:
+            stage: stands since `since_s` before the sample [s].
+            since_s: see there.
+            sailed: state before, delivered values (substeps, m) of each step, state a sample later.
+        """
+        before, given, after = sailed
+        rest = stage.left(since_s + self._step_s, after)
+        if rest > 1e-9:
+            return None
+        if rest > 0:
+            return 1.0
+
+        def left(share: float) -> float:
+            time_s = share * self._step_s
+            return stage.left(since_s + time_s, self._within(before, given, time_s))
+
+        return 0.0 if left(0.0) <= 0 else float(scipy.optimize.brentq(left, 0.0, 1.0, xtol=1e-12))
+
+    def _within(self, state: Array, given: Array, until_s: float) -> Array:
+        """The state a time into the sample."""
+        steps_s = self._step_s * self.shares
+        for begin_s, each_s, held in zip(np.cumsum(steps_s) - steps_s, steps_s, given, strict=True):
+            state = self._stepped(state, held[None], min(max(until_s - begin_s, 0.0), each_s), 1)
+        return state
+
+    def _stepped(self, state: Array, given: Array, time_s: float, substeps: int | Array) -> Array:
+        state = self._integrator.states(state, given[None], sea=STILL, sample_time_s=time_s, substeps=substeps)[-1]
+        if not (np.abs(state[3:]) < LARGEST_SPEED).all():
+            raise Diverged(
+                f"vessel {self._vessel.name!r}: the model is unstable: a speed passes {LARGEST_SPEED:g} m/s or rad/s"
+            )
+        return state
