@@ -189,14 +189,9 @@ def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float,
 EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
 
 
-@pytest.mark.parametrize(
-    ("name", "trials"),
-    [
-        (EFFECTS[0], 12),
-        *(pytest.param(name, 100, marks=pytest.mark.slow) for name in EFFECTS),
-    ],
-)
-def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name, trials):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EFFECTS)
+def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name, trials=100):
     """Within three standard errors of the binomial distribution, and eight points for the noise that is estimated."""
     predicted, found = shares_found(case, known, foreseen[name], 0.6, trials)
     assert abs(predicted - 0.6) < 0.15  # sizes are scaled in proportion
