@@ -186,13 +186,14 @@ def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float,
     return there.power, hits / trials
 
 
+TRIALS = 100
 EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
-def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name, trials=100):
+def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name):
     """Within three standard errors of the binomial distribution, and eight points for the noise that is estimated."""
-    predicted, found = shares_found(case, known, foreseen[name], 0.6, trials)
+    predicted, found = shares_found(case, known, foreseen[name], 0.6, TRIALS)
     assert abs(predicted - 0.6) < 0.15  # sizes are scaled in proportion
-    assert abs(found - predicted) < 3 * np.sqrt(predicted * (1 - predicted) / trials) + 0.08
+    assert abs(found - predicted) < 3 * np.sqrt(predicted * (1 - predicted) / TRIALS) + 0.08
