@@ -133,15 +133,6 @@ COMPONENTS, COURSES = 200, 36
 """Of waves that are drawn, and over which encounter is averaged."""
 
 
-def shaping_filter(peak_radps: float, *, damping: float, std: float = 1.0) -> tuple[Array, Array]:
-    """Numerator and denominator (3,) in p of K p / (p^2 + 2 zeta w p + w^2), for white noise of unit density.
-
-    The output has the standard deviation `std`, and its spectrum its peak at `peak_radps`.
-    """
-    w, zeta = peak_radps, damping
-    return np.array([0.0, 2.0 * std * np.sqrt(zeta * w), 0.0]), np.array([1.0, 2.0 * zeta * w, w * w])
-
-
 POWERS = {
     "length": 1.0, "time": 0.5, "speed": 0.5, "angle": 0.0, "mass": 3.0, "force": 3.0, "moment": 4.0, "damping": 4.5,
     "inertia": 5.0,

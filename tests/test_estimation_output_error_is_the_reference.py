@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NoAnswer
-from expdesign.estimation.disturbance import mean_current
+from expdesign.estimation.disturbance import current_moments
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.output_error import gauss_newton, minimise
@@ -198,7 +198,7 @@ def test_a_steady_current_is_estimated_with_the_parameters(method: str) -> None:
     fixed = () if "air" in method else tuple(MERGED.values())
     found = estimate(data, model, method=method, settings=Settings(fixed=fixed))
     np.testing.assert_allclose(found.values, [TRUTH[name] for name in found.names], rtol=1e-6)
-    np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-6)
+    np.testing.assert_allclose(current_moments(found).mean, CURRENT, rtol=1e-6)
 
 
 def without_air(model: VesselModel) -> VesselModel:

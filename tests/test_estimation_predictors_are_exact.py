@@ -7,7 +7,7 @@ import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.estimation.disturbance import READINGS, mean_current
+from expdesign.estimation.disturbance import READINGS, current_moments
 from expdesign.estimation.methods import METHODS, estimate
 from expdesign.estimation.regression.predictors import build_layout, build_regression
 from expdesign.estimation.settings import Settings
@@ -100,7 +100,7 @@ def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
         record(*batches), NOMINAL, method="iv-augmented", settings=Settings(weighting=Weighting(mean=mean))
     )
     assert_true(found, rtol=1e-5)
-    np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-5)
+    np.testing.assert_allclose(current_moments(found).mean, CURRENT, rtol=1e-5)
 
 
 @pytest.mark.parametrize("mean", ["none", "complete", "batch"])
@@ -111,7 +111,7 @@ def test_a_steady_current_of_two_parameters_is_found_whatever_the_moduli_do(mean
     weighting = Weighting(mean=mean)
     found = estimate(record(*batches), NOMINAL, method="iv-air-current", settings=Settings(weighting=weighting))
     assert_true(found, rtol=1e-6)
-    np.testing.assert_allclose(mean_current(found)[0], CURRENT, rtol=1e-6)
+    np.testing.assert_allclose(current_moments(found).mean, CURRENT, rtol=1e-6)
 
 
 @pytest.mark.parametrize("lost", ["X_u", "Y_v"])
@@ -122,13 +122,14 @@ def test_surge_and_sway_each_tell_the_current(lost: str, monkeypatch: pytest.Mon
     rng = np.random.default_rng(12)
     batch = measured(noisy, commands(3000, rng), weather=weather)
     found = estimate(record(batch), NOMINAL, method="iv-augmented")
-    both, covariance = mean_current(found, heading_std_rad=0.01)
+    both = current_moments(found, heading_std_rad=0.01)
     left = tuple(reading for reading in READINGS if reading[0] != lost)
     monkeypatch.setattr("expdesign.estimation.disturbance.READINGS", left)
-    alone, wider = mean_current(found, heading_std_rad=0.01)
-    for value, spread in ((both, covariance), (alone, wider)):
-        assert (np.abs(value - CURRENT) < 5 * np.sqrt(np.diag(spread))).all()
-    assert (np.diag(covariance) <= np.diag(wider) * (1 + 1e-9)).all()
+    alone = current_moments(found, heading_std_rad=0.01)
+    variance, wider = (np.diag(reading.covariance)[:2] for reading in (both, alone))
+    for reading, spread in ((both, variance), (alone, wider)):
+        assert (np.abs(reading.mean - CURRENT) < 5 * np.sqrt(spread)).all()
+    assert (variance <= wider * (1 + 1e-9)).all()
 
 
 def test_batches_excited_the_other_way_round_flip_the_signs_of_nuisance_terms() -> None:

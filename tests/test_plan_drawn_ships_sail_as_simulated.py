@@ -56,20 +56,8 @@ def test_a_fleet_of_one_sails_like_a_single_ship(name):
     alone = simulate(vessel, told, environment=weather, standing=np.zeros(4))
     fleet = Fleet(vessel, CALM, truths(vessel, 1, (0.2, -0.1)), state=np.zeros(6), standing=np.zeros(4), rng=rng)
     for row in values:
-        fleet.advance(row[None], np.ones(1, dtype=bool))
+        fleet.advance(row[None])
     np.testing.assert_allclose(fleet.states[0], np.r_[alone.pose[-1], alone.velocity[-1]], rtol=1e-9, atol=1e-9)
-
-
-def test_ships_that_wait_stay_as_they_are_and_go_on_as_if_they_had_not_waited():
-    vessel, rng = slow(RESPONSES["lag"]), np.random.default_rng(0)
-    values = np.cumsum(rng.normal(0, [0.5, 0.05, 0.5, 0.05], (20, 4)), axis=0)
-    fleet = Fleet(vessel, CALM, truths(vessel, 2), state=np.zeros(6), standing=np.zeros(4), rng=rng)
-    for row in values:
-        fleet.advance(np.tile(row, (2, 1)), np.array([True, False]))
-    np.testing.assert_array_equal(fleet.states[1], 0.0)
-    for row in values:
-        fleet.advance(np.tile(row, (2, 1)), np.array([False, True]))
-    np.testing.assert_allclose(fleet.states[1], fleet.states[0])
 
 
 @pytest.mark.parametrize("name", RESPONSES)
@@ -199,7 +187,7 @@ def test_a_helmsman_brings_a_ship_with_a_rudder_to_a_course_and_holds_its_speed(
     for _ in range(800):
         before = fleet.states
         wanted = np.column_stack([before[:, :2], np.full(2, 0.6), np.full(2, 6.0), np.zeros((2, 2))])
-        fleet.advance(helm.commands(wanted, before, fleet.given, unexplained=unexplained), np.ones(2, dtype=bool))
+        fleet.advance(helm.commands(wanted, before, fleet.given, unexplained=unexplained))
         unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
     np.testing.assert_allclose(fleet.states[:, 2], 0.6, atol=0.01)
     np.testing.assert_allclose(fleet.states[:, 3], 6.0, atol=0.05)

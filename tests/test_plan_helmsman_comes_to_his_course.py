@@ -23,11 +23,11 @@ def test_a_ship_beside_the_track_is_steady_on_it_when_the_run_begins(side):
     standing[0] = water.ship.approach.helm.inputs(water.ship.approach.drive, 0.0)[0]
     fleet = Fleet(vessel, CALM, truths, state=start, standing=standing, rng=rng)
     helm = Helmsman(vessel=vessel, environment=CALM, ship=water.ship)
-    unexplained, everyone = np.zeros((count, 3)), np.ones(count, dtype=bool)
+    unexplained = np.zeros((count, 3))
     for _ in range(int(CONTROL.helm_run_up_hulls * vessel.length_m / speed / vessel.sample_time_s)):
         before = fleet.states
         desired = np.column_stack([before[:, :1], 0 * before[:, :2], np.full((count, 1), speed), 0 * before[:, :2]])
-        fleet.advance(helm.commands(desired, before, fleet.given, unexplained=unexplained), everyone)
+        fleet.advance(helm.commands(desired, before, fleet.given, unexplained=unexplained))
         unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
     assert np.abs(wrap_angle(fleet.states[:, 2])).max() < MONTE_CARLO.heading_rad
     assert np.abs(fleet.states[:, 5]).max() < MONTE_CARLO.yaw_rate_share * water.ship.yaw_rate_radps

@@ -36,7 +36,7 @@ def settled_s(vessel: Vessel, *, allowed_for: bool) -> np.ndarray:
     for _ in range(SAMPLES):
         delivered = fleet.delivered if allowed_for else None
         told = helm.commands(np.zeros((8, 6)), fleet.states, fleet.given, delivered=delivered)
-        fleet.advance(told, np.ones(8, dtype=bool))
+        fleet.advance(told)
         away.append(np.hypot(*fleet.states[:, :2].T))
     far = np.array(away) > NEAR_M
     assert not far[-1].any()
@@ -74,6 +74,6 @@ def test_a_helm_steered_ship_that_is_to_go_astern_does_not_turn_round():
     for sample in range(int(60 / vessel.sample_time_s)):
         place = -2.0 * (sample + 1) * vessel.sample_time_s
         wanted = np.array([[place, 0.0, 0.0, -2.0, 0.0, 0.0]])
-        fleet.advance(helm.commands(wanted, fleet.states, fleet.given), np.ones(1, dtype=bool))
+        fleet.advance(helm.commands(wanted, fleet.states, fleet.given))
     assert abs(fleet.states[0, 2]) < 0.1
     assert fleet.states[0, 3] < -1.0

@@ -34,7 +34,7 @@ def run(name: str, displacement, *, room_m: float = 20.0) -> Footprint:
 
 def space(water: shapely.Geometry, goal, *runs: Footprint) -> SearchSpace:
     legs = leg_water(water)
-    margin = legs.path_margin_m + legs.field.cell_m / 2
+    margin = legs.leg_margin_m + legs.field.cell_m / 2
     return SearchSpace(
         footprints=runs,
         frame=legs.area.frame,

@@ -20,7 +20,6 @@ from expdesign.roll import (
     discrete,
     first_moment,
     load_from,
-    lumped_centre,
     named,
     own_parameters,
     parameters,
@@ -29,7 +28,7 @@ from expdesign.roll import (
     simulated,
     stiffness,
 )
-from expdesign.waves import Jonswap, encounter, froude_factor, shaping_filter
+from expdesign.waves import Jonswap, encounter, froude_factor
 from roll_truths import MODEL_SHIP, MODEL_SHIP_TRUTH, PENDULUM, PENDULUM_TRUTH, Hull, ship_system
 
 LOAD = Load(mass_kg=0.2, z_m=-0.274)
@@ -236,13 +235,6 @@ def test_a_ship_leans_into_her_turn_first_and_out_of_it_then() -> None:
     assert np.abs(angle[-1]) > np.abs(angle[5])
 
 
-def test_lumped_masses_have_the_same_first_moment_and_inertia() -> None:
-    total, centre = lumped_centre(PENDULUM, LOAD)
-    assert total * centre == pytest.approx(first_moment(PENDULUM, LOAD))
-    around = 0.1385 + PENDULUM.mass_kg * (centre - PENDULUM.z_g) ** 2 + LOAD.mass_kg * (centre - LOAD.z_m) ** 2
-    assert around + total * centre**2 == pytest.approx(axis_inertia(0.1385, PENDULUM, LOAD))
-
-
 @pytest.mark.parametrize("gamma", [1.0, 2.0, 3.3, 5.0])
 def test_a_jonswap_sea_has_its_peak_and_height(gamma: float) -> None:
     sea, w = Jonswap(height_m=2.0, peak_radps=0.4, gamma=gamma), np.linspace(0.05, 20.0, 200_000)
@@ -255,14 +247,6 @@ def test_waves_are_met_faster_ahead_and_slower_astern() -> None:
     assert encounter(np.array([0.5]), speed_mps=5.0, heading_rad=np.pi) == pytest.approx(0.5 + 0.25 * 5.0 / G_MPS2)
     assert encounter(np.array([0.5]), speed_mps=5.0, heading_rad=np.pi / 2) == pytest.approx(0.5)
     assert encounter(np.array([2.0]), speed_mps=20.0, heading_rad=0.0) == pytest.approx(4.0 * 20.0 / G_MPS2 - 2.0)
-
-
-def test_the_shaping_filter_gives_its_deviation_and_peak() -> None:
-    above, below = shaping_filter(0.8, damping=0.2, std=3.0)
-    w = np.linspace(1e-3, 60.0, 600_000)
-    gain = np.abs(np.polyval(above, 1j * w) / np.polyval(below, 1j * w)) ** 2
-    assert np.trapezoid(gain, w) / np.pi == pytest.approx(9.0, rel=0.01)
-    assert w[np.argmax(gain)] == pytest.approx(0.8, abs=1e-3)
 
 
 def test_froude_scales_the_model_ship_to_hers() -> None:

@@ -192,15 +192,6 @@ def test_stepping_sample_by_sample_delivers_what_is_delivered_to_commands_known_
         actuators = actuators.after(command)
 
 
-def test_actuators_of_ships_that_wait_stay_as_they_are():
-    commands, moving = np.random.default_rng(4).normal(size=(2, 2)), np.array([True, False])
-    before = ActuatorState.standing((SPEED, ANGLE), np.ones((2, 2)), sample_time_s=0.5, substeps=2)
-    after, all_moved = before.after(commands, moving), before.after(commands)
-    np.testing.assert_array_equal(after.values, np.where(moving, all_moved.values, before.values))
-    for now, moved, then in zip(after.past, all_moved.past, before.past, strict=True):
-        np.testing.assert_array_equal(now, np.where(moving, moved, then))
-
-
 def test_what_is_delivered_can_be_asked_for():
     ship, commands = sluggish(SPEED, ANGLE, IDEAL, IDEAL), random_commands(12)
     given = delivered(ship, commands, standing=STANDING)

@@ -24,7 +24,6 @@ class OneStep:
         outputs: names.
         residuals: (k, n) in the unit of a sample-to-sample difference.
         batch: (k,) number of the run.
-        step: (k,) sample k - 1 within the run.
         explained: (n,) share of the variance of nu(k) - nu(k - 1) that the model explains, at most 1.
         autocorrelation: (lags + 1, n), 1 at lag 0; pairs never reach across runs or missing samples.
     """
@@ -32,16 +31,14 @@ class OneStep:
     outputs: tuple[str, ...]
     residuals: Array
     batch: Integers
-    step: Integers
     explained: Array
     autocorrelation: Array
 
     def __post_init__(self) -> None:
         seal(self, residuals="k n", explained="n", autocorrelation="l n")
-        for name in ("batch", "step"):
-            numbers = np.array(getattr(self, name), dtype=np.int64)
-            numbers.setflags(write=False)
-            frozen_set(self, name, numbers)
+        numbers = np.array(self.batch, dtype=np.int64)
+        numbers.setflags(write=False)
+        frozen_set(self, "batch", numbers)
 
     @property
     def white_band(self) -> float:
@@ -76,7 +73,6 @@ def one_step(
         outputs=regression.outputs,
         residuals=residuals,
         batch=regression.batch_of,
-        step=regression.step_of,
         explained=explained,
         autocorrelation=autocorrelation(residuals, regression.batch_of, regression.step_of),
     )

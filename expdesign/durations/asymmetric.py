@@ -33,20 +33,19 @@ def definite_start(problem: DurationProblem, polytope: Polytope) -> Array | None
     return w if np.linalg.eigvalsh(prior + np.tensordot(w, matrices, axes=1))[0] > TUNING.definite else None
 
 
-def improved(problem: DurationProblem, polytope: Polytope, start: Array | None, *, seed: int = 0) -> Array:
+def improved(problem: DurationProblem, polytope: Polytope, start: Array | None) -> Array:
     """Fractions (q,) with log |det B| no lower than at the start, by sequential quadratic programming.
 
     Args:
         problem: with matrices that need not be symmetric.
         polytope: limits.
         start: (q,), or None for `Tuning.starts` random ones.
-        seed: of the random starts.
 
     Raises:
         NotInformative: |det B| is zero wherever the search began.
     """
     q = len(problem.names)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     starts = [start] if start is not None else [rng.dirichlet(np.ones(q)) for _ in range(TUNING.starts)]
     matrices, prior = _unit_scaled(problem)
 

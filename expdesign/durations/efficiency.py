@@ -17,9 +17,6 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
 
-DESIGNS = ("continuous", "repeats", "uniform")
-"""The optimal fractions, their whole runs, and equal time on every primitive."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Efficiencies:

@@ -99,8 +99,10 @@ def tells_current(estimate: Estimate) -> bool:
     return set(STEADY_CURRENT) <= names or any(_needs(reading) <= names for reading in READINGS)
 
 
-def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Array, Array]:
-    """(2,) mean current to north/east [m/s] and its covariance (2, 2), to first order.
+def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Moments:
+    """Mean and second moments of the current.
+
+    The second moments of a current that is estimated as steady are those of its mean, and not estimated.
 
     Args:
         estimate: of a method with a steady current, or of an augmented one with X_u or Y_v among its parameters.
@@ -108,15 +110,6 @@ def mean_current(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[A
 
     Raises:
         InputError: the estimate has no disturbance parameters.
-    """
-    found = _mean_current(estimate, heading_std_rad)
-    return found.values, found.slopes @ estimate.joint_covariance @ found.slopes.T
-
-
-def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Moments:
-    """Mean and second moments of the current; arguments and errors as in `mean_current`.
-
-    The second moments of a current that is estimated as steady are those of its mean, and not estimated.
     """
     columns = [
         index for index, own in enumerate(estimate.nuisance_shares) if _of(own, SECOND) and not any(s.air for s in own)

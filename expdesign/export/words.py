@@ -109,6 +109,6 @@ def _degrees_minutes(degrees: float, width: int, decimals: int) -> str:
     return f"{whole:0{width}d}\N{DEGREE SIGN}{minutes}\N{PRIME}"
 
 
-def counted(count: int, one: str, many: str | None = None) -> str:
+def counted(count: int, one: str) -> str:
     """1 run, 3 runs."""
-    return f"{count} {one if count == 1 else many or one + 's'}"
+    return f"{count} {one}{'' if count == 1 else 's'}"

@@ -96,7 +96,6 @@ def foresee(
             for cause in CAUSES
             if cause.name not in names
         ),
-        samples=int(np.isfinite(known.windows.measured).any(axis=2).sum()),
         duration_s=known.windows.duration_s,
         wanted_power=TUNING.wanted_power,
         random_current_mps=known.base.noise.current_std_mps,

@@ -77,14 +77,12 @@ class Rivals:
 
     Attributes:
         tests: tested candidates.
-        rows: per candidate, its rows of the information.
         whitening: (m, w) of scores to independent numbers, those of each candidate side by side; parts: (t,) their
             beginnings.
         noise: (n, m) drawn scores; white: (n, w) the same whitened.
     """
 
     tests: tuple[ScoreTest, ...]
-    rows: tuple[NDArray[np.int64], ...]
     whitening: Array
     parts: NDArray[np.int64]
     noise: Array
@@ -123,7 +121,6 @@ def rivals_of(
     drawn = rng.standard_normal((TUNING.draws, len(A))) @ spread
     return Rivals(
         tests=tuple(tests),
-        rows=tuple(rows),
         whitening=whitening,
         parts=np.array(parts),
         noise=drawn,

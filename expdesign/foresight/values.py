@@ -108,7 +108,7 @@ class Foresight:
     Attributes:
         effects: in the order of the catalogue.
         unseen: (cause, why) of causes that these records cannot show.
-        samples: compared; duration_s: of the trial.
+        duration_s: of the trial.
         wanted_power: of what counts as revealed.
         random_current_mps: standard deviation of the wandering current that the diagnosis allows for.
         together: runs that bring every effect which can be brought there to the wanted power; None where none is
@@ -118,7 +118,6 @@ class Foresight:
 
     effects: tuple[Foreseen, ...]
     unseen: tuple[tuple[str, str], ...]
-    samples: int
     duration_s: float
     wanted_power: float
     random_current_mps: float

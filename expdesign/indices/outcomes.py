@@ -33,16 +33,12 @@ class StandardResults:
     """All standard trials of one vessel at one approach speed.
 
     Attributes:
-        vessel: its name.
-        length_m: of the ship.
         speed_mps: approach speed.
         helm: steering actuators, in words.
         circles, zigzags, stops: the trials, starboard before port.
         not_run: why a trial could not be run, one sentence each.
     """
 
-    vessel: str
-    length_m: float
     speed_mps: float
     helm: str
     circles: tuple[Circle, ...]
@@ -95,8 +91,6 @@ def standard_results(
     except (InputError, NoAnswer) as error:
         not_run.append(str(error))
     return StandardResults(
-        vessel=vessel.name,
-        length_m=vessel.length_m,
         speed_mps=approach.speed_mps,
         helm=approach.helm.description,
         circles=tuple(circles),

@@ -21,7 +21,7 @@ derived here.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,6 @@ def expected_covariance(
     *,
     environment: Environment = CALM,
     mean_subtraction: str = "complete",
-    instruments: VesselModel | None = None,
     integrator: str = "rk4",
     unknown_current: bool = False,
     excitation: str = FREE,
@@ -80,7 +79,6 @@ def expected_covariance(
         parameters: names of the estimated parameters, in the order of the result.
         environment: mean current and wind, and the current's white variation from sample to sample.
         mean_subtraction: from the instruments: "none", "batch" (each part's own mean) or "complete".
-        instruments: model that simulates the instruments; the vessel's own by default, as after refinement.
         integrator: "rk4" for the motion of a ship and its parameters, "euler" for the map that defines discrete ones.
         unknown_current: whether a steady current is estimated with the parameters, as by methods iv-current and
             iv-air-current.
@@ -95,7 +93,6 @@ def expected_covariance(
             part,
             parameters,
             environment,
-            instruments or vessel.model,
             integrator,
             unknown_current,
             excitation,
@@ -162,29 +159,23 @@ def _rows(
     part: TrialPart,
     parameters: Sequence[str],
     environment: Environment,
-    instruments: VesselModel,
     integrator: str,
     unknown_current: bool,
     excitation: str,
 ) -> _Rows:
     model, outputs = vessel.model, vessel.model.outputs
 
-    def sailed(which: Vessel) -> Trajectory:
-        return simulate(
-            which,
-            part.commands,
-            pose=np.array([0.0, 0.0, part.heading_rad]),
-            velocity=part.velocity,
-            environment=environment,
-            standing=part.standing,
-            integrator=integrator,
-            substeps=1 if integrator == "euler" else SUBSTEPS,
-        )
-
-    second = vessel if instruments is model else replace(vessel, model=instruments)
-    own = sailed(vessel)
-    other = own if second is vessel else sailed(second)
-    given, given_second = (delivered(which, part.commands, standing=part.standing) for which in (vessel, second))
+    own = simulate(
+        vessel,
+        part.commands,
+        pose=np.array([0.0, 0.0, part.heading_rad]),
+        velocity=part.velocity,
+        environment=environment,
+        standing=part.standing,
+        integrator=integrator,
+        substeps=1 if integrator == "euler" else SUBSTEPS,
+    )
+    given = delivered(vessel, part.commands, standing=part.standing)
     shares = (1.0, 0.0) if integrator == "euler" else (0.5, 0.5)
     ends = [(share, begin) for begin, share in enumerate(shares) if share]
     slopes = [_derivatives(model, _from(own, begin), given, environment) for begin in range(2)]
@@ -192,22 +183,20 @@ def _rows(
         np.stack([share * by for share, by in zip(shares, pair, strict=True)]) for pair in zip(*slopes, strict=True)
     )
 
-    def blocks(which: VesselModel, motion: Trajectory, inputs: Commands) -> Array:
-        parts = []
-        for share, begin in ends:
-            moved = _from(motion, begin)
-            block = _blocks(which, moved, inputs, environment, parameters)
-            if unknown_current:
-                block = np.concatenate([block, _by_current(which, moved, inputs, environment)[..., chosen]], axis=1)
-            parts.append(share * block)
-        return np.asarray(sum(parts[1:], start=parts[0]))
-
     noise = vessel.sensors
     chosen = [("u", "v", "r").index(name) for name in outputs]
+    blocks = []
+    for share, begin in ends:
+        moved = _from(own, begin)
+        block = _blocks(model, moved, given, environment, parameters)
+        if unknown_current:
+            block = np.concatenate([block, _by_current(model, moved, given, environment)[..., chosen]], axis=1)
+        blocks.append(share * block)
+    regressors = np.asarray(sum(blocks[1:], start=blocks[0]))
     sensor = np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2
     return _Rows(
-        regressors=blocks(model, own, given),
-        instruments=blocks(instruments, other, given_second) * (_weights(sensor) if unknown_current else 1.0),
+        regressors=regressors,
+        instruments=regressors * (_weights(sensor) if unknown_current else 1.0),
         by_velocity=by_water[:, :, chosen][..., chosen],
         by_air=by_air[:, :, chosen],
         by_current=slopes[0][0][:, chosen, :2],

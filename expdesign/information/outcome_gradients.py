@@ -40,7 +40,6 @@ def outcome_gradients(
     parameters: Sequence[str],
     *,
     speed_mps: float | None = None,
-    side: str = "starboard",
     progress: Progress = silent,
 ) -> OutcomeGradients:
     """Gradients of named outcomes by named parameters, at the nominal model.
@@ -50,7 +49,6 @@ def outcome_gradients(
         names: keys of `indices.OUTCOMES`.
         parameters: p names.
         speed_mps: approach speed for all parameter values; that of the nominal model when not given.
-        side: of the first turn.
         progress: of the simulations.
 
     Raises:
@@ -61,7 +59,7 @@ def outcome_gradients(
     theta = vessel.model.parameters
 
     def found(values: Array) -> Array:
-        table = outcomes(vessel, speed_mps=speed, parameters=values, names=tuple(names), side=side)
+        table = outcomes(vessel, speed_mps=speed, parameters=values, names=tuple(names))
         return np.array([table[name] for name in names])
 
     base = found(theta)

@@ -45,11 +45,6 @@ class PrimitiveInformation:
             frozen_set(self, "used", np.ones(self.Y.shape[1]))
         seal(self, X="p p", Y="p n", Z="p n", YZ="p p", used="n")
 
-    @property
-    def mean_products(self) -> Array:
-        """(p, p) Y Z^T, each column over its share of samples: what its own complete mean subtraction takes from X."""
-        return np.asarray(over_shares(self.Y, self.used) @ self.Z.T)
-
 
 def over_shares(Y: Array, used: Array) -> Array:
     """(..., p, n) columns of Y over their shares (..., n); zero where nothing is used."""

@@ -202,10 +202,10 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner, *
     )
 
 
-def run_space(problem: PlanProblem, water: LegWater, off_m: Sequence[Array] | None = None) -> RunSpace:
-    """Where runs may be placed in a water; `off_m` are the dispersions, where known."""
+def run_space(problem: PlanProblem, water: LegWater) -> RunSpace:
+    """Where runs may be placed in a water."""
     return RunSpace(
-        footprints=footprints(problem, water.field, dispersions(problem) if off_m is None else off_m),
+        footprints=footprints(problem, water.field, dispersions(problem)),
         frame=problem.area.frame,
         field=water.field,
         leg_margin_m=water.leg_margin_m + water.field.cell_m / 2,

@@ -164,10 +164,11 @@ class Draft:
     def __post_init__(self) -> None:
         seal(self, made_good_m="legs", late_s="legs")
 
-    def beyond_s(self, kind: str) -> float:
-        """Time of the legs of one kind beyond what the way that they make good takes at transit speed [s]."""
-        of_kind = [leg.kind == kind for leg in self.sailed.legs]
-        return self.sailed.seconds(kind) - float(self.made_good_m[of_kind].sum()) / self.transit_mps
+    @property
+    def runs_beyond_s(self) -> float:
+        """Time of the runs beyond what the distance that they make good takes at transit speed [s]."""
+        runs = [leg.kind == "primitive" for leg in self.sailed.legs]
+        return self.sailed.seconds("primitive") - float(self.made_good_m[runs].sum()) / self.transit_mps
 
 
 def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Progress = silent) -> Draft:

@@ -48,7 +48,6 @@ class Pieces:
 
     Attributes:
         labels: of each piece.
-        parameters: p names.
         H: (m, p, p) sums of Z Phi^T.
         h: (m, p) sums of Z y.
         Z, F: (m, p, n) sums of instruments and of regressors.
@@ -60,7 +59,6 @@ class Pieces:
     """
 
     labels: tuple[str, ...]
-    parameters: tuple[str, ...]
     H: Array
     h: Array
     Z: Array
@@ -148,7 +146,6 @@ def recorded_pieces(
 
     return Pieces(
         labels=tuple(labels),
-        parameters=layout.parameters,
         H=np.array([np.einsum("knp,knq->pq", Z, F) for Z, F, _ in own]),
         h=np.array([np.einsum("knp,kn->p", Z, e) for Z, _, e in own]),
         Z=np.array([Z.sum(axis=0).T for Z, _, _ in own]),

@@ -42,7 +42,6 @@ from expdesign.vessel.masses import (
     Load,
     axis_inertia,
     first_moment,
-    lumped_centre,
     sensed_inertia,
 )
 
@@ -82,7 +81,6 @@ __all__ = [
     "froude_scaled",
     "load_from",
     "low_pass",
-    "lumped_centre",
     "named",
     "null_space",
     "open_directions",

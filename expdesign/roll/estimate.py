@@ -131,7 +131,6 @@ class RollEstimate:
         sensed: (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters.
         rounds: (r, 9) parameters after each round of spectra.
         settled: whether the last round changed little.
-        residual_std: (c,) of each case [rad/s].
         strength: of the instruments, what they tell of the worst combination of parameters over what noise alone would
             seem to tell; nan for least squares.
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
@@ -148,14 +147,13 @@ class RollEstimate:
     sensed: Array
     rounds: Array
     settled: bool
-    residual_std: Array
     strength: float
     surprise: float
     unanswered: float
     freedom: float
 
     def __post_init__(self) -> None:
-        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9", residual_std="c")
+        seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9")
 
     @property
     def std(self) -> dict[str, float]:
@@ -226,7 +224,6 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         sensed=sensed,
         rounds=np.array(history),
         settled=settled,
-        residual_std=np.array([np.std(np.concatenate(e)) for e in _noise(problem, weighted, theta)]),
         strength=_strength(problem, weighted, theta, sensed, covariance) if method == "iv" else float("nan"),
         surprise=_surprise(left, len(problem.free) - len(held)),
         unanswered=_unanswered(problem, weighted, theta, sensed) if method == "iv" else float("nan"),

@@ -368,7 +368,7 @@ def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> Bu
     _check_keys(table.cost_per_s, primitives, entry.at("cost_per_s"))
     if bool(table.cost_per_s) == bool(table.use):
         raise entry.error("needs either cost_per_s by primitive or use = 'cubed_propeller_speed'")
-    return BudgetSettings(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s), use=table.use)
+    return BudgetSettings(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s))
 
 
 def _files(given: list[str], entry: Entry) -> tuple[Path, ...]:

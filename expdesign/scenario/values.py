@@ -23,15 +23,13 @@ class BudgetSettings:
     Attributes:
         name: for reports.
         limit: amount available for the whole informative time.
-        cost_per_s: use per second by primitive, where stated.
-        use: computed use otherwise: "cubed_propeller_speed", the mean over the run of the sum of |n|^3 of all
+        cost_per_s: use per second by primitive; where empty, the mean over the run of the sum of |n|^3 of all
             propellers and thrusters [rps3], which grows like shaft power.
     """
 
     name: str
     limit: float
     cost_per_s: Mapping[str, float]
-    use: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -386,5 +386,5 @@ def _impossible(error: NoPlan) -> set[str]:
 
 def _parts(draft: Draft, plan: Plan) -> DayParts:
     """Where the time of a plan goes; runs are those of its draft, and legs may have been planned anew."""
-    runs_s = draft.beyond_s("primitive")
+    runs_s = draft.runs_beyond_s
     return DayParts(way_s=draft.direct_s, runs_s=runs_s, legs_s=plan.commands.duration_s - draft.direct_s - runs_s)

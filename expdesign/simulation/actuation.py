@@ -248,15 +248,14 @@ class ActuatorState:
                 result[:, row] = through.means @ self._driving(row, commands[row]) + through.offset
         return result
 
-    def after(self, commands: Array, moving: np.ndarray | bool = True) -> ActuatorState:
-        """One sample later, for the ships that move (n,); the others stay as they are."""
-        values, pasts = np.where(moving, commands, self.values), list(self.past)
+    def after(self, commands: Array) -> ActuatorState:
+        """One sample later."""
+        values, pasts = np.array(commands, dtype=float), list(self.past)
         for row, through in enumerate(self.maps):
             if through is not None:
                 driving = self._driving(row, commands[row])
-                values[row] = np.where(moving, through.end @ driving, self.values[row])
-                later = np.concatenate([self.past[row][1:], _effective(through, commands[row])[None]])
-                pasts[row] = np.where(moving, later, self.past[row])
+                values[row] = through.end @ driving
+                pasts[row] = np.concatenate([self.past[row][1:], _effective(through, commands[row])[None]])
         return ActuatorState(maps=self.maps, substeps=self.substeps, values=values, past=tuple(pasts))
 
     def _driving(self, row: int, command: Array) -> Array:

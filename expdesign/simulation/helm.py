@@ -26,6 +26,7 @@ THRUSTERS = ("stern", "all")
 SERVICE_SHARE = 0.85 ** (1 / 3)
 """Propeller speed at 85 % of the largest power, as a share of the largest, as power goes with its cube."""
 FASTEST_MPS = 60.0
+HARD_OVER_RAD = math.radians(35.0)
 STEADY = 1e-9
 """Share of its speed that a steady vessel may gain or lose in a second."""
 
@@ -137,17 +138,17 @@ class Helm:
                     f"{value:.4g}, expected {limit.low:.4g} to {limit.high:.4g}"
                 )
 
-    def hardest(self, drive: float, *, up_to_rad: float = math.radians(35.0)) -> float:
-        """Largest helm angle to both sides [rad] that all actuators can give, `up_to_rad` at most."""
+    def hardest(self, drive: float) -> float:
+        """Largest helm angle to both sides [rad] that all actuators can give, `HARD_OVER_RAD` at most."""
         if self.means == "propeller":
-            return up_to_rad
+            return HARD_OVER_RAD
         if self.means != "force":
             reaches = [min(-a.limits[-1].low, a.limits[-1].high) for a in self.steering]
-            return min([up_to_rad, *reaches])
+            return min([HARD_OVER_RAD, *reaches])
         _, side, turn = self.steering[0].limits
         thrust, arm = abs(_share(self.steering[0].limits[0], drive)), self.vessel.length_m / 2
         most = min(-side.low, side.high, -turn.low / arm, turn.high / arm)
-        return min(up_to_rad, math.asin(min(1.0, max(0.0, most) / max(thrust, 1e-300))))
+        return min(HARD_OVER_RAD, math.asin(min(1.0, max(0.0, most) / max(thrust, 1e-300))))
 
     def acceleration(self, motion: tuple[float, float, float], drive: float, angle_rad: float) -> list[float]:
         """d/dt (u, v, r) at a motion (u, v, r) through calm water under orders that have stood for long."""

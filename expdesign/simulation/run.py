@@ -90,7 +90,6 @@ def integrate_motion(
     sea: Array,
     sample_time_s: float,
     substeps: int | Array = SUBSTEPS,
-    integrator: str = "rk4",
 ) -> Array:
     """`simulate` for delivered inputs: states (k + 1, 6), pose and velocity, the start first.
 
@@ -101,13 +100,12 @@ def integrate_motion(
         sea: (k, 4), or (1, 4) where steady: n-frame current and wind to north and east [m/s].
         sample_time_s: time between samples [s].
         substeps: steps per sample, or the shares of it that they take, for which inputs are delivered.
-        integrator: as in `simulate`.
 
     Raises:
         Diverged: a speed passed `LARGEST_SPEED`.
     """
     states = _integrated(
-        vessel, delivered, start, sea=sea, sample_time_s=sample_time_s, substeps=substeps, integrator=integrator
+        vessel, delivered, start, sea=sea, sample_time_s=sample_time_s, substeps=substeps, integrator="rk4"
     )
     return states[:, :STATES]
 

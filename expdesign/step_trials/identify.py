@@ -36,7 +36,6 @@ class StepTrial:
         delays: dead time of throttle and rudder with standard error [s].
         model: with two degrees of freedom.
         found: asymmetry and hysteresis.
-        seed: of the calibration.
     """
 
     batches: tuple[Sailed, ...]
@@ -48,7 +47,6 @@ class StepTrial:
     delays: Delays
     model: TwoDofModel
     found: tuple[Comparison, ...]
-    seed: int
 
     @property
     def counted(self) -> tuple[StepSample, ...]:
@@ -77,7 +75,7 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
     _check(samples)
     return StepTrial(
         batches=batches, holds=holds, controls=controls, rudder_sign=sign, tests=tests, samples=samples, delays=delays,
-        model=_model(samples, delays), found=comparisons(samples), seed=seed,
+        model=_model(samples, delays), found=comparisons(samples),
     )  # fmt: skip
 
 

@@ -39,11 +39,10 @@ def swept_hulls(pose: Array, hull_b: Array) -> np.ndarray:
     return np.asarray(shapely.convex_hull(shapely.multipoints(np.concatenate([corners[:-1], corners[1:]], axis=1))))
 
 
-def covering_discs(length_m: float, beam_m: float, *, count: int = 3) -> tuple[Array, float]:
-    """Forward positions (count,) and the radius of equal discs on the centre line that cover the hull [m]."""
-    piece = length_m / count
-    centres = (np.arange(count) - (count - 1) / 2) * piece
-    return np.asarray(centres, dtype=float), float(np.hypot(piece / 2, beam_m / 2))
+def covering_discs(length_m: float, beam_m: float) -> tuple[Array, float]:
+    """Forward positions (3,) and the radius of equal discs on the centre line that cover the hull [m]."""
+    piece = length_m / 3
+    return np.array([-piece, 0.0, piece]), float(np.hypot(piece / 2, beam_m / 2))
 
 
 def thinned_poses(pose: Array, *, reach_m: float, spacing_m: float) -> np.ndarray:

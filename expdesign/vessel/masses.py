@@ -80,9 +80,3 @@ def axis_inertia(own: float, body: Body, load: Load, z_f: float = 0.0) -> float:
 def sensed_inertia(own: float, body: Body, load: Load, z_f: float = 0.0) -> float:
     """I2 = I1 - z_s S1, the inertia in the equation that reads the accelerometer [kg m2]."""
     return axis_inertia(own, body, load, z_f) - body.sensor(z_f) * first_moment(body, load, z_f)
-
-
-def lumped_centre(body: Body, load: Load) -> tuple[float, float]:
-    """Mass of ship and load together [kg], and the place of their common centre [m]."""
-    total = body.mass_kg + load.mass_kg
-    return total, first_moment(body, load) / total

@@ -81,13 +81,11 @@ class Timeline:
     Attributes:
         place: (k,) where each row of the data stands.
         batch, step: (t,) number of the stretch and sample number in it.
-        owner: (s,) place among the batches of each stretch's own.
     """
 
     place: Integers
     batch: Integers
     step: Integers
-    owner: Integers
 
     def spread(self, rows: Array) -> Array:
         """(t, ...) from (k, ...), zero where a sample was left out."""
@@ -100,12 +98,10 @@ class Timeline:
 
 def timeline(batch: Integers, step: Integers) -> Timeline:
     """The timeline of rows (k,) with their batch and sample numbers."""
-    place, numbers, steps, owner, begin = [], [], [], [], 0
-    known = np.unique(batch)
+    place, numbers, steps, begin = [], [], [], 0
     for number, part in enumerate(stretches(batch, step)):
         place.append(begin + part.places)
         numbers.append(np.full(part.samples, number))
         steps.append(np.arange(part.samples))
-        owner.append(int(np.searchsorted(known, batch[part.rows.start])))
         begin += part.samples
-    return Timeline(np.concatenate(place), np.concatenate(numbers), np.concatenate(steps), np.array(owner))
+    return Timeline(np.concatenate(place), np.concatenate(numbers), np.concatenate(steps))

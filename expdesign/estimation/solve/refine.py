@@ -82,7 +82,6 @@ def refine_iv(
     *,
     prior: Prior | None = None,
     most: int = TUNING.most_refinements,
-    settled: float = TUNING.settled_deviations,
 ) -> Refined:
     """Refine from first instruments.
 
@@ -114,15 +113,15 @@ def refine_iv(
         deviations = np.sqrt(np.diag(covariance))
         moved = np.abs(newer - values) / np.maximum(deviations, 1e-150)
         origin, values, count = before, newer, count + 1
-        if moved.max() < settled:
+        if moved.max() < TUNING.settled_deviations:
             break
     restless = np.zeros(len(equations.uses), dtype=bool)
-    if count == most and moved.max() >= settled:
+    if count == most and moved.max() >= TUNING.settled_deviations:
         warnings.append(
             f"The estimate still changes by {moved.max():.2g} standard deviations after {most} refinements; equations "
             "that do not settle keep their first instruments."
         )
-        restless = np.asarray((equations.uses[:, moved >= settled] > 0).any(axis=1))
+        restless = np.asarray((equations.uses[:, moved >= TUNING.settled_deviations] > 0).any(axis=1))
         instruments = np.where(restless[:, None], first(), instruments)
     parts = build_parts(equations, instruments)
     del instruments

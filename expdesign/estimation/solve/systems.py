@@ -30,7 +30,6 @@ class System:
         varying: (k, n, p) regressors without the mean that is subtracted from instruments.
         size: (p,) norm of that; infinite where it is constant to working precision.
         y: (k, n).
-        batch: (k,) batch numbers of its rows.
         group: (k,) numbers of the rows that share a mean.
         parts: rows of each batch.
     """
@@ -42,7 +41,6 @@ class System:
     varying: Array
     size: Array
     y: Array
-    batch: Integers
     group: Integers
     parts: list[slice]
 
@@ -81,7 +79,6 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
             names = tuple(regression.parameters[index] for index in columns)
             equations = ", ".join(regression.outputs[index] for index in outputs)
             raise NotInformative(f"no sample is left for {equations}, which {', '.join(names)} need", parameters=names)
-    batch = regression.batch_of[rows]
     Phi = _cut(regression.Phi[rows], outputs, columns)
     group = _groups(regression, rows, outputs, mean)
     varying = _without_mean(Phi, group, mean)
@@ -95,9 +92,8 @@ def _system(regression: Regression, columns: Integers, outputs: Integers, mean: 
         varying=varying,
         size=size,
         y=regression.y[rows][:, outputs],
-        batch=batch,
         group=group,
-        parts=batch_slices(batch),
+        parts=batch_slices(regression.batch_of[rows]),
     )
 
 

@@ -94,9 +94,9 @@ def hours(time_s: float) -> str:
     return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
 
 
-def told(content: MonitorContent, alarm: Alarm, number: int | None = None) -> str:
+def told(content: MonitorContent, alarm: Alarm) -> str:
     """The size of a change in words."""
-    change = content.changes[alarm.change if number is None else number]
+    change = content.changes[alarm.change]
     return change.told(alarm.value * change.size, alarm.std * change.size)
 
 

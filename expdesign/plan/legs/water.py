@@ -11,7 +11,7 @@ import shapely
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import CHART, ClearanceField, Corners, VisibilityGraph, polyline_length, visibility_graph_of
-from expdesign.plan.control import Capability, arc_spare_m
+from expdesign.plan.control import Capability
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
@@ -119,11 +119,6 @@ class LegWater:
     def leg_margin_m(self) -> float:
         """Clearance that the centre lines of legs need."""
         return self.clearance_m + self.ship.path_spares_m(self.vessel)[-1]
-
-    @property
-    def path_margin_m(self) -> float:
-        """Clearance of the centre line that keeps the hull clear on an arc of the turning radius."""
-        return self.clearance_m + arc_spare_m(self.ship, self.vessel)
 
     def candidate_paths(self, start: Array, end: Array) -> list[Array]:
         """Paths (k, 2) between two points, shortest first; of similar lengths the one farther from the shore first.

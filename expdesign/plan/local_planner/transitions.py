@@ -29,9 +29,9 @@ from expdesign.simulation import CALM
 from expdesign.values import Array
 
 
-def pairs_of(placements: Sequence[Placement], last: str = "") -> list[Pair]:
+def pairs_of(placements: Sequence[Placement]) -> list[Pair]:
     """Names of the runs before and after each leg, "" for start and goal, once each."""
-    return list(dict.fromkeys(pairwise([last, *(item.primitive for item in placements), ""])))
+    return list(dict.fromkeys(pairwise(["", *(item.primitive for item in placements), ""])))
 
 
 def with_transitions(

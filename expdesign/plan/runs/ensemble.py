@@ -142,9 +142,9 @@ class Fleet:
             past=tuple(_with(whole.T, ships, some.T).T for whole, some in pasts),
         )
 
-    def advance(self, commands: Array, moving: np.ndarray | None = None) -> None:
-        """One sample with commands (n, m); ships that are lost, or do not move (n,), wait."""
-        sails = ~self.lost if moving is None else moving & ~self.lost
+    def advance(self, commands: Array) -> None:
+        """One sample with commands (n, m); ships that are lost wait."""
+        sails = ~self.lost
         if not sails.any():
             return
         if sails.all():
