@@ -34,30 +34,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from expdesign.estimation.noise.timeline import Stretch, Turn
+from expdesign.estimation.noise.parts import Slow, alternatives, covariance_along, directions_of, filtered, slow_parts
+from expdesign.estimation.noise.periodograms import binned, expected_periodogram, misfit_of, periodograms
+from expdesign.estimation.noise.timeline import Stretch
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
-
-WHITE, SENSOR = 0, 1
-"""Places of the quick parts among the variances; slow ones follow."""
-MEMORIES = 2.0 ** np.arange(1, 11)
-"""Of the slow parts [samples]; as long as the longest stretch at most, and one that lasts for ever."""
-
-
-@dataclass(frozen=True)
-class Slow:
-    """A disturbance that lasts.
-
-    Attributes:
-        memory: how long [samples].
-        turning: whether it keeps its side of the chart while the ship turns, not its side of the ship.
-    """
-
-    memory: float
-    turning: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +97,6 @@ def left_shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...], by: Sequence[F
     return (_less(shapes, parts, slow, own) for own in by)
 
 
-def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
-    """Slow parts that noise may have in stretches so long; those of the chart only where headings are known."""
-    longest = max(part.samples for part in parts)
-    memories = MEMORIES[longest >= MEMORIES].tolist()
-    turns = any(part.turn is not None and np.ptp(part.turn) > TUNING.rounding for part in parts)
-    ship, chart = [Slow(memory) for memory in (*memories, np.inf)], [Slow(memory, turning=True) for memory in memories]
-    return (*ship, *chart) if turns else tuple(ship)
-
-
 def _shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...]) -> list[Array]:
     """Expected periodograms (2 + m, f) of each stretch; those of stretches alike are computed once."""
     known: dict[bytes, Array] = {}
@@ -130,7 +104,7 @@ def _shapes(parts: Sequence[Stretch], slow: tuple[Slow, ...]) -> list[Array]:
     for part in parts:
         key = part.places.tobytes() + (b"" if part.turn is None else part.turn.tobytes())
         if key not in known:
-            known[key] = _expected(part, slow)
+            known[key] = expected_periodogram(part, slow)
         result.append(known[key])
     return result
 
@@ -166,10 +140,10 @@ def _fitted(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array], slo
     power = float(eps @ eps) / len(eps)
     variances = np.zeros(2 + len(slow))
     variances[0] = power
-    frequency, ordinates, shapes = _periodograms(eps, parts, expected)
+    frequency, ordinates, shapes = periodograms(eps, parts, expected)
     if not power > 0 or not (frequency > 0).any():
         return Components(variances, slow, 0.0, np.zeros((len(variances),) * 2))
-    binned_power, binned_shapes, count = _binned(frequency, ordinates / power, shapes)
+    binned_power, binned_shapes, count = binned(frequency, ordinates / power, shapes)
     cost = np.inf
     for places, penalty in alternatives(slow, len(frequency)):
         found, own_cost = _most_likely(binned_power, binned_shapes[places], count)
@@ -182,203 +156,6 @@ def _fitted(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array], slo
     return Components(variances, slow, misfit, power**2 * uncertainty)
 
 
-def alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, float]]:
-    """Parts that noise may consist of, and what they must earn: no slow ones, those of the ship, those of the chart."""
-    quick = np.arange(2)
-    kinds = [2 + np.flatnonzero([part.turning == kind for part in slow]) for kind in (False, True)]
-    earned = np.log(ordinates) / 2
-    return [(quick, 0.0), *((np.append(quick, kind), earned) for kind in kinds if len(kind))]
-
-
-def covariance_along(directions: tuple[Array, Array], information: Array) -> Array:
-    """Covariance (q, q) of variances with this information (q, q) that are wrong in these `directions` only."""
-    T, before = directions
-    own = T.T @ information @ T + np.diag(before)
-    size = np.sqrt(np.diag(own))
-    size[size == 0] = 1.0
-    return np.asarray(T @ (np.linalg.pinv(own / np.outer(size, size), hermitian=True) / np.outer(size, size)) @ T.T)
-
-
-def directions_of(variances: Array, slow: Sequence[Slow]) -> tuple[Array, Array]:
-    """How variances (2 + m,) may be wrong: directions (2 + m, d), and what is known about each beforehand (d,).
-
-    The parts that are there may be larger or smaller, and slow ones may have the memory of their neighbours: what lasts
-    long is known much worse than by the size of a part whose memory is given.
-    """
-    there = np.flatnonzero(variances)
-    columns, before = list(np.eye(len(variances))[there]), [0.0] * len(there)
-    for place in there[there > SENSOR].tolist():
-        turning = slow[place - 2].turning
-        ends = [other for other in (place - 1, place, place + 1) if 0 <= other - 2 < len(slow)]
-        ends = [other for other in ends if slow[other - 2].turning == turning]
-        if len(ends) > 1:
-            column = np.zeros(len(variances))
-            column[[ends[0], ends[-1]]] = np.array([-1.0, 1.0]) * variances[place] / (ends[-1] - ends[0])
-            columns.append(column)
-            before.append(TUNING.memory_doublings**-2.0)
-    return np.reshape(columns, (-1, len(variances))).T, np.array(before)
-
-
-def filtered(index: int, slow: Sequence[Slow], W: Array, turn: Turn | None = None) -> Array:
-    """(t, p) covariance matrix of a part, with unit variance, times W (t, p), under headings exp(i psi) (t,)."""
-    if index == WHITE:
-        return W
-    if index == SENSOR:
-        result = 2.0 * W
-        result[1:] -= W[:-1]
-        result[:-1] -= W[1:]
-        return result
-    part = slow[index - 2]
-    if not part.turning:
-        return _remembered(W, part.memory)
-    assert turn is not None  # without headings there are no turning parts
-    c, s = turn.real[:, None], turn.imag[:, None]
-    return np.asarray(c * _remembered(c * W, part.memory) + s * _remembered(s * W, part.memory))
-
-
-def _remembered(W: Array, memory: float) -> Array:
-    keep = np.exp(-1.0 / memory)
-    past = scipy.signal.lfilter([1.0], [1.0, -keep], W, axis=0)
-    return np.asarray(past + scipy.signal.lfilter([1.0], [1.0, -keep], W[::-1], axis=0)[::-1] - W)
-
-
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """How sums over samples of W eps vary, for outputs o with W (k, p_o).
-
-    Attributes:
-        blocks: (p_o, p_o') covariances of the sums of outputs o and o'.
-        doubts: (p_o,) variance of each estimated variance.
-    """
-
-    blocks: list[list[Array]]
-    doubts: list[Array]
-
-
-def score_covariance(
-    W: Sequence[Array], residuals: Array, fitted: Sequence[Components], parts: Sequence[Stretch]
-) -> Scores:
-    """The covariance of sum W_o eps_o, and how well the variances are known that it is made of.
-
-    Parts of different outputs are as correlated as the outputs' residuals are at the same sample.
-
-    Args:
-        W: (k, p_o) for each output.
-        residuals: (k, n).
-        fitted: the parts of each output.
-        parts: `stretches`.
-    """
-    variances = np.array([item.variances for item in fitted])
-    doubted = np.array([np.diag(item.uncertainty) > 0 for item in fitted])
-    blocks, units = sums_of_parts(W, variances, fitted[0].slow, _common(residuals, variances), parts, doubted)
-    doubts = [np.einsum("ip,ij,jp->p", own, item.uncertainty, own) for own, item in zip(units, fitted, strict=True)]
-    return Scores(blocks, doubts)
-
-
-def sums_of_parts(
-    W: Sequence[Array],
-    variances: Array,
-    slow: Sequence[Slow],
-    common: Array,
-    parts: Sequence[Stretch],
-    doubted: NDArray[np.bool_],
-) -> tuple[list[list[Array]], list[Array]]:
-    """Covariances (p_o, p_o') of sum W_o eps_o, and what each part adds to variances if its own is one (2 + m, p_o).
-
-    Args:
-        W: (k, p_o) for each output.
-        variances: (n, 2 + m) of each output's parts.
-        slow: the m slow parts.
-        common: (n, n) correlation of the outputs' parts.
-        parts: `stretches`.
-        doubted: (n, 2 + m) parts without variance whose own sums are asked for all the same.
-    """
-    blocks = [[np.zeros((a.shape[1], b.shape[1])) for b in W] for a in W]
-    units = [np.zeros((variances.shape[1], a.shape[1])) for a in W]
-    for part in parts:
-        wide = [part.spread(item[part.rows]) for item in W]
-        for index, scale in enumerate(np.sqrt(variances.T)):
-            for o in np.flatnonzero((scale > 0) | doubted[:, index]).tolist():
-                turned = filtered(index, slow, wide[o], part.turn)
-                units[o][index] += np.einsum("kp,kp->p", wide[o], turned)
-                for other in np.flatnonzero(scale[: o + 1] * common[o, : o + 1]).tolist():
-                    blocks[other][o] += scale[o] * scale[other] * common[o, other] * (wide[other].T @ turned)
-    for o in range(len(W)):
-        for other in range(o):
-            blocks[o][other] = blocks[other][o].T
-    return blocks, units
-
-
-def _common(residuals: Array, variances: Array) -> Array:
-    """(n, n) correlation that parts with variances (n, 2 + m) share."""
-    level, roots = np.ones(variances.shape[1]), np.sqrt(variances)
-    level[SENSOR] = 2.0
-    moments, explained = residuals.T @ residuals / len(residuals), (roots * level) @ roots.T
-    return as_correlation(np.divide(moments, explained, out=np.zeros_like(moments), where=explained > 0))
-
-
-def as_correlation(found: Array) -> Array:
-    """(n, n) with ones on the diagonal, none above one, positive semidefinite."""
-    found = np.clip(found, -1.0, 1.0)
-    np.fill_diagonal(found, 1.0)
-    least = float(np.linalg.eigvalsh(found)[0])
-    return found if least >= 0 else np.asarray((found - least * np.eye(len(found))) / (1.0 - least))
-
-
-def _periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Frequencies (f,), the periodogram there, and each part's expected one (2 + m, f), of all stretches in a row.
-
-    Frequency zero is there only where the mean is, not where it was subtracted.
-    """
-    found = []
-    for part, shapes in zip(parts, expected, strict=True):
-        own = eps[part.rows]
-        ordinates = np.abs(np.fft.rfft(part.spread(own), part.padded)) ** 2 / len(part.places)
-        frequency = 2 * np.pi * np.arange(len(ordinates)) / part.padded
-        first = int(abs(own.sum()) <= 1e-9 * np.sqrt(len(own)) * np.linalg.norm(own))
-        found.append((frequency[first:], ordinates[first:], shapes[:, first:]))
-    frequency, ordinates, shapes = (np.concatenate(items, axis=-1) for items in zip(*found, strict=True))
-    return frequency, ordinates, shapes
-
-
-def _expected(part: Stretch, slow: Sequence[Slow]) -> Array:
-    """(2 + m, f) expected periodogram of every part of the noise with unit variance, at the samples of a stretch."""
-    count = part.padded
-    lags = np.arange(count)
-    straight = _pairs(part.spread(np.ones(len(part.places))), count)
-    turning = straight if part.turn is None else _pairs(part.turn.real, count) + _pairs(part.turn.imag, count)
-    covariances = np.zeros((2 + len(slow), count))
-    covariances[:2, 0] = 1.0, 2.0
-    covariances[1, 1:2] = -1.0
-    covariances[:2] *= straight
-    for row, own in zip(covariances[2:], slow, strict=True):
-        row[:] = np.exp(-lags / own.memory) * (turning if own.turning else straight)
-    covariances /= len(part.places)
-    covariances[:, 1:] += covariances[:, :0:-1].copy()
-    return np.asarray(np.fft.rfft(covariances, axis=1).real)
-
-
-def _pairs(weights: Array, count: int) -> Array:
-    """(count,) sum of products of weights (t,) so many samples apart, t not above the count."""
-    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(weights, 2 * count)) ** 2, 2 * count)[:count])
-
-
-def _binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, Array, Array]:
-    """Mean ordinates (b,) and shapes (2 + m, b) of bins, and how many frequencies each holds, half for zero."""
-    means, weight = in_bins(frequency, np.vstack([ordinates, shapes]))
-    return means[0], means[1:], weight
-
-
-def in_bins(frequency: Array, rows: Array) -> tuple[Array, Array]:
-    """Means (q, b) of rows (q, f) in bins of frequency (f,), and how many frequencies each bin holds, half for zero."""
-    least = frequency[frequency > 0].min(initial=np.pi)
-    position = np.log(np.maximum(frequency, least) / least) / np.log(1.001 * np.pi / least)
-    place = np.where(frequency > 0, 1 + (TUNING.spectrum_bins * position).astype(int), 0)
-    _, place, count = np.unique(place, return_inverse=True, return_counts=True)
-    weight = np.asarray(np.bincount(place, np.where(frequency > 0, 1.0, 0.5)), dtype=float)
-    return np.array([np.bincount(place, row) / count for row in rows]), weight
-
-
 def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, float]:
     """Variances (parts,) of parts with these shapes, and minus the logarithm of their likelihood."""
     expected = shapes[0] + shapes[1]
@@ -387,14 +164,3 @@ def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, 
         variances, _ = scipy.optimize.nnls((shapes * weight).T, ordinates * weight, maxiter=100 * len(shapes))
         expected = np.maximum(variances @ shapes, 1e-9 * np.max(variances @ shapes))
     return variances, float(count @ (np.log(expected) + ordinates / expected))
-
-
-def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
-    """Bartlett's statistic: how far the cumulated ratio of periodogram to expectation is from a straight line."""
-    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
-    order = np.argsort(frequency, kind="stable")
-    rising = np.cumsum(ratio[order[frequency[order] > 0]])
-    if not rising[-1] > 0:
-        return 0.0
-    even = np.arange(1, len(rising) + 1) / len(rising)
-    return float(np.abs(rising / rising[-1] - even).max() * np.sqrt(len(rising)))
