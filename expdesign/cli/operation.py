@@ -1,4 +1,4 @@
-"""The command on a ship in operation."""
+"""Commands that watch a ship: in operation, and during a step trial."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from expdesign.cli.app import Asked, ask, command
-from expdesign.cli.options import Jobs, OutByData, Velocity
+from expdesign.cli.options import Jobs, OutByData, Resume, Rudder, Seed, Throttle, Velocity
 
 
 @command("monitor")
@@ -61,14 +61,7 @@ def monitor(
             "another load afterwards, which is estimated anew and raises no alarm. inf: its load never changes.",
         ),
     ] = 6.0,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it "
-            "had read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
-        ),
-    ] = False,
+    resume: Resume = False,
     velocity: Velocity = "auto",
     out: OutByData = None,
     jobs: Jobs = 0,
@@ -94,4 +87,61 @@ def monitor(
         model=model,
         resume=resume,
         jobs=jobs,
+    )
+
+
+@command("watch-steps")
+def watch_steps(
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA.csv", help="Record of a step trial; - reads a stream, row by row.")
+    ],
+    steps: Annotated[
+        Path,
+        typer.Option(
+            "--steps",
+            metavar="FILE",
+            help="What is to be sailed: a CSV with one row for each hold and a column for every input (n1_rps, "
+            "rudder1_rad); the plan.json of a trial; or a dictionary with families of steps (.toml).",
+        ),
+    ],
+    vessel: Annotated[
+        Path,
+        typer.Option(
+            "--vessel", metavar="VESSEL.toml", help="The guess before the trial: inputs, and how fast it answers."
+        ),
+    ],
+    throttle: Throttle = None,
+    rudder: Rudder = None,
+    learn: Annotated[
+        float | None,
+        typer.Option(
+            "--learn-s",
+            metavar="T",
+            help="Seconds of the first hold, from which the noise is learnt. Default: 120, or 80 % of the hold where "
+            "it is planned to be shorter.",
+        ),
+    ] = None,
+    resume: Resume = False,
+    out: OutByData = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Tell during a step trial when the vessel is steady and which step is next; list what is left to sail.
+
+    One line for each event, at once. Bad steps are named and put to the end. Writes steps-to-do.csv, a list of steps
+    for --steps, watch-steps.json and watch-steps-state.json for --resume.
+
+    Example: expdesign watch-steps - --steps steps.csv --vessel fast-8m.toml
+    """
+    return ask(
+        "watch_steps",
+        data,
+        out,
+        tells=True,
+        steps=steps,
+        vessel=vessel,
+        throttle=throttle or (),
+        rudder=rudder or (),
+        learn_s=learn,
+        resume=resume,
+        seed=seed,
     )

@@ -69,6 +69,14 @@ NoCache = Annotated[
         "name the folder for them. Default: ~/.cache/expdesign, at most 256 MiB.",
     ),
 ]
+Resume = Annotated[
+    bool,
+    typer.Option(
+        "--resume",
+        help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it had "
+        "read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
+    ),
+]
 Fixed = Annotated[
     list[str] | None,
     typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
