@@ -92,7 +92,7 @@ def as_found(clean, cause: str):
 
 
 def test_every_cause_of_the_catalogue_is_tried():
-    """That of a rudder, which the tug does not have, in `test_diagnosis_tests_are_right_on_average`."""
+    """That of a rudder, which the tug does not have, in `test_diagnosis_simulations_and_vessel_files_are_exact`."""
     assert {*EFFECTS, "actuator_scale"} == {cause.name for cause in CAUSES}
 
 

@@ -1,4 +1,4 @@
-"""Identities of the diagnosis: sensitivities, priors, noise, adjusted p-values."""
+"""Identities of the diagnosis: priors, noise, adjusted p-values, comparisons of fits."""
 
 from dataclasses import replace
 
@@ -22,9 +22,7 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.motion.integration import propagated
-from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
-from expdesign.diagnosis.motion.simulation import initial_states, simulate_nearby, simulate_windows
+from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests
@@ -32,15 +30,6 @@ from expdesign.diagnosis.select.selection import Step, redundant_step
 from expdesign.diagnosis.select.selection_round import open_candidates
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.writing import extend
-
-SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
-
-
-def case(ship="barge", **options):
-    record = hidden_record(ship, seed=3, batches=2, samples=150, **options)
-    extended = extended_model(vessel_of(ship), record)
-    return extended, cut_windows(extended.model, record)
 
 
 @pytest.fixture(scope="module")
@@ -57,48 +46,6 @@ def clean_scores():
             (key,) = test.candidate.free
             found[key].append((test.p_value, float(test.step[0])))
     return found
-
-
-def test_sensitivities_are_differences_of_simulations():
-    for ship in ("barge", "tug", "coaster"):
-        extended, windows = case(ship)
-        start = initial_states(windows)
-        motion = simulate_windows(extended, windows, start)
-        linear = linearise(motion)
-        for key, size in SMALL.items():
-            changed = extended.with_effects({key: size})
-            answer = responses(linear, [disturbance_of(linear, changed, 1.0)])[0]
-            difference = simulate_windows(changed, windows, start).predicted - motion.predicted
-            assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max(), (ship, key)
-
-
-def test_a_warm_start_changes_no_result():
-    """Newton's method over all steps converges to the Runge-Kutta solution, from a close and from a distant start."""
-    for ship in ("barge", "tug", "coaster"):
-        extended, windows = case(ship)
-        start = initial_states(windows)
-        warm_start = linearise(simulate_windows(extended, windows, start))
-        for effects in ({"gain": 0.01}, {"gain": -0.4, "inertia:v": 0.5}, {"lag:all": 6.0, "current:north": 0.5}):
-            changed = extended.with_effects(effects)
-            one = simulate_windows(changed, windows, start + 0.1)
-            other = simulate_windows(changed, windows, start + 0.1, warm_start=warm_start)
-            assert np.abs(one.states - other.states).max() < 1e-7, (ship, effects)
-            near = simulate_nearby(changed, windows, start + 0.1, warm_start)
-            assert near is None or np.abs(one.states - near.states).max() < 1e-7, (ship, effects)
-            assert np.abs(one.heading_change - other.heading_change).max() < 1e-6, (ship, effects)
-        little = extended.with_effects({"gain": 1e-3})
-        assert simulate_nearby(little, windows, start, warm_start) is not None
-        assert simulate_nearby(little, windows, start + 1e6, warm_start) is None
-
-
-def test_gaps_between_steps_are_propagated_as_step_by_step():
-    rng = np.random.default_rng(0)
-    transition, first, missed = rng.normal(size=(2, 9, 3, 3)), rng.normal(size=(2, 3)), rng.normal(size=(2, 9, 3))
-    change = propagated(transition, first, missed)
-    np.testing.assert_allclose(change[:, 0], first)
-    for step in range(9):
-        after = np.einsum("wij,wj->wi", transition[:, step], change[:, step]) + missed[:, step]
-        np.testing.assert_allclose(change[:, step + 1], after)
 
 
 def test_what_is_known_where_a_fit_begins_changes_no_result():
@@ -121,19 +68,6 @@ def test_what_is_known_where_a_fit_begins_changes_no_result():
         for key in keys:
             assert known.value(key) == pytest.approx(anew.value(key), rel=1e-5, abs=1e-7), keys
         assert known.deviance == pytest.approx(anew.deviance, rel=1e-7)
-
-
-def test_shorter_windows_hold_the_same_data():
-    """Every measurement once, each with the inputs and the heading that it had."""
-    extended, windows = case("barge")
-    short = windows.cut_shorter(40)
-    assert short.measured.shape[1] == 38  # 150 samples in four windows
-    assert np.isclose(np.nansum(short.measured), np.nansum(windows.measured))
-    motion = simulate_windows(extended, windows, initial_states(windows))
-    joints = motion.states[short.batch.astype(int), short.first.astype(int)]
-    again = simulate_windows(extended, short, joints)
-    errors = [np.sort(item.error[..., :3][np.isfinite(item.error[..., :3])]) for item in (motion, again)]
-    assert np.allclose(*errors, atol=1e-9)
 
 
 def test_causes_have_equal_shares_of_false_alarms():
@@ -296,68 +230,6 @@ def test_an_effect_that_is_not_there_is_estimated_as_zero_within_its_standard_er
     assert np.sum(np.square(ratios)) < chi2.isf(1e-3, len(ratios))
 
 
-SENSED = {"lag:n": 2.0, "gyro": 0.04, "heading_bias": 0.02, "lever:forward": 1.0, "current:north": 0.1}
-TOGETHER = (
-    ("tug", SENSED | {"gain": 0.1, "inertia:u": 0.2, "delay:a": 1.5, "offset:a1": 0.05, "theta:Y_v": -0.02}),
-    ("tug", {"asymmetry": 0.4, "gain": 0.1, "inertia:r": 0.3, "theta:N_mu": 1e-4}),
-    ("barge", {"asymmetry": 0.6, "gain": -0.2, "gain:propeller": 0.1, "inertia:r": 0.3}),
-    ("barge", {"asymmetry": 0.6, "change:time": 0.0, "change:gain": 0.3, "change:damping_r": -0.2}),
-    ("barge", {"term:Y_abs_v_v": -0.05, "inertia:v": 0.3, "change:time": 0.0, "change:damping": 0.2}),
-    ("coaster", {"scale:rudder": -0.1, "gain": 0.1, "inertia:r": 0.2}),
-    ("coaster", SENSED | {"asymmetry": 2e-4, "inertia:r": 0.5, "gain": 0.1}),
-    ("coaster", {"gain:propeller": 0.2, "gain": 0.1, "inertia:u": 0.2, "term:X_unn": -3e-4, "theta:X_nn": 1e-4}),
-)
-
-
-@pytest.mark.parametrize(("ship", "effects"), TOGETHER)
-def test_an_extended_vessel_simulates_as_the_extended_model(ship, effects):
-    """Effects written to a vessel and read again act as before, also together."""
-    record = hidden_record(ship, seed=1, batches=2, samples=120)
-    vessel = vessel_of(ship)
-    extended = extended_model(vessel, record).with_effects(effects)
-    again, missing = extend(vessel, extended, {})
-    assert [note for note in missing if "after the change" not in note] == []
-    windows = cut_windows(extended.model, record)
-    start = initial_states(windows)
-    one = simulate_windows(extended, windows, start).predicted
-    other = simulate_windows(extended_model(again, record), windows, start).predicted
-    assert np.abs(one - other).max() < 1e-9
-
-
-def test_a_yaw_moment_of_thrust_is_written_whatever_reads_it():
-    """A term that is not tau_psi alone is rewritten, and one that an earlier diagnosis wrote takes the new one in."""
-    record, vessel = hidden_record("barge", seed=1, batches=2, samples=120), vessel_of("barge")
-    terms = tuple(replace(term, expression="abs(tau_psi)*tau_psi*0.1") if term.name == "N_mu" else term
-                  for term in vessel.model.terms)  # fmt: skip
-    curved = replace(vessel, model=replace(vessel.model, terms=terms))
-    once, _ = extend(vessel, extended_model(vessel, record).with_effects({"asymmetry": 0.3}), {})
-    assert once.model.names[-1] == "N_tau_x"
-    for ship in (curved, once):
-        extended = extended_model(ship, record).with_effects({"asymmetry": 0.4, "gain": 0.1})
-        again, _ = extend(ship, extended, {})
-        assert again.model.names == ship.model.names
-        windows = cut_windows(extended.model, record)
-        one, other = (
-            simulate_windows(x, windows, initial_states(windows)).predicted
-            for x in (extended, extended_model(again, record))
-        )
-        assert np.abs(one - other).max() < 1e-8
-
-
-def test_standard_errors_of_factors_propagate_into_the_vessel_file():
-    """A factor of 0.88 +- 0.03 on X_mu = 0.02 +- 0.001 and a yaw moment: first-order error propagation by hand."""
-    record, vessel = hidden_record("barge", seed=1, batches=2, samples=120), vessel_of("barge")
-    values = vessel.model.parameters
-    vessel = replace(vessel, model=replace(vessel.model, parameter_std=np.where(values == 0.02, 0.001, 0.0)))
-    extended = extended_model(vessel, record).with_effects({"gain": -0.12, "asymmetry": 0.5})
-    model = extend(vessel, extended, {"gain": 0.03, "asymmetry": 0.1})[0].model
-    std = dict(zip(model.names, model.parameter_std, strict=True))
-    assert np.isclose(std["X_mu"], np.hypot(0.88 * 0.001, 0.02 * 0.03))
-    assert np.isclose(std["N_mu"], 0.0004 * 0.03)
-    assert np.isclose(std["N_tau_x"], np.hypot(0.5 * 0.0004 * 0.03, 0.1 * 0.88 * 0.0004))
-    assert std["Y_v"] == 0.0
-
-
 def test_an_imitation_is_redundant_beside_the_true_cause_and_not_the_reverse():
     """A misaligned sensor that a drift term imitates: only the imitation is redundant, whichever is added first."""
     record = hidden_record("barge", seed=41, batches=3, samples=150, faults={"heading_bias": 0.04})
@@ -406,24 +278,3 @@ def test_uncertain_parameters_beyond_their_bounds_are_still_tested_as_causes():
     assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
     (found,) = score_tests(base, own)
     assert found.p_value < 1e-6
-
-
-def test_regressors_are_the_derivatives_by_parameters_and_terms():
-    """Along a path with a factor on everything: current, load, thrust, shallow water, a change of the ship."""
-    effects = {
-        "current:north": 0.1, "inertia:v": 0.2, "gain": 0.1, "shallow:damping": 0.3, "shallow:inertia": 0.2,
-        "change:time": 90.0, "change:gain": 0.1, "change:damping": -0.1, "asymmetry": 0.01,
-    }  # fmt: skip
-    for ship, roll in (("barge", {"roll:period": 9.0, "roll:damping": 0.1, "roll:sway": 0.3}), ("coaster", {})):
-        extended, windows = case(ship, shoaling=True)
-        changed = extended.with_effects(effects | roll)
-        linear = linearise(simulate_windows(changed, windows, initial_states(windows, changed.states)))
-        found = term_disturbances(linear, (*extended.unit_terms, "gain"))
-        assert {"gain"}.isdisjoint(found)
-        assert any(key.startswith("term:") for key in found)
-        for key, exact in found.items():
-            changed = linear.motion.ship.with_effects({key: linear.motion.ship.get(key) + 1e-3})
-            other = disturbance_of(linear, changed, 1e-3)
-            size = np.abs(exact.force).max()
-            assert size > 0, key
-            np.testing.assert_allclose(exact.force, other.force, atol=1e-6 * size, err_msg=f"{ship} {key}")

@@ -1,15 +1,13 @@
 """Each way in which a data file may be wrong gives one line: where, what was found, what would be right."""
 
 from collections.abc import Callable
-from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from expdesign.errors import FileError
-from expdesign.records import VELOCITY_METHODS, load_records
-from expdesign.signals import Record
+from expdesign.records import load_records
 from record_files import Columns, csv_text, motion, texts
 
 VESSEL = ("n1", "rudder1")
@@ -367,41 +365,3 @@ def test_a_bad_file_gives_one_line(tmp_path: Path, kind: str) -> None:
         load_records([path], vessel_inputs=VESSEL, sample_time_s=0.5)
     assert str(caught.value) == f"{path}: {message}"
     assert "\n" not in message
-
-
-ODD_TEXTS = ("", "nan", "inf", "1e308", "1e-320", "0", "abc", '"', "1,5", "\x00", "360", " ", "-1")
-ODD_NAMES = ("time", "batch", "u", "v [kn]", "heading", "lat_deg", "wind_u_mps", "", "n1_rpm", "tau_x", "time_ms")
-
-
-def randomly_spoiled(rng: np.random.Generator) -> str:
-    """A trial with up to three random changes to names, cells and columns."""
-    count = int(rng.choice([1, 2, 3, 5, 80]))
-    columns = {name: values[:count] for name, values in texts(motion()).items()}
-    for _ in range(rng.integers(1, 4)):
-        name, odd = list(columns)[rng.integers(len(columns))], str(rng.choice(ODD_TEXTS))
-        match rng.integers(4):
-            case 0:
-                columns[name][rng.integers(count)] = odd
-            case 1:
-                columns[name][rng.integers(count) :] = [odd]
-            case 2:
-                columns[str(rng.choice(ODD_NAMES))] = columns.pop(name)
-            case _:
-                columns[name] = [odd] * count
-    return "\n".join([",".join(columns), *(",".join(row) for row in zip_longest(*columns.values(), fillvalue=""))])
-
-
-def test_whatever_is_in_a_file_it_loads_or_gives_one_line(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    records: list[Record] = []
-    messages: list[str] = []
-    for _ in range(400):
-        path = spoiled(tmp_path, randomly_spoiled(rng))
-        try:
-            records.append(load_records(path, velocity=str(rng.choice(VELOCITY_METHODS))))
-        except FileError as error:
-            messages.append(str(error))
-    assert not any("\n" in message for message in messages)
-    batches = [batch for record in records for batch in record.batches]
-    assert all(np.isfinite(batch.velocity).all() and np.isfinite(batch.inputs).all() for batch in batches)
-    assert min(len(records), len(messages)) > 20
