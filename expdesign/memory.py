@@ -111,7 +111,7 @@ _memory: ContextVar[Memory | None] = ContextVar("memory", default=None)
 
 @contextmanager
 def remembering(memory: Memory | None) -> Iterator[None]:
-    """In this block results are remembered there, or nowhere."""
+    """Results that are worked out in this block are remembered there, or nowhere."""
     token = _memory.set(memory)
     try:
         yield

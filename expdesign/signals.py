@@ -122,7 +122,7 @@ class Delivered:
         return replace(self, values=self.values[part], values_by_time=slopes)
 
     def moved(self, name: str, change_s: float) -> Delivered:
-        """With another value of an uncertain time, to first order."""
+        """The delivered inputs at another value of an uncertain time, to first order."""
         place = self.times.index(name)
         return replace(
             self,

@@ -19,7 +19,7 @@ MAPS = Path("/proc/self/maps")
 
 
 def use_one_thread() -> None:
-    """In this process, in those that it starts, and in libraries that are loaded already."""
+    """Limit linear algebra to one thread: in this process, those that it starts, and libraries loaded already."""
     for name in VARIABLES:
         os.environ.setdefault(name, "1")
     if "numpy" in sys.modules and MAPS.exists():

@@ -15,7 +15,7 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, checked, remedies, solve
+from expdesign.plan import PlanSettings, checked, solve
 from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
@@ -23,7 +23,7 @@ from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies import advised
+from expdesign.plan.remedies import advised, trials
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
 from expdesign.progress import silent
@@ -225,17 +225,17 @@ def test_the_forecast_named_where_most_trials_are_aborted_is_one_with_which_the_
 
 def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch, story):
     whole = in_current(story, 1.4)
-    monkeypatch.setattr(remedies, "_sailed", lambda other: ())
+    monkeypatch.setattr(trials, "first_sailed", lambda other: ())
     refused = {"what": "risk", "which": "deceleration"}
 
-    monkeypatch.setattr(remedies, "accepted", lambda other: other.repeats["deceleration"] == 0)
+    monkeypatch.setattr(trials, "accepted", lambda other: other.repeats["deceleration"] == 0)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
-    monkeypatch.setattr(remedies, "accepted", lambda other: other.environment.current_std_mps < 1.0)
+    monkeypatch.setattr(trials, "accepted", lambda other: other.environment.current_std_mps < 1.0)
     forecast = "environment.current_to.std_mps = 0.7 (a better forecast)"
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f"too risky; with {forecast} drawn trials accept the plan"
-    monkeypatch.setattr(remedies, "accepted", lambda other: False)
+    monkeypatch.setattr(trials, "accepted", lambda other: False)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f'too risky; no single change of those tried helps ({forecast}, design.excluded = ["deceleration"])'
     known = in_current(story, 0.0)

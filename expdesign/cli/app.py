@@ -89,7 +89,7 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
 
 
 def _tell(line: str) -> None:
-    """At once, for whoever reads the output as it comes."""
+    """Print a line at once, for whoever reads the output as it comes."""
     typer.echo(line)  # flushes
 
 

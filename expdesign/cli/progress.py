@@ -40,7 +40,7 @@ class _TimeLeft:
         self._began = time.monotonic()
 
     def at(self, share: float) -> str:
-        """In words, once a part of the work is done; "" where it is less than a second."""
+        """The time left in words, once a part of the work is done; "" where it is less than a second."""
         left_s = (time.monotonic() - self._began) * (1.0 - share) / max(share, LEAST_SHARE)
         if share < LEAST_SHARE or left_s < 1.0:
             return ""

@@ -85,7 +85,7 @@ def _ahead(held: Sequence[HeldOut]) -> list[HeldOut]:
 def _cross_validated(
     found: Selection, as_stated: HeldOut, validation: CrossValidation, progress: Progress
 ) -> list[HeldOut]:
-    """Of the model before any cause, then after every step.
+    """Held-out errors of the model before any cause, then after every step.
 
     The gain of uncertain parameters within their standard deviations is not attributed to a cause. So the model in use
     has them fitted, unless it simulates held-out units better as it is: what a cause repairs of a worse fit is no gain.

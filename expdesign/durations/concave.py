@@ -176,7 +176,7 @@ class Collected:
 
     @staticmethod
     def of(problem: DurationProblem, name: str | None = None) -> Collected:
-        """For the problem's criterion or a named one.
+        """Models and measures of the problem's criterion, or of a named one.
 
         Raises:
             UnknownName, InputError: no such criterion, or the aim lacks settings for it.

@@ -119,7 +119,7 @@ def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Mome
 
 
 def felt_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Moments, ...]:
-    """Of current and wind together, for each equation whose terms of the air fall together with those of the water."""
+    """Moments of current and wind combined, for each equation whose air terms coincide with its water terms."""
     factor, found = np.exp(-0.5 * heading_std_rad**2), []
     for equation in FELT:
         columns, shares = _felt_columns(estimate, equation)

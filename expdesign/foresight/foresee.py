@@ -63,7 +63,7 @@ def foresee(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Foresight:
-    """With which probability a diagnosis of a trial would find each cause at a size that matters.
+    """The probability that a diagnosis of a trial would find each cause at a size that matters.
 
     Args:
         vessel: the model in use, with its sensors.
@@ -318,7 +318,7 @@ def _length(sizes: tuple[Size, ...], mixture: Array) -> float:
 
 
 def effect_name(effect: HiddenEffect, known: Background) -> str:
-    """In results."""
+    """Name of an effect in results."""
     return joined([described(item, known.base.ship)[0] for item in effect.directions])
 
 

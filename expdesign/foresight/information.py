@@ -81,7 +81,7 @@ class SimulatedUnits:
 
 
 def simulated_units(base: Fit, windows: Windows, disturbances: Sequence[Disturbance]) -> SimulatedUnits:
-    """Of a trial with nothing hidden, with the units by which a diagnosis cross-validates."""
+    """Simulated data of a trial with nothing hidden, in the units by which a diagnosis cross-validates."""
     unit = validation_units(windows)
     own = effect_disturbances(base.linear, base.keys)
     values = build_sensitivities(base.linear, [*own, *disturbances], random_current=False).values[..., :3]

@@ -179,7 +179,7 @@ def ordinary_orders(vessel: Vessel, samples: int, *, stretch_s: float, rng: np.r
 
 
 def _order(actuator: Actuator, speed: float, turn: float) -> tuple[float, ...]:
-    """Of one actuator, for shares of its speed and angle."""
+    """Commands of one actuator, for shares of its speed and angle."""
     limits = actuator.limits
     if actuator.kind == "azimuth":
         aft = -1.0 if actuator.forward_m < 0 else 1.0

@@ -90,7 +90,7 @@ class Rivals:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Of the candidates."""
+        """Cause of each candidate."""
         return tuple(test.candidate.cause for test in self.tests)
 
 

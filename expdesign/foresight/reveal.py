@@ -79,7 +79,7 @@ class Wanted:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """The wanted effect in words."""
         shown = self.cause if self.cause.endswith(f":{self.effect}") else f"{self.cause} as {self.effect}"
         return f"{shown} told from {self.apart_from}" if self.apart_from else f"power to reveal {shown}"
 

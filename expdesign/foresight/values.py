@@ -126,7 +126,7 @@ class Foresight:
 
     @property
     def weakest(self) -> tuple[Foreseen, ...]:
-        """Of every cause the effect with the least power; among equals the one that is nearest to being missed."""
+        """The effect with the least power of every cause; among equals the one that is nearest to being missed."""
         least: dict[str, Foreseen] = {}
         for item in self.effects:
             known = least.get(item.cause)

@@ -90,7 +90,7 @@ def slope_of_whole(whole: Array, parameters: int, slope: Array) -> Array:
 
 
 def _pseudo_inverse(M: Array) -> Array:
-    """Of a positive semidefinite matrix, by its correlations."""
+    """Pseudo-inverse of a positive semidefinite matrix, by its correlations."""
     scale = np.sqrt(np.diag(M))
     scale = np.where(scale > 0, scale, 1.0)
     inverse = np.linalg.pinv(M / np.outer(scale, scale), rcond=TUNING.unseen_current, hermitian=True)

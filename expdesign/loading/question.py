@@ -43,7 +43,7 @@ class Question:
 
     @property
     def places(self) -> list[int]:
-        """Of the free parameters among all."""
+        """Places of the free parameters among all."""
         return [PARAMETERS.index(name) for name in self.free]
 
     @property

@@ -198,7 +198,7 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
 
 
 def _spared(force: Force, time_s: Array) -> Force:
-    """With more variance of the slow processes, of which a short reference sees few values: of one, nearly nothing."""
+    """The force with more variance of its slow processes, of which a short reference shows few independent values."""
     seen = len(np.unique(np.floor((time_s - time_s[0]) / TUNING.slow_s)))
     spare = np.repeat([1.0, 1.0 + TUNING.spare / seen], len(force.variance) // 2)
     return replace(force, variance=spare * force.variance)
@@ -211,7 +211,7 @@ def _best_step(gains: Array) -> float:
 
 
 def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
-    """Of (..., 2 q + 1) logarithms."""
+    """The force whose parameters have these logarithms (..., 2 q + 1)."""
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
     quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, TUNING.slow_s / 4), variance[..., :q].shape)

@@ -33,7 +33,7 @@ def estimates(state: State, calibration: Calibration) -> tuple[Array, Array]:
 
 
 def threshold(watched: int, stretches: float) -> float:
-    """Of sums in both directions of so many changes: false alarms are at least so many stretches apart on average."""
+    """Alarm limit for sums of so many changes, both ways, with so many stretches between false alarms or more."""
     return math.log(max(2.0 * watched * stretches, 2.0))
 
 
@@ -84,7 +84,7 @@ def watch(
 
 
 def _counted(state: State, one: Judged, surprised: float, kind: int, terms: Array) -> State:
-    """With a stretch in what is added up over all that the filter takes.
+    """The state with a stretch added to the sums over the whole watch.
 
     It is not judged where the weather is beyond the reference, unless a change that was noticed explains it.
     """
@@ -105,7 +105,7 @@ def _counted(state: State, one: Judged, surprised: float, kind: int, terms: Arra
 def _noticed(
     state: State, step: Step, calibration: Calibration, limit: float, forces: int
 ) -> tuple[State, Alarm | None]:
-    """With an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew."""
+    """Raise an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew."""
     if step.statistic <= limit or _doubtful(state):
         return with_load(state, calibration), None
     if not _by_weather(state, calibration, forces):
@@ -146,7 +146,7 @@ def _less(products: Array, change: Array) -> Array:
 
 
 def _waited(state: State, nuisance: Force, until_s: float) -> State:
-    """At the beginning of the stretch that ends then; at first nothing is known of the force anyway."""
+    """The state at the beginning of the stretch that ends then, with the force's memory faded over the gap."""
     gap_s = until_s - state.judged_s
     keep = nuisance.memory(gap_s)
     return replace(
@@ -160,7 +160,7 @@ def _waited(state: State, nuisance: Force, until_s: float) -> State:
 
 
 def _summed(state: State, one: Judged, surprised: float, before: float, calibration: Calibration) -> tuple[State, Step]:
-    """With a stretch added to all sums, or as the first of a sum where that is larger; those below zero begin anew.
+    """Add a stretch to all sums, or begin a sum with it where that is larger; sums below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
     """

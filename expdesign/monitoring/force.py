@@ -38,7 +38,7 @@ class Force:
         return np.asarray(np.exp(-gap_s / self.time_s))
 
     def with_load(self, count: int) -> Force:
-        """With so many components of a load, known to be none."""
+        """The force with so many components of a load, known to be zero."""
         return Force(
             variance=np.concatenate([self.variance, np.zeros(count)]),
             time_s=np.concatenate([self.time_s, np.full(count, np.inf)]),
@@ -59,7 +59,7 @@ class Known:
 
     @classmethod
     def nothing(cls, force: Force) -> Known:
-        """Before the first stretch."""
+        """What is known of the force before the first stretch."""
         covariance = force.variance[..., :, None] * np.eye(force.variance.shape[-1])
         return cls(mean=np.zeros(force.variance.shape), covariance=covariance)
 
@@ -153,7 +153,7 @@ def after_gap(known: Known, force: Force, gap_s: float) -> Known:
 
 
 def after_stretch(known: Known, one: Judged) -> Known:
-    """With what the stretch tells of the force."""
+    """The force's estimate, updated with a stretch."""
     return Known(mean=known.mean + one.towards, covariance=one.gain)
 
 

@@ -21,7 +21,7 @@ MOST_CALLS = 100
 
 
 def called(state: State, calibration: Calibration, until_s: float) -> State:
-    """After a port call that ends then: the load may be another."""
+    """The state after a port call that ends then: the load may be another."""
     loads, first = calibration.loads, len(state.known.mean) - len(calibration.loads)
     more, taken = np.zeros(len(state.known.mean)), np.zeros(len(state.shift))
     more[first:] = calibration.load[loads] ** 2
@@ -32,7 +32,7 @@ def called(state: State, calibration: Calibration, until_s: float) -> State:
 
 
 def with_load(state: State, calibration: Calibration) -> State:
-    """With the load taken for the ship's once it is known: its effects are not linear where they are large."""
+    """Move a load that is known into the ship's model, as large effects are not linear."""
     load, loads = state.load, calibration.loads
     due = TUNING.load_settled[load.rounds] if load.rounds < len(TUNING.load_settled) else math.inf
     if not load.stay_s or load.judged < due:

@@ -87,7 +87,7 @@ class RollWatch:
 
 
 def roll_learnt(now: RollWatch, ship: Vessel, runs: Sequence[Run]) -> RollWatch:
-    """With a piece of the reference."""
+    """The watch with a piece of the reference added."""
     try:
         found = record_estimate(_pendulum(ship), runs, beam_m=ship.beam_m)
     except (InputError, NotInformative) as error:
@@ -98,7 +98,7 @@ def roll_learnt(now: RollWatch, ship: Vessel, runs: Sequence[Run]) -> RollWatch:
 def roll_watched(
     now: RollWatch, ship: Vessel, runs: Sequence[Run], *, begin_s: float, end_s: float, mean_time_s: float, called: bool
 ) -> RollWatch:
-    """After a piece of the watch.
+    """The watch of roll after another piece of data.
 
     Args:
         now: before.
@@ -201,7 +201,7 @@ def _duration(runs: Sequence[Run]) -> float:
 
 
 def restored_roll(table: dict[str, Any]) -> RollWatch:
-    """From `saved`."""
+    """A watch of roll, read from what `saved` made of it."""
     arrays = {name: None if table[name] is None else np.array(table[name], float) for name in ("mean", "covariance")}
     events = tuple(RollEvent(**_event_values(event)) for event in table["events"])
     return RollWatch(**{**table, **arrays, "free": tuple(table["free"]), "events": events})

@@ -25,14 +25,14 @@ def saved(value: Any) -> Any:
 
 
 def restored_calibration(table: dict[str, Any]) -> Calibration:
-    """From `saved`."""
+    """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
     rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "surprise")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 
 def restored_state(table: dict[str, Any]) -> State:
-    """From `saved`."""
+    """A state, read from what `saved` made of it."""
     alarm, pending = table["alarm"], table["pending"]
     return State(
         judged_s=table["judged_s"],
@@ -57,12 +57,12 @@ def restored_state(table: dict[str, Any]) -> State:
 
 
 def restored_alarm(table: dict[str, Any]) -> Alarm:
-    """From `saved`."""
+    """An alarm, read from what `saved` made of it."""
     return Alarm(**{**table, "as_likely": tuple(table["as_likely"])})
 
 
 def restored_changes(tables: list[dict[str, Any]]) -> tuple[Change, ...]:
-    """From `saved`."""
+    """Watched changes, read from what `saved` made of them."""
     return tuple(Change(**{**table, "unit": tuple(table["unit"])}) for table in tables)
 
 

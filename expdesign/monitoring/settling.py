@@ -15,7 +15,7 @@ from expdesign.values import Array
 
 
 def raised(state: State, step: Step, calibration: Calibration) -> tuple[State, Alarm]:
-    """With an alarm of the largest sum."""
+    """Raise an alarm of the largest sum."""
     pending = state.largest
     alarm = Alarm(
         time_s=state.judged_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change
@@ -25,7 +25,7 @@ def raised(state: State, step: Step, calibration: Calibration) -> tuple[State, A
 
 
 def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) -> State:
-    """With a stretch added to what is known of a change that raised an alarm.
+    """The state with a stretch added to the estimate of the change that raised the alarm.
 
     Once it is known well, the ship is changed by it. That is repeated with the data that follow, as the error is not
     linear in large changes, until there is nothing left to change; then it is settled.

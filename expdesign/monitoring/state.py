@@ -112,11 +112,11 @@ class Sums:
         )
 
     def later(self, keep: Array) -> Sums:
-        """After a gap over which the force's autocorrelation is (f,)."""
+        """The sums after a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
     def added(self, one: Judged, surprise: float = 0.0) -> tuple[Sums, Array, Array]:
-        """With one more stretch; and its scores (n, m) and information (n, m, m)."""
+        """The sums with one more stretch; and its scores (n, m) and information (n, m, m)."""
         score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
         cross = one.by_force @ self.taken
         information = (
@@ -193,7 +193,7 @@ class Budget:
         )
 
     def added(self, kind: int, terms: Array, information: Array) -> Budget:
-        """With a stretch."""
+        """The budget with a stretch added."""
         where = np.arange(len(self.stretches)) == kind
         return Budget(
             stretches=self.stretches + where,
@@ -204,7 +204,7 @@ class Budget:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """Of a watch, between two stretches.
+    """State of a watch between two stretches.
 
     Attributes:
         judged_s: end of the last stretch that was looked at [s].
@@ -245,7 +245,7 @@ class State:
 
     @classmethod
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
-        """At the beginning of a watch."""
+        """The state at the beginning of a watch."""
         m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
         return cls(
             judged_s=time_s,
@@ -275,7 +275,7 @@ class Rules:
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """After a stretch.
+    """Outcome of one stretch.
 
     Attributes:
         time_s: its end [s].

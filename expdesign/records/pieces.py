@@ -195,7 +195,7 @@ class _Cut:
     skipped: int
 
     def piece(self, lines: list[str], left_out: int, *, rows: int, again: int, last: bool) -> Piece:
-        """Of lines up to a row of the source, as many as there are whole stretches."""
+        """A piece of the lines up to a row of the source, as many as make whole stretches."""
         times = self.columns.times(lines)
         whole = self._whole(times) if self.more_follow or not last else len(lines)
         kept = lines[:whole]

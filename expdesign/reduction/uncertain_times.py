@@ -61,7 +61,7 @@ class Division:
         return np.diff(np.append(begins, 1.0))
 
     def maps(self, responses: Sequence[Response], sample_time_s: float) -> list[SampleMap | None]:
-        """Of each signal over a sample."""
+        """The map of each signal over a sample."""
         steps_s, first = sample_time_s * self.shares(responses, sample_time_s), dict.fromkeys(range(len(responses)), 0)
         first |= dict(zip(self.arriving, self.places, strict=True))
         return [

@@ -74,7 +74,7 @@ class RollProblem:
 
     @property
     def places(self) -> list[int]:
-        """Of the free parameters among all."""
+        """Places of the free parameters among all."""
         return [PARAMETERS.index(name) for name in self.free]
 
 

@@ -55,7 +55,7 @@ class Fold:
 
 
 def folds(runs: Sequence[Run]) -> list[list[Fold]]:
-    """Of each run: whole runs where there are enough of them, else parts of equal length."""
+    """Folds of each run: whole runs where there are enough of them, else parts of equal length."""
     parts = _parts([len(run.signals) for run in runs])
     sources = [run.source for run in runs]
     sought = 3 if all(run.planned is None for run in runs) else 4
@@ -67,7 +67,7 @@ def folds(runs: Sequence[Run]) -> list[list[Fold]]:
 
 
 def _parts(lengths: Sequence[int]) -> list[list[tuple[int, slice]]]:
-    """Of each run: number of the fold, and samples."""
+    """For each run the numbers of its folds, with their samples."""
     count = TUNING.folds
     if len(lengths) >= count:
         return [[(place % count, slice(0, length))] for place, length in enumerate(lengths)]
@@ -78,7 +78,7 @@ def _parts(lengths: Sequence[int]) -> list[list[tuple[int, slice]]]:
 def _boxes(
     inputs: Sequence[Array], outputs: Sequence[Array], parts: Sequence[Sequence[tuple[int, slice]]]
 ) -> list[BlackBox]:
-    """For each fold the black box that the other folds tell."""
+    """For each fold the black box that is fitted to the other folds."""
     triangles: list[list[Array]] = [[] for _ in range(TUNING.folds)]
     for u, y, own in zip(inputs, outputs, parts, strict=True):
         table = _arx_table(u, y)
@@ -155,7 +155,7 @@ class Weighted:
 
 
 def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> Weighted:
-    """Of sampled coefficients (5,); before there are any, as if noise were white, as least squares always does."""
+    """Equations for sampled coefficients (5,), weighted by the noise at given ones, or as if it were white."""
     plain = tuple(build_rows(run, WHITE) for run in case.runs)
     if values is None:
         model, rows, left = WHITE, plain, flat_spectrum([one.y for one in plain])

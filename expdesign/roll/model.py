@@ -144,7 +144,7 @@ def stiffness(theta: Array, body: Body, load: Load | None) -> float:
 
 
 def roll_frequency(theta: Array, body: Body, load: Load | None) -> float:
-    """Of the undamped roll [Hz], zero for a ship that does not stay upright."""
+    """Frequency of the undamped roll [Hz], zero for a ship that does not stay upright."""
     values = coefficients(theta, body, load).values
     beta, z_s = float(values[2]), body.sensor(float(theta[PARAMETERS.index("z_f")]))
     return float(np.sqrt(max(0.0, (values[1] - beta * G_MPS2) / (1.0 - beta * z_s))) / (2.0 * np.pi))

@@ -126,7 +126,7 @@ def _rank(sizes: Array) -> int:
 
 
 def direction(free: Sequence[str], theta: Array, relative: Array, size: float) -> Direction:
-    """From relative changes (p,) of the free parameters, at parameters (9,)."""
+    """The direction of relative changes (p,) of the free parameters, at parameters (9,)."""
     values = theta[_places(free)]
     largest = int(np.argmax(np.abs(relative)))
     moved = relative / relative[largest] * 0.1

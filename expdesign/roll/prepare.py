@@ -44,17 +44,17 @@ class LowPass:
         seal(self, taps="n")
 
     def gain(self, frequency_hz: float) -> float:
-        """At a frequency."""
+        """Gain at a frequency."""
         return _gain(self.taps, frequency_hz, self.step_s / self.every)
 
     @property
     def least_samples(self) -> int:
-        """Of a run, before it."""
+        """Fewest samples of a run that can be filtered."""
         return len(self.taps) + self.every * (TUNING.left_out_samples + TUNING.least_samples)
 
     @property
     def samples_per_period(self) -> float:
-        """Of roll."""
+        """Samples in one period of roll, after the filter."""
         return 1.0 / (self.roll_hz * self.step_s)
 
 

@@ -144,7 +144,7 @@ class Spectrum:
 
 
 def flat_spectrum(residuals: Sequence[Array]) -> Spectrum:
-    """Of white noise with the variance of residuals (k,) of each run."""
+    """Spectrum of white noise with the variance of residuals (k,) of each run."""
     length = _transform_length(residuals)
     variance = max(float(np.var(np.concatenate(residuals))), 1e-300)
     return Spectrum(density=np.full(length // 2 + 1, variance), length=length, freedom=np.inf)
@@ -186,7 +186,7 @@ def _segments(signals: Sequence[Array]) -> list[int]:
 
 
 def _freedom(segments: int) -> float:
-    """Of an average of periodograms of Hann windows that overlap by half, whose powers correlate by 1 / 36."""
+    """Degrees of freedom of averaged periodograms of Hann windows; they overlap by half and correlate by 1 / 36."""
     return 2.0 * segments / (1.0 + 2.0 / 36.0 * (1.0 - 1.0 / segments))
 
 

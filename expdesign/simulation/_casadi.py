@@ -97,7 +97,7 @@ class CompiledSample:
     """One sample of several ships, each with parameters, inputs and weather of its own."""
 
     def __init__(self, model: VesselModel, *, rows: int, substeps: int) -> None:
-        """Of `substeps` Runge-Kutta steps, with as many `rows` of inputs, or one where they are held."""
+        """Compile `substeps` Runge-Kutta steps, with as many `rows` of inputs, or one where they are held."""
         structure = model.terms, model.form, model.sample_time_s, model.actuators, model.roll, model.inertia
         self._functions = compiled_samples(structure, rows, substeps)
 

@@ -224,7 +224,7 @@ class ActuatorState:
     def standing(
         cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int | Array
     ) -> ActuatorState:
-        """After commands (m, n) held for long."""
+        """The state after commands (m, n) held for long."""
         maps = tuple(
             None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
             for response in responses

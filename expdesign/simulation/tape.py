@@ -157,7 +157,7 @@ class Evaluation:
     results: tuple[int, ...]
 
     def values(self, signals: Mapping[str, Any]) -> list[Any]:
-        """Of all expressions, for signals that are numbers or arrays; what they share is computed once."""
+        """Values of all expressions, for signals that are numbers or arrays; what they share is computed once."""
         found: dict[int, Any] = {**self.constants}
         for place, name in self.signals:
             found[place] = signals[name]

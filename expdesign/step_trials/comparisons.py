@@ -77,7 +77,7 @@ def _compared(
 
 
 def _tested(kind: str, command: str, columns: Array, extra: Array, values: Array) -> Comparison:
-    """Of one more column; its F test is the square of its t test."""
+    """The comparison that one more column makes; its F test is the square of its t test."""
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-12)
     rest, target = (part - columns @ np.linalg.lstsq(columns, part, rcond=1e-10)[0] for part in (extra, values))
     power = max(float(rest @ rest), 1e-12)

@@ -50,7 +50,7 @@ def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
 
 
 def _rudder_delay(batches: Sequence[Sailed], samples: Sequence[StepSample]) -> tuple[float, float]:
-    """Of responses of one shape, where there are enough of them."""
+    """Dead time of the rudder from responses of one shape, where there are enough of them."""
     own = [one for one in samples if one.counts and one.hold.channel == 1]
     if len(own) < TUNING.least_group:
         return _delay(samples, 1)

@@ -72,7 +72,7 @@ def best_fit(samples: Sampled) -> Fit:
 
 
 def ridge(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> Fit:
-    """With the penalty of the least leave-one-out error, in closed form."""
+    """Ridge regression with the penalty of the least leave-one-out error, in closed form."""
     errors = [_left_out_error(samples, penalty) for penalty in penalties]
     best = int(np.argmin(errors))
     solution = _ridge(samples, penalties[best])[0]
@@ -80,7 +80,7 @@ def ridge(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> 
 
 
 def lasso(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> Fit:
-    """With the penalty of the least error in folds; zeros are exact."""
+    """Lasso with the penalty of the least error in folds; zeros are exact."""
     folds = np.arange(float(len(samples.values))) % min(TUNING.folds, len(samples.values))
     largest = _largest_penalty(samples)
     errors = [_fold_error(samples, folds, penalty * largest) for penalty in penalties]
@@ -128,7 +128,7 @@ def _largest_penalty(samples: Sampled) -> float:
 
 
 def _lasso(samples: Sampled, penalty: float) -> Array:
-    """As non-negative least squares in the positive and the negative parts of the coefficients."""
+    """The lasso, solved as non-negative least squares in the positive and negative parts of the coefficients."""
     scale, root = _scale(samples), np.sqrt(samples.weights / len(samples.values))
     rows = root[:, None] * samples.columns / scale
     both = np.concatenate([rows, -rows], axis=1)

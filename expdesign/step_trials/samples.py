@@ -164,7 +164,7 @@ def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
 
 
 def standard_error(values: Array) -> float:
-    """Of the mean of correlated values, from the means of blocks."""
+    """Standard error of the mean of correlated values, from the means of blocks."""
     blocks = min(TUNING.steady_blocks, len(values) // 2)
     if blocks < 2:
         return float("inf")

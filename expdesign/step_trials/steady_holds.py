@@ -126,7 +126,7 @@ def watched(
 
 
 def advanced_many(state: Watched, test: RatioTest, values: Array) -> Watched:
-    """After several samples."""
+    """The state after several samples."""
     for value in values.tolist():
         state = advanced(state, test, value)
     return state

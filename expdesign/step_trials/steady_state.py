@@ -62,7 +62,7 @@ class RatioTest:
 
     @property
     def memory_s(self) -> float:
-        """Of the filtered signal [s]."""
+        """Memory of the filtered signal [s]."""
         return self.interval_s / self.rate
 
 
@@ -97,12 +97,12 @@ def begun(test: RatioTest, value: float) -> Watched:
 
 
 def stepped(state: Watched, *, responds: bool) -> Watched:
-    """After a command has changed, to which the signal responds or may respond."""
+    """The state after a command has changed, to which the signal responds or may respond."""
     return replace(state, mode=WAITING if responds else TRANSIENT, below_s=0.0)
 
 
 def advanced(state: Watched, test: RatioTest, value: float) -> Watched:
-    """After one more sample of the signal."""
+    """The state after one more sample of the signal."""
     part = (*state.part, value)
     if len(part) < test.averaged:
         return replace(state, part=part)

@@ -138,7 +138,7 @@ class ValidityRegion:
 
     @cached_property
     def hull(self) -> shapely.Geometry:
-        """In scaled coordinates."""
+        """The region in scaled coordinates."""
         hull = shapely.MultiPoint(self.corners).convex_hull
         shapely.prepare(hull)
         return hull
@@ -163,7 +163,7 @@ class ValidityRegion:
 
 
 def validity_region(states: Array) -> ValidityRegion:
-    """Of the states (n, 2) that a trial visited."""
+    """The region of the states (n, 2) that a trial visited."""
     scale = np.maximum(np.max(np.abs(states), axis=0), 1e-9)
     mirrored = np.concatenate([states, states * [1.0, -1.0]]) / scale
     hull = shapely.MultiPoint(mirrored).convex_hull

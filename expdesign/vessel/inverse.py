@@ -166,7 +166,7 @@ class Allocator:
     """`allocate` and `within_limits` for n ships at once, sample by sample."""
 
     def __init__(self, actuators: tuple[Actuator, ...], *, sample_time_s: float) -> None:
-        """Of these actuators, in command order."""
+        """Prepare the allocation to these actuators, in command order."""
         self._actuators, self._bounds = actuators, _bounds(actuators, sample_time_s)
         self._inverse = _inverse_force_matrix(actuators).T
 

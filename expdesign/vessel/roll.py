@@ -152,7 +152,7 @@ class RollPendulum:
 
     @property
     def period_s(self) -> float:
-        """Of undamped roll; infinite for a ship that does not stay upright."""
+        """Period of undamped roll; infinite for a ship that does not stay upright."""
         return 2.0 * math.pi * math.sqrt(self.inertia_kgm2 / self.righting_nm) if self.righting_nm > 0 else math.inf
 
     def acceleration(self, roll: Any, rate: Any, side: Any, yaw_rate: Any, rudder: Any) -> Any:

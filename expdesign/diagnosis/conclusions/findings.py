@@ -95,6 +95,6 @@ def error_reductions_of(
 
 
 def _reduction(before: Array, after: Array) -> Array:
-    """By which share a root mean square error falls, from sums of squares."""
+    """Share by which a root mean square error falls, from sums of squares."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(1.0 - np.sqrt(after / before))

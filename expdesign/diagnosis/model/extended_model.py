@@ -73,7 +73,7 @@ class ExtendedModel:
 
     @cached_property
     def regressors(self) -> Evaluation:
-        """Of `scaled_terms`."""
+        """Regressors of `scaled_terms`, to be evaluated together."""
         return evaluation([part.expression for part in self.scaled_terms])
 
     @cached_property

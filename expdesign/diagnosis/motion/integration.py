@@ -32,7 +32,7 @@ def runge_kutta_step(
 def _rk4_part(
     ship: ExtendedModel, x: tuple[Array, ...], exogenous: Sequence[ExogenousInputs], h: float
 ) -> tuple[tuple[Array, ...], Array]:
-    """With exogenous signals at the beginning, in the middle and at the end."""
+    """One Runge-Kutta step, with exogenous signals at its beginning, middle and end."""
     begin, middle, end = exogenous
 
     def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:

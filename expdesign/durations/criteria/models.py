@@ -107,7 +107,7 @@ class Objective:
         return self.pieces[0].measure.degree
 
     def value(self, w: Array) -> float:
-        """At fractions (q,)."""
+        """The objective at fractions (q,)."""
         values = np.array([piece.value(w) for piece in self.pieces]) - self.levels
         return float(values.min() if self.worst else values.mean())
 

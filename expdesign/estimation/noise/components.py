@@ -87,7 +87,7 @@ def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitt
 
 
 def nothing_taken(rows: int) -> Fitted:
-    """Of the noise in so many rows."""
+    """An estimate of no parameters, which took nothing from the noise of so many rows."""
     return Fitted(*np.zeros((2, rows, 0)))
 
 

@@ -35,7 +35,7 @@ class Stretch:
 
     @property
     def samples(self) -> int:
-        """From the first to the last, those left out included."""
+        """Number of samples from the first to the last, those left out included."""
         return int(self.places[-1]) + 1
 
     @property

@@ -185,7 +185,7 @@ def _owners(problem: Problem, layout: Layout) -> Integers:
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """From every sample to the next of the same stretch, one stretch after the other.
+    """Steps from every sample to the next of the same stretch, one stretch after the other.
 
     Attributes:
         there: (W, L - 1) whether a stretch lasts so long.

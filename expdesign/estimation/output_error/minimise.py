@@ -91,7 +91,7 @@ def minimise_output_error(
 
 
 def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:
-    """With what is known beforehand in units of the cost, whose residuals count as white."""
+    """The problem with its prior in units of the cost, in which residuals count as white."""
     if not problem.beyond:
         return problem
     with np.errstate(over="ignore", invalid="ignore"):

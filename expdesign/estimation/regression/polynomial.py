@@ -69,7 +69,7 @@ class Polynomial:
         return not self.signals
 
     def derivative(self, name: str) -> Polynomial:
-        """With respect to one signal; signs count as constants."""
+        """The derivative by one signal; signs count as constants."""
         total = Polynomial({})
         for monomial, value in self.terms.items():
             if name in monomial:
@@ -79,7 +79,7 @@ class Polynomial:
         return total
 
     def substituted(self, numbers: Mapping[str, float]) -> Polynomial:
-        """With numbers in place of some symbols."""
+        """The polynomial with numbers in place of some symbols."""
         total = Polynomial({})
         for monomial, value in self.terms.items():
             left = tuple(name for name in monomial if name not in numbers)
@@ -127,7 +127,7 @@ class Algebra:
 
     @property
     def operators(self) -> Operators:
-        """For `Expression.evaluate`."""
+        """Operators on polynomials, for `Expression.evaluate`."""
         return Operators(self._modulus, lambda x: self._opaque("sin", x), lambda x: self._opaque("cos", x))
 
     def _modulus(self, inside: Polynomial | float) -> Polynomial:

@@ -82,7 +82,7 @@ def _stability(found: RollJudgement, change: RollChange) -> str:
 
 
 def roll_entry(told: RollTold | None) -> dict[str, Any]:
-    """For diagnosis.json; nothing for a vessel file without [roll]."""
+    """The entry of roll in diagnosis.json; nothing for a vessel file without [roll]."""
     if told is None:
         return {}
     entry: dict[str, Any] = {"verdict": list(roll_sentences(told))}

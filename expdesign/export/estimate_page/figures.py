@@ -56,7 +56,7 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
 
 
 def thinned(time: Array, values: Array) -> tuple[Array, Array]:
-    """At most about `Tuning.line_points` points that keep the highest and the lowest of every stretch."""
+    """About `Tuning.line_points` points at most, with the highest and the lowest of every stretch among them."""
     stretch = -(-2 * len(values) // TUNING.line_points)
     if stretch < 3:
         return time, values

@@ -60,7 +60,7 @@ def budget_figure(content: MonitorContent) -> str:
 
 
 def budget_header() -> tuple[str, ...]:
-    """Of `budget_tables`."""
+    """Header of `budget_tables`."""
     return ("change", *KINDS)
 
 

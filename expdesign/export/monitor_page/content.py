@@ -26,7 +26,7 @@ HOUR = 3600.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moment:
-    """Of the watch, after a piece of the data.
+    """State of the watch after a piece of the data.
 
     Attributes:
         time_s: end of the piece [s].

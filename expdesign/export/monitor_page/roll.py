@@ -48,7 +48,7 @@ def _event(event: RollEvent) -> str:
 
 
 def roll_entry(watch: RollWatch | None, *, false_alarm_days: float) -> dict[str, Any]:
-    """For monitor.json; nothing for a vessel file without [roll]."""
+    """The entry of roll in monitor.json; nothing for a vessel file without [roll]."""
     if watch is None:
         return {}
     told = {

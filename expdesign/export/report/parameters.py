@@ -120,7 +120,7 @@ class Expected:
 
 
 def expected(content: ReportContent) -> Expected:
-    """By first-order propagation of the vessel file's sensor noise through instrumental-variable estimation."""
+    """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise."""
     sailed = content.plan.sailed
     runs = [leg for leg in sailed.legs if leg.kind == "primitive"]
     return Expected(

@@ -19,7 +19,7 @@ class Link:
 
 
 def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
-    """From durations to route."""
+    """The links that lead from durations to the route, each with its proof."""
     design, plan, check = content.design, content.plan, content.plan.verification
     links = [
         Link(

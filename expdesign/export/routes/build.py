@@ -113,7 +113,7 @@ def _cut_m(tolerance_m: float) -> float:
 
 
 def _rounded_up(length_m: float) -> float:
-    """To the resolution of cross-track distances in files [m]; at least one step."""
+    """A length rounded up to the resolution of cross-track distances in files [m]; at least one step."""
     return max(math.ceil(length_m / XTD_STEP_M - 1e-9), 1) * XTD_STEP_M
 
 

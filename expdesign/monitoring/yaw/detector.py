@@ -45,7 +45,7 @@ class Detector:
 
     @classmethod
     def calibrated(cls, residuals: Array, *, false_share: float, deviations: float = 2.0) -> Detector:
-        """From residuals of the nominal ship (n, k): the sum hardly grows, and a share of the voyages raises an alarm.
+        """Tuned on residuals of the nominal ship (n, k), of whose voyages a share raises an alarm.
 
         Args:
             residuals: of voyages as long as those that are watched.

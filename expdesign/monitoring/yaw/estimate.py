@@ -98,7 +98,7 @@ def _middle(values: Array) -> Array:
 
 
 def _step_derivatives(shapes: Array, by: Array, inertia: Array, rates: Array, step: float) -> tuple[Array, Array]:
-    """Of the yaw rate after each step: (k - 1, n, 1) by that before, (k - 1, n, p) by the parameters."""
+    """Derivatives of the yaw rate after each step: (k - 1, n, 1) by that before, (k - 1, n, p) by the parameters."""
     begin, middle, end = (shapes[:, :-1], by[:, :-1]), (_middle(shapes), _middle(by)), (shapes[:, 1:], by[:, 1:])
     own = np.zeros((*rates[:-1].shape, shapes.shape[-1] + 2))
     own[..., 0] = 1.0

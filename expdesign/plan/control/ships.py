@@ -190,7 +190,7 @@ class HelmShip(Capability):
         return CONTROL.helm_run_up_hulls * vessel.length_m / max(speed_mps, 0.5 * self.transit_speed_mps)
 
     def braking_mps2(self, speed_mps: float) -> float:
-        """As with the engines full astern."""
+        """Deceleration with the engines full astern."""
         return speed_mps**2 / (2 * self.stopping_m)
 
 

@@ -113,7 +113,7 @@ class Helmsman:
 
     @cached_property
     def controller(self) -> Controller:
-        """Of the ship's kind."""
+        """The controller for the ship's kind."""
         return self.ship.controller(self.vessel)
 
     @property

@@ -61,7 +61,7 @@ class GoAroundTime:
 
     @staticmethod
     def of(ship: Capability, vessel: Vessel) -> GoAroundTime | None:
-        """Of ships that turn on the spot; the legs of others have run-ups."""
+        """Go-around time of ships that turn on the spot; the legs of others have run-ups."""
         if not isinstance(ship, AgileShip):
             return None
         run_up_s = ship.run_up_s(vessel, ship.transit_speed_mps)

@@ -19,7 +19,7 @@ NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
 
 
 def missing_columns(batch: Batch) -> tuple[str, ...]:
-    """Of `NEEDED`, what a batch does not measure."""
+    """Columns of `NEEDED` that a batch does not measure."""
     return tuple(name for name in NEEDED if not batch.measures(name))
 
 

@@ -139,7 +139,7 @@ def judge_roll(
 
 
 def _chance(total: float, numbers: int, freedom: float) -> float:
-    """Of a larger sum of squares of so many numbers, whose covariance has so many degrees of freedom."""
+    """Chance of a larger sum of squares of so many numbers, whose covariance has so many degrees of freedom."""
     rest = freedom - numbers + 1.0
     return float(scipy.stats.f.sf(total * rest / (freedom * numbers), numbers, rest))
 
@@ -150,7 +150,7 @@ def _price(change: RollChange) -> float:
 
 
 def record_estimate(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: float) -> RollEstimate:
-    """By instruments from the rudder, with what one record cannot tell as in the file.
+    """Estimate with instruments from the rudder; parameters that one record cannot determine stay as in the file.
 
     Raises:
         InputError, NotInformative: its intervals are not to be trusted.

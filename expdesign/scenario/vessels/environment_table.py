@@ -27,7 +27,7 @@ class FlowTable(Table):
 
     @property
     def variation(self) -> Variation:
-        """As a value."""
+        """The variation as a value."""
         return Variation(std_mps=self.variation_std_mps, correlation_s=self.correlation_s)
 
 

@@ -80,7 +80,7 @@ def sail_many(
         return np.concatenate([accelerations, [p, r * np.cos(phi)]])
 
     def numbers(rows: Array) -> list[Any]:
-        """Of one voyage as plain numbers, which are quicker."""
+        """Rows of one voyage as plain numbers, which are quicker."""
         return list(rows.tolist()) if n == 1 else list(rows)
 
     x = np.zeros((6, n)) if start is None else np.array(start.T, dtype=float)

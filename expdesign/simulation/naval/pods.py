@@ -33,7 +33,7 @@ class Pods:
     down_m: float = 1.2
 
     def forces(self, u: Any, v: Any, p: Any, r: Any, angle: Any, speed: Any) -> list[Any]:
-        """Of both pods in (u, v, p, r) [N, N, Nm, Nm], for a pod angle [rad] and a propeller speed [1/s]."""
+        """Forces of both pods in (u, v, p, r) [N, N, Nm, Nm], for a pod angle [rad] and a propeller speed [1/s]."""
         ahead: Any = 0.0
         aside: Any = 0.0
         across = v + self.forward_m * r - self.down_m * p

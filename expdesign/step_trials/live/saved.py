@@ -14,7 +14,7 @@ from expdesign.step_trials.steady_state import RatioTest, Watched
 
 
 def restored_state(table: Mapping[str, Any]) -> State:
-    """From plain values.
+    """A state, read from plain values.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: it is none.

@@ -45,7 +45,7 @@ class Setup:
 
 
 def beginning(setup: Setup) -> State:
-    """Before the first row."""
+    """The state before the first row."""
     return State(left=setup.steps.steps)
 
 
@@ -129,7 +129,7 @@ def _watching(state: State, sample: np.ndarray) -> State:
 
 
 def _with_row(state: State, held: Held, row: Row, setup: Setup) -> Told:
-    """With a row, and, where the commands leave where they stood, a new hold."""
+    """Take a row; a new hold begins where the commands change."""
     assert state.tests is not None
     events: tuple[Event, ...] = ()
     if held.inputs is not None and not setup.steps.same(held.inputs, row.inputs):
@@ -157,7 +157,7 @@ def _again(state: State, row: Row) -> State:
 
 
 def _ended(state: State, held: Held, row: Row, setup: Setup) -> Told:
-    """After the last row of a hold; one that was left before its time is judged by what it has."""
+    """Take the last row of a hold; one that was left too early is judged by the rows it has."""
     assert held.inputs is not None
     events: tuple[Event, ...] = ()
     if not held.over and held.steady is not None:

@@ -88,7 +88,7 @@ class Evidence:
 
 
 def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
-    """Of all plateaus and of the steps that count."""
+    """Evidence of all plateaus and of the steps that count."""
     held = [(one, one.plateau) for one in samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
     plateaus = [part for _, part in held]
     sway_std = [part.sway_std if math.isfinite(part.sway_std) else math.inf for part in plateaus]

@@ -120,7 +120,7 @@ def _schmidt(jacobian: Array, white: Array, slopes: Array) -> Array:
 
 
 def _enlarged(parts: Sequence[Array], parameters: int) -> Array:
-    """By how much the errors of each part are too small, never less than 1.
+    """Factor by which the errors of each part are too small, never less than 1.
 
     What considered parameters add is not taken off: it is far from linear in them, and parameters would come out
     several standard deviations wrong.

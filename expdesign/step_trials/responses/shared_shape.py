@@ -64,7 +64,7 @@ def shared_delay(steps: Sequence[Transient], *, most_s: float) -> tuple[float, f
 
 
 def _residuals(x: Array, delay: float, steps: Sequence[Transient], noise: Sequence[float]) -> Array:
-    """Of the shape to that of hulls, and of all steps."""
+    """Residuals of the shape against that of hulls, and of all steps against the shape."""
     parts = [
         _apart(step, by, delay, x[:2], x[2 + OWN * place : 2 + OWN * (place + 1)])
         for place, (step, by) in enumerate(zip(steps, noise, strict=True))
@@ -73,7 +73,7 @@ def _residuals(x: Array, delay: float, steps: Sequence[Transient], noise: Sequen
 
 
 def _apart(step: Transient, noise: float, delay: float, shape: Array, own: Array) -> Array:
-    """Of one step in standard deviations, and of its plateaus."""
+    """Residuals of one step and of its plateaus, in standard deviations."""
     damping, zero, natural = np.exp(np.minimum([shape[0], shape[1], own[0]], MOST_LOG)).tolist()
     before, after = step.before + own[1] * step.before_std, step.after + own[2] * step.after_std
     done = second_order(np.array([natural, damping, zero * natural, delay]), step.time_s)

@@ -140,7 +140,7 @@ class _Work:
 
 
 def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: bool, progress: Progress) -> Watch:
-    """After a whole source; the state is saved now and then, and at once when there are more alarms."""
+    """Watch a whole source; the state is saved now and then, and at once when there are more alarms."""
     asked, due, done = work.asked, (0, time.monotonic() + WRITTEN_EVERY_S * (source != STREAM)), 0
     size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
     cut = pieces(

@@ -20,7 +20,7 @@ from expdesign.workflows.data.watching import Learning, Reading, Ready, Watch, W
 
 
 def restored_watch(table: Mapping[str, Any]) -> Watch:
-    """From `saved`.
+    """A watch, read from what `saved` made of it.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: it is none.

@@ -67,7 +67,7 @@ class Reading:
     taken: tuple[Taken, ...] = ()
 
     def after(self, piece: Piece) -> Reading:
-        """With the rows of a piece."""
+        """The reading after the rows of a piece."""
         others = tuple(taken for taken in self.taken if not taken.continues(piece.taken))
         before = next((taken for taken in self.taken if taken.continues(piece.taken)), piece.taken)
         last_s = piece.taken.last_s if np.isfinite(piece.taken.last_s) else before.last_s
@@ -80,7 +80,7 @@ class Reading:
         )
 
     def noted(self, *notes: str) -> Reading:
-        """With more notes; of those that differ in numbers alone, the last."""
+        """The reading with more notes; of those that differ in numbers alone, the last is kept."""
         return replace(self, notes=tuple({re.sub(r"\d+", "", text): text for text in (*self.notes, *notes)}.values()))
 
 
@@ -112,7 +112,7 @@ class Ready:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watching:
-    """After the reference.
+    """The phase after the reference.
 
     Attributes:
         calibration: of the reference.
@@ -170,7 +170,7 @@ def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch
 
 
 def _continued(reading: Reading, piece: Piece) -> Reading:
-    """With times that go on where those of the piece begin again."""
+    """The reading with times that go on where those of the piece begin again."""
     if not piece.time_s[0] + reading.offset_s <= reading.now_s:
         return reading
     note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
@@ -179,7 +179,7 @@ def _continued(reading: Reading, piece: Piece) -> Reading:
 
 
 def with_piece(now: Watch, piece: Piece, read: Read | Unread | None, asked: Asked) -> Watch:
-    """After one more piece of the data, which may belong to the reference, to the watch, or to both."""
+    """The watch after one more piece of the data, which may belong to the reference, to the watch, or to both."""
     now = after_reading(now, piece, read)
     if not isinstance(read, Read):
         return now
@@ -198,7 +198,7 @@ def with_piece(now: Watch, piece: Piece, read: Read | Unread | None, asked: Aske
 
 
 def _roll_watched(before: Watch, now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
-    """With what a piece tells of roll."""
+    """The watch with the roll of a piece judged."""
     runs = roll_runs(read.record, asked.vessel)
     if runs is None:
         return replace(now, roll=replace(now.roll, reason=f"the data do not measure {' and '.join(NEEDED)}"))
@@ -219,7 +219,7 @@ def _last_call_s(watch: Watch) -> float | None:
 
 
 def roll_runs(record: Record, ship: Vessel) -> tuple[Run, ...] | None:
-    """Of a record; None where [roll] is not in the vessel file, or not measured."""
+    """Runs of a record with roll; None where [roll] is not in the vessel file, or not measured."""
     if ship.pendulum is None or any(missing_columns(batch) for batch in record.batches):
         return None
     return with_one_source([roll_run(batch, ship=ship) for batch in record.batches])
@@ -231,7 +231,7 @@ def roll_days(asked: Asked) -> float:
 
 
 def with_reference(now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
-    """With a piece that belongs to the reference."""
+    """The watch with a piece added to the reference."""
     assert isinstance(now.phase, Learning)
     learning = now.phase
     if (runs := roll_runs(read.record, asked.vessel)) is not None:
@@ -242,7 +242,7 @@ def with_reference(now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
 
 
 def calibrated(now: Watch) -> Watch:
-    """At the end of the reference.
+    """The watch at the end of the reference, with its calibration.
 
     Raises:
         NotInformative: it is too short, or tells too little.
@@ -272,7 +272,7 @@ def rules_of(calibration: Calibration, asked: Asked) -> Rules:
 
 
 def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: float = -np.inf) -> Watch:
-    """After the stretches of a piece that begin at a time or later were watched."""
+    """Watch the stretches of a piece that begin at a time or later."""
     assert not isinstance(now.phase, Learning)
     calibration, offset_s = now.phase.calibration, now.reading.offset_s
     grams = read.at(now.changes, shift_of(now), asked, offset_s=offset_s)
@@ -306,7 +306,7 @@ def _begun(ready: Ready, time_s: float) -> Watching:
 
 
 def _hour(on: Watching, grams: Grams, rules: Rules) -> tuple[Watching, list[Alarm], int]:
-    """After stretches that make one moment of the page; alarms that were raised, and stretches that were used."""
+    """Watch the stretches of one moment of the page; returns the alarms raised and the number of stretches used."""
     state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules)
     value, std = estimates(state, on.calibration)
     statistic = max((step.statistic for step in steps), default=0.0)

@@ -170,7 +170,7 @@ def expected_std(
 
 
 def purchases(design: DurationDesign, parameters: Sequence[str]) -> tuple[Purchase, ...]:
-    """For each parameter the manoeuvre without whose runs its standard deviation would be largest.
+    """For each parameter the manoeuvre that its accuracy depends on most.
 
     By the inverse of the design's information matrix, prior data included.
     """

@@ -50,7 +50,7 @@ def foresee(
     cache: bool = True,
     progress: Progress = silent,
 ) -> Outcome:
-    """With which probability a diagnosis of the trial would find each cause, into `out` or runs/<scenario>.
+    """The probability that a diagnosis of the trial would find each cause, into `out` or runs/<scenario>.
 
     Args:
         scenario: the scenario file.

@@ -108,7 +108,7 @@ def identify_steps(
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
-    """As recorded: lags and dead times that a vessel file states are not undone, for they are to be found."""
+    """The record as measured: lags and dead times that a vessel file states are not undone, as they are to be found."""
     return load_records(
         list(data_files(data)),
         vessel_inputs=None if ship is None else ship.model.inputs,

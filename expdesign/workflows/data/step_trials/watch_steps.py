@@ -139,7 +139,7 @@ def watch_steps(
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:
-    """After all rows of a source; the state is written at every event, and now and then between."""
+    """Watch all rows of a source; the state is written at every event, and now and then between."""
     due = time.monotonic() + WRITTEN_EVERY_S
     size = data.stat().st_size if data != STREAM and data.is_file() else 0
     done, columns = 0, None
