@@ -21,6 +21,7 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,
     finding_of,
+    note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
     note_on_random_current,
@@ -45,7 +46,7 @@ from expdesign.diagnosis.fit import (
     with_longer_windows,
     within_stated_std,
 )
-from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, without_harm
+from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, losses_without, without_harm
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
@@ -116,7 +117,7 @@ def diagnose(
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
-    order = sorted(range(len(findings)), key=lambda index: -findings[index].certain_reduction)
+    order = np.argsort(-losses_without(chosen.kept, chosen.held, chosen.validation, windows), kind="stable").tolist()
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
     harmless = bool(findings) or not harms(ship, chosen.kept.last.ship, record)
@@ -175,6 +176,7 @@ class _Selected:
     Attributes:
         as_stated: errors of the model in use as its file states it.
         held: of the model before any cause, then after every one that was kept.
+        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
         validation: of other fits.
         rest: what is missing beside all causes, or instead of them.
     """
@@ -183,6 +185,7 @@ class _Selected:
     kept: Selection
     as_stated: HeldOut
     held: list[HeldOut]
+    re_estimated: HeldOut | None
     validation: CrossValidation
     rest: Remainder
 
@@ -194,12 +197,7 @@ class _Selected:
     @property
     def before(self) -> HeldOut:
         """`as_stated` as `held` was measured: of whole units or of short stretches."""
-        return _like(self.held[0], self.as_stated)
-
-
-def _like(other: HeldOut, held: HeldOut) -> HeldOut:
-    """Errors measured as others were: of whole units or of short stretches."""
-    return held.ahead() if other.in_stretches and held.ahead is not None else held
+        return self.as_stated.like(self.held[0])
 
 
 def _select(
@@ -215,10 +213,20 @@ def _select(
         progress = told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
         return errors_as_judged(found, as_stated, validation, windows, progress, seed)
 
-    kept, held = eliminate_backward(found, windows, cross_validated, seed)
+    comparable = found.steps and found.first.keys and within_stated_std(found.first)
+    re_estimated = validation.of(found.first) if comparable else None
+    kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     rest = with_unlisted_terms(kept, held, windows, validation, seed)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])
-    return _Selected(found=found, kept=kept, as_stated=as_stated, held=held, validation=validation, rest=rest)
+    return _Selected(
+        found=found,
+        kept=kept,
+        as_stated=as_stated,
+        held=held,
+        re_estimated=re_estimated,
+        validation=validation,
+        rest=rest,
+    )
 
 
 def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
@@ -235,7 +243,7 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
         return None
     base, leads = chosen.held[len(chosen.kept.steps)], []
     for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
-        held = _like(base, chosen.validation.without(item.fit, item.fit.ship))
+        held = chosen.validation.without(item.fit, item.fit.ship).like(base)
         leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
     return Unexplained(
         outputs=after.outputs,
@@ -300,6 +308,7 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
     notes = [
         *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
+        *note_beside_the_same_fit(chosen.kept, chosen.held, chosen.re_estimated, seed),
         *notes_on_rejected(chosen.found, chosen.rest.kept, unit),
     ]
     if chosen.kept.first.keys:

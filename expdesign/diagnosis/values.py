@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from expdesign.diagnosis.accuracy import Accuracy, Residuals
 from expdesign.diagnosis.data import Windows
 from expdesign.signals import Record
@@ -77,11 +75,6 @@ class Finding:
     keys: tuple[str, ...]
     predicted: ErrorReduction | None = None
 
-    @property
-    def certain_reduction(self) -> float:
-        """Largest share by which the error of an output falls for certain: the lower end of its interval."""
-        return max((item.low for item in self.error_reductions if np.isfinite(item.low)), default=-np.inf)
-
 
 @dataclass(frozen=True)
 class Lead:
@@ -124,7 +117,8 @@ class Diagnosis:
         windows: the data as compared.
         unit: what gains are measured on, in words.
         before, after: accuracy of both on all batches, in sample.
-        findings: by `certain_reduction`; each gain is relative to the model with the causes that were found before.
+        findings: by what the model of all loses on held-out data without each; each gain is relative to the model with
+            the causes that were found before.
         verdict: one sentence.
         unexplained: what remains; None where the simulation explains much, or all but the noise.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.

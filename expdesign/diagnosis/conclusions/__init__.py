@@ -2,6 +2,7 @@
 
 from expdesign.diagnosis.conclusions.findings import error_reductions_of, finding_of
 from expdesign.diagnosis.conclusions.notes import (
+    note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
     note_on_random_current,
@@ -32,6 +33,7 @@ __all__ = [
     "has_diverged",
     "manoeuvre",
     "missing_effect",
+    "note_beside_the_same_fit",
     "note_on_divergence",
     "note_on_nuisance",
     "note_on_random_current",

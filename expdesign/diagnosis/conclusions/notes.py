@@ -9,7 +9,7 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions.verdict import has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
-from expdesign.diagnosis.select import SELECTION_TUNING, Selection
+from expdesign.diagnosis.select import SELECTION_TUNING, Selection, gain_beside_the_same_fit
 from expdesign.diagnosis.vessel_file import public_name
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
@@ -160,7 +160,31 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
     return (
         "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
         f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state, a fifth of every "
-        "run held out at a time.",
+        "run held out at a time. In a stretch an error counts as no larger than that of the run's mean.",
+    )
+
+
+def note_beside_the_same_fit(
+    kept: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
+) -> tuple[str, ...]:
+    """The gain of the first cause where that on the model in use is not certain.
+
+    Args:
+        kept: the causes.
+        held: errors on held-out units of the model before any cause, then after every one.
+        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
+        seed: of the intervals.
+    """
+    if not kept.steps or held_out_gain(held[0], held[1], seed)[1][0] > 0.0:
+        return ()
+    known = gain_beside_the_same_fit(kept, held, re_estimated, seed)
+    if known is None or not known[1][0] > 0.0:
+        return ()
+    gain, (low, high) = known
+    return (
+        "The parameters of the vessel file may have been fitted to these data too. On the model re-estimated without "
+        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} as it is with it, the gain is {gain:+.1f} points "
+        f"({low:.1f} to {high:.1f}).",
     )
 
 

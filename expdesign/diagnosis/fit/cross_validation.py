@@ -10,7 +10,10 @@ most of all where that moves otherwise than the others. Then models are judged b
 in stretches, each simulated from its first measured state, one part of every run held out at a time (as the h-block
 cross-validation of P. Burman, E. Chow and D. Nolan, Biometrika 81 (1994), 351-358). What is judged so is also fitted
 so, by output error in the other stretches. The likelihood whitens slow errors away, and these are most of the error of
-such a prediction.
+such a prediction. Where a stretch is predicted worse than by the mean of its run, it is lost, and by how much tells
+nothing: its error counts as that of such a constant. The few stretches in which a model runs away would decide else
+(errors relative to a simple prediction, winsorised: J. S. Armstrong and F. Collopy, International Journal of
+Forecasting 8 (1992), 69-80).
 """
 
 from __future__ import annotations
@@ -61,6 +64,10 @@ class HeldOut:
     def fit(self) -> Array:
         """(n,) [%] over all units that could be fitted."""
         return _fit_percent(np.nansum(self.squared_error, axis=0), np.nansum(self.squared_deviation, axis=0))
+
+    def like(self, other: HeldOut) -> HeldOut:
+        """Errors of the same model measured as those of another are: of whole units or of short stretches."""
+        return self.ahead() if other.in_stretches and self.ahead is not None else self
 
     @property
     def mean_fit(self) -> float:
@@ -163,6 +170,7 @@ def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
     folds = [names[index::most] for index in range(min(most, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(parts), len(columns)))
+    lost_at = None if given.near else error_of_constants(windows.measured[..., columns], windows.batch)
     deviation, unconverged = np.zeros_like(error), 0
     tested: list[tuple[NDArray[np.bool_], ExtendedModel | None]] = []
     kept_out = [np.isin(given.unit, fold) for fold in folds]
@@ -179,10 +187,27 @@ def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
         unconverged += found is not None and model.effects == found.ship.effects
         part = windows.selected(test)
         near = found.linear.selected(test) if found is not None and given.near else None
-        sums = squared_sums(simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns])
-        for total, more in zip((error, deviation), sums, strict=True):
+        lost, varied = squared_sums(
+            simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns]
+        )
+        lost = lost if lost_at is None else np.minimum(lost, lost_at[test])
+        for total, more in ((error, lost), (deviation, varied)):
             np.add.at(total, np.searchsorted(parts, given.part[test]), more)
     return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged, models=tuple(tested))
+
+
+def error_of_constants(measured: Array, batch: Array) -> Array:
+    """(w, n) squared error of each window where every batch is predicted by its mean, averaged over all data.
+
+    Args:
+        measured: (w, s, n), nan where not measured.
+        batch: (w,) that each window is of.
+    """
+    total, seen = np.zeros(measured.shape[-1]), np.isfinite(measured)
+    for number in np.unique(batch):
+        rows = measured[batch == number].reshape(-1, measured.shape[-1])
+        total += np.nansum((rows - np.nanmean(rows, axis=0)) ** 2, axis=0)
+    return np.asarray(seen.sum(axis=1) * total / np.maximum(seen.sum(axis=(0, 1)), 1))
 
 
 def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:

@@ -2,6 +2,7 @@
 
 from expdesign.diagnosis.select.backward_elimination import (
     eliminate_backward,
+    gain_beside_the_same_fit,
     improves_held_out,
     only_nuisance,
     simulates_better,
@@ -24,6 +25,7 @@ __all__ = [
     "eliminate_backward",
     "fit_nuisance",
     "fitted_ahead",
+    "gain_beside_the_same_fit",
     "improves_held_out",
     "leading_candidates",
     "only_nuisance",

@@ -27,6 +27,7 @@ def eliminate_backward(
     windows: Windows,
     cross_validated: Callable[[Selection], tuple[Selection, list[HeldOut]]],
     seed: int,
+    re_estimated: HeldOut | None = None,
 ) -> tuple[Selection, list[HeldOut]]:
     """Drop causes without held-out gain, and causes whose size is indistinguishable from zero.
 
@@ -36,6 +37,7 @@ def eliminate_backward(
         cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
             before any cause, then after every step.
         seed: of the gains' intervals.
+        re_estimated: errors of the model before any cause with its uncertain parameters fitted; None where it has none.
 
     Returns:
         The selection whose last fit has the standard errors that are reported, and the errors that belong to it.
@@ -43,7 +45,7 @@ def eliminate_backward(
     reordered: list[Candidate] = []
     while True:
         found, held = cross_validated(found)
-        improves = improves_held_out(found, held, seed, windows)
+        improves = improves_held_out(found, held, seed, windows, re_estimated)
         later = _moved_last(found, improves, windows, reordered)
         if later is not None:
             found = later
@@ -88,7 +90,11 @@ def before_first_without_gain(found: Selection, improves: Sequence[bool]) -> Sel
 
 
 def improves_held_out(
-    found: Selection, held: Sequence[HeldOut], seed: int, windows: Windows | None = None
+    found: Selection,
+    held: Sequence[HeldOut],
+    seed: int,
+    windows: Windows | None = None,
+    re_estimated: HeldOut | None = None,
 ) -> list[bool]:
     """Which causes improve the simulation of held-out data.
 
@@ -101,7 +107,9 @@ def improves_held_out(
     the interval of a later cause must exclude zero, and so must that of any cause beside the parameters of the file, as
     tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off every error is a remark,
     whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause whose gain is not certain has
-    to show for certain in the error of some output, or in predictions from one sample to the next. It may show in these
+    to show for certain in the error of some output, in predictions from one sample to the next, or beside the model
+    that is fitted as it is but for the cause. Parameters of a file that were fitted to the same data have seen what is
+    held out, those fitted with a cause have not: a loss by fitting them hides the gain. A cause may show in predictions
     alone, if it makes simulations no worse for certain.
 
     Args:
@@ -109,6 +117,7 @@ def improves_held_out(
         held: errors on held-out units of the model before any cause, then after every step.
         seed: of the gains' intervals.
         windows: all data; None where there are no predictions of them.
+        re_estimated: errors of the model before any cause with its uncertain parameters fitted; None where it has none.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     simulated = [
@@ -129,8 +138,24 @@ def improves_held_out(
     if high >= 0.0 and low <= 0.0:
         share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
         shows = least > 0.0 or _falls_for_certain(held[0], held[1], seed)
+        if not shows:
+            beside = gain_beside_the_same_fit(found, held, re_estimated, seed)
+            shows = beside is not None and beside[1][0] > 0.0
         simulated[0] = (simulated[0] and shows) or (share >= TUNING.least_predicted and least > 0.0)
     return simulated
+
+
+def gain_beside_the_same_fit(
+    found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
+) -> tuple[float, tuple[float, float]] | None:
+    """Gain of the first cause on the model without it that is fitted in the same way [points], and its interval.
+
+    None where there is no such model, or the cause is that its parameters are wrong. Arguments as of
+    `improves_held_out`.
+    """
+    if re_estimated is None or found.beside_stated or found.steps[0].chosen.candidate.cause == "parameters":
+        return None
+    return held_out_gain(re_estimated.like(held[1]), held[1], seed)
 
 
 def _falls_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
