@@ -76,11 +76,11 @@ def test_a_first_cause_is_certain_beside_the_same_fit_without_it(monkeypatch, re
 def test_causes_are_ordered_by_what_the_model_loses_without_each(monkeypatch):
     """The first cause gains 20 points and the second 10 after it, but without the second 10 are lost, else 5."""
     found = steps_of("first", "second")
-    held = [errors(50.0), errors(70.0), errors(80.0)]
+    held = [errors(value) for value in (50.0, 70.0, 80.0, 90.0)]  # a third cause was taken out
     only_second = SimpleNamespace(chosen=SimpleNamespace(fit="second alone"))
     monkeypatch.setattr(judgement, "without_step", lambda *_: [only_second])
     validation = SimpleNamespace(of={"second alone": errors(75.0)}.get)
     np.testing.assert_allclose(losses_without(found, held, validation, None), [5.0, 10.0])  # type: ignore[arg-type]
     monkeypatch.setattr(judgement, "without_step", lambda *_: None)
     np.testing.assert_allclose(losses_without(found, held, validation, None), [np.inf, 10.0])  # type: ignore[arg-type]
-    assert losses_without(steps_of(), held[:1], validation, None).size == 0  # type: ignore[arg-type]
+    assert losses_without(steps_of(), held, validation, None).size == 0  # type: ignore[arg-type]

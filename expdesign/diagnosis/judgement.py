@@ -123,19 +123,22 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
 
     Args:
         found: the selection.
-        held: errors on held-out units of the model before any cause, then after every step.
+        held: errors on held-out units of the model before any cause, then after every step, and perhaps of more.
         validation: of other fits.
         windows: all data.
 
     Source: J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani and L. Wasserman, Journal of the American Statistical
     Association 113 (2018), 1094-1111, section 6: leave one covariate out.
     """
+    if not found.steps:
+        return np.zeros(0)
+    *_, last, whole = held[: len(found.steps) + 1]
     losses = []
     for index in range(len(found.steps) - 1):
         others = without_step(list(found.steps), index, windows)
-        one = None if others is None else validation.of(others[-1].chosen.fit).like(held[-1])
-        losses.append(np.inf if one is None else held[-1].mean_fit - one.mean_fit)
-    return np.array([*losses, *(held[-1].mean_fit - one.mean_fit for one in held[-2:-1])])
+        one = None if others is None else validation.of(others[-1].chosen.fit).like(whole)
+        losses.append(np.inf if one is None else whole.mean_fit - one.mean_fit)
+    return np.array([*losses, whole.mean_fit - last.mean_fit])
 
 
 def without_harm(
