@@ -73,6 +73,20 @@ def test_a_first_cause_is_certain_beside_the_same_fit_without_it(monkeypatch, re
     assert len(note_beside_the_same_fit(found, held, without, 0)) == kept
 
 
+@pytest.mark.parametrize(("ahead", "kept"), [(75.0, True), (70.0 + OPEN, False)])
+def test_a_first_cause_that_one_of_many_runs_shows_is_certain_in_stretches(monkeypatch, ahead, kept):
+    """Five runs are simulated alike without and with it, so that its gain in whole runs is open."""
+    monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_: (0.0, (-1.0, 1.0)))
+    found = steps_of("first")
+    found.steps[0].chosen.fit = SimpleNamespace(noise=None)
+    fits = (70.0, 70.0 + np.array([[20.0], [0.0], [0.0], [0.0], [0.0], [0.0]]))
+    held = [
+        replace(errors(whole), ahead=lambda short=short: replace(errors(short), in_stretches=True))
+        for whole, short in zip(fits, (70.0, ahead), strict=True)
+    ]
+    assert improves_held_out(found, held, 0, object()) == [kept]  # type: ignore[arg-type]
+
+
 def test_causes_are_ordered_by_what_the_model_loses_without_each(monkeypatch):
     """The first cause gains 20 points and the second 10 after it, but without the second 10 are lost, else 5."""
     found = steps_of("first", "second")

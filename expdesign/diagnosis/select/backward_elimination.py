@@ -107,10 +107,10 @@ def improves_held_out(
     the interval of a later cause must exclude zero, and so must that of any cause beside the parameters of the file, as
     tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off every error is a remark,
     whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause whose gain is not certain has
-    to show for certain in the error of some output, in predictions from one sample to the next, or beside the model
-    that is fitted as it is but for the cause. Parameters of a file that were fitted to the same data have seen what is
-    held out, those fitted with a cause have not: a loss by fitting them hides the gain. A cause may show in predictions
-    alone, if it makes simulations no worse for certain.
+    to show for certain in the error of some output, in predictions from one sample to the next, in short stretches, as
+    one of many runs may be all that shows it, or beside the model that is fitted as it is but for the cause. Parameters
+    of a file that were fitted to the same data have seen what is held out, those fitted with a cause have not: a loss
+    by fitting them hides the gain. A cause may show in predictions alone, if it makes simulations no worse for certain.
 
     Args:
         found: the selection.
@@ -138,6 +138,7 @@ def improves_held_out(
     if high >= 0.0 and low <= 0.0:
         share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
         shows = least > 0.0 or _falls_for_certain(held[0], held[1], seed)
+        shows = shows or (held[1].ahead is not None and _is_certain_ahead(held, 0, seed, gains[0]))
         if not shows:
             beside = gain_beside_the_same_fit(found, held, re_estimated, seed)
             shows = beside is not None and beside[1][0] > 0.0
