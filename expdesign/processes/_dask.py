@@ -20,7 +20,7 @@ from uuid import uuid4
 import cloudpickle
 
 from expdesign.errors import InputError
-from expdesign.processes.sharing import done
+from expdesign.processes.tasks import done
 from expdesign.processes.tuning import CLUSTER
 
 try:

@@ -14,13 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from functools import lru_cache
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
 from joblib import Parallel, cpu_count, delayed, effective_n_jobs, parallel_config
 from joblib.externals.loky import ProcessPoolExecutor
+
+from expdesign.processes.tasks import done
 
 if TYPE_CHECKING:
     from expdesign.processes._dask import Cluster
@@ -207,14 +208,3 @@ def leaving_interruptions() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
-
-
-def done(both: bytes, task: bytes) -> Any:
-    """The result of a task, from a function with its shared arguments and from the task's own, all pickled."""
-    function, shared = _unpacked(both)
-    return function(*shared, *cloudpickle.loads(task))
-
-
-@lru_cache(maxsize=2)
-def _unpacked(both: bytes) -> Any:
-    return cloudpickle.loads(both)

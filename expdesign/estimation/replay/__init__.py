@@ -1,5 +1,6 @@
 """Batches simulated again: instruments, and fast simulation for output error."""
 
+from expdesign.estimation.replay.compiled import Compiled, compiled
 from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
 from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
 from expdesign.estimation.replay.steered import (
@@ -11,7 +12,7 @@ from expdesign.estimation.replay.steered import (
     open_loop,
     treatment_of,
 )
-from expdesign.estimation.replay.stretches import Compiled, Stretches, compiled
+from expdesign.estimation.replay.stretches import Stretches
 
 __all__ = [
     "LEAVE_OUT",

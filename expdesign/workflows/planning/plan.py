@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign.durations import with_repeats
-from expdesign.memory import remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.command_text import command_text
@@ -46,11 +45,7 @@ def plan(
     case = loaded(scenario, progress, vessel=vessel)
     check_plannable(case)
     words = command_text("plan", [scenario], {"--vessel": vessel, "--durations": durations, "--seed": seed})
-    with (
-        remembering(user_memory() if cache else None),
-        workers(jobs, scheduler=scheduler),
-        drafted(case, out, command=words),
-    ):
+    with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
         return _plan(case, out, durations, seed, progress)
 
 

@@ -24,7 +24,6 @@ from expdesign.export.load_page import (
 )
 from expdesign.information import PrimitiveInformation
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
-from expdesign.memory import remembering, user_memory
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, ending, silent, within
 from expdesign.scenario import Scenario, load_cases
@@ -89,7 +88,7 @@ def roll_plan(
         check_plannable(case)
     asked = load_cases(loads, case.vessel)
     question = build_question(case.vessel, asked.loads, known=asked.known, guess=asked.start)
-    with remembering(user_memory() if cache else None), workers(jobs, load=load_planner if place else None):
+    with workers(jobs, load=load_planner if place else None, cache=cache):
         information = scored(case, progress=within(limited, 0.05, 0.1))
         plan = choose_loads(
             question, [item.primitive for item in information], total_s=case.design.total_s,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from expdesign.durations import efficiencies
-from expdesign.memory import recalled, remembering, user_memory
+from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.workflows.command_text import command_text
@@ -46,11 +46,7 @@ def run(
     case = loaded(scenario, progress, vessel=vessel)
     check_plannable(case)
     words = command_text("run", [scenario], {"--vessel": vessel, "--seed": seed})
-    with (
-        remembering(user_memory() if cache else None),
-        workers(jobs, scheduler=scheduler),
-        drafted(case, out, command=words),
-    ):
+    with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
         return _run(case, out, seed, progress)
 
 

@@ -1,11 +1,12 @@
-"""Where independent work is done: processes on this machine, or the workers of a Dask scheduler."""
+"""Where independent work is done, on this machine or on a Dask scheduler, and where its results are remembered."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from expdesign.errors import InputError
+from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors
 
 
@@ -25,7 +26,11 @@ def load_planner() -> None:
 
 @contextmanager
 def workers(
-    jobs: int, *, scheduler: str | None = None, load: Callable[[], None] | None = load_planner
+    jobs: int,
+    *,
+    scheduler: str | None = None,
+    load: Callable[[], None] | None = load_planner,
+    cache: bool | None = None,
 ) -> Iterator[None]:
     """Independent work in this block is shared among processes; its results do not depend on them.
 
@@ -33,15 +38,14 @@ def workers(
         jobs: processes; 0 for one per core that this process may use, 1 for this one alone.
         scheduler: address of a Dask scheduler whose workers do the work instead.
         load: what processes of this machine do first, once something is missing in the cache.
+        cache: whether results are remembered for later commands; None leaves that as it is.
 
     Raises:
         InputError: the number of processes is negative; as `on_cluster`.
     """
     if jobs < 0:
         raise InputError(f"--jobs is {jobs}, expected a whole number of 0 or more")
-    if scheduler is not None:
-        with on_cluster(scheduler):
-            yield
-        return
-    with local_processes(jobs or processors(), load=load):
+    memory = nullcontext() if cache is None else remembering(user_memory() if cache else None)
+    place = on_cluster(scheduler) if scheduler is not None else local_processes(jobs or processors(), load=load)
+    with memory, place:
         yield

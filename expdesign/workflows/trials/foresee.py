@@ -24,7 +24,6 @@ from expdesign.export.routes import read_plan
 from expdesign.foresight import Foresight, TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
-from expdesign.memory import remembering, user_memory
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
@@ -69,7 +68,7 @@ def foresee(
         return _operation(scenario, out, operation, seed=seed, jobs=jobs, cache=cache, progress=progress)
     case = loaded(scenario, progress)
     words = command_text("foresee", [scenario], {"--plan": plan, "--seed": seed})
-    with remembering(user_memory() if cache else None), workers(jobs, load=None):
+    with workers(jobs, load=None, cache=cache):
         information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.15))
         offers = [item.primitive for item in information]
         runs, weather = _trial(case, information, plan, seed, within(progress, 0.15, 0.2))
@@ -100,7 +99,7 @@ def _operation(
 ) -> Outcome:
     """What a watch over the scenario's ship in its weather would find."""
     case = loaded(scenario, progress)
-    with remembering(user_memory() if cache else None), workers(jobs, load=None):
+    with workers(jobs, load=None, cache=cache):
         found = foresee_operation(
             case.vessel, case.environment, voyages=voyages, seed=seed, progress=within(progress, 0.02, 0.97)
         )

@@ -16,7 +16,7 @@ from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
 from expdesign.information import estimated_parameters
-from expdesign.memory import recalled, remembering, user_memory
+from expdesign.memory import recalled
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
@@ -94,8 +94,7 @@ def replan(
         },
     )
     with (
-        remembering(user_memory() if cache else None),
-        workers(jobs, scheduler=scheduler),
+        workers(jobs, scheduler=scheduler, cache=cache),
         drafted(replace(state.first, start=state.pose, vessel=state.ship), out, command=words),
     ):
         return _replanned(state, out, words, interest=interest, seed=seed, progress=progress)
