@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
-from expdesign.estimation.disturbance import current_moments, felt_moments, measured_wind
+from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind
 from expdesign.estimation.methods import estimate
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Sensors, Vessel, VesselModel
@@ -42,7 +42,7 @@ def test_a_steady_current_has_the_second_moments_of_its_mean() -> None:
     np.testing.assert_allclose(moments.mean, SKEW, rtol=1e-6)
     np.testing.assert_allclose(moments.second, second(SKEW), rtol=1e-6)
     np.testing.assert_allclose(moments.central, 0.0, atol=1e-8)
-    assert felt_moments(found) == ()
+    assert combined_moments(found) == ()
 
 
 def test_drag_feels_current_and_wind_by_the_shares_of_their_parameters() -> None:
@@ -51,7 +51,7 @@ def test_drag_feels_current_and_wind_by_the_shares_of_their_parameters() -> None
     batches = [measured(QUIET, commands(900, np.random.default_rng(seed)), weather=weather) for seed in (4, 5)]
     found = estimate(record(*batches), NOMINAL, method="iv-augmented")
     value = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
-    told = felt_moments(found)
+    told = combined_moments(found)
     assert [(item.of, item.shares) for item in told] == [
         ("u", (("W_abs_u_u", "X_abs_u_u"),)),
         ("v", (("W_abs_v_v", "Y_abs_v_v"),)),

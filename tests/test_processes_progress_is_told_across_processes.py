@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from expdesign.processes import as_finished, local_processes, told_together
+from expdesign.processes import as_finished, local_processes, reported_together
 from expdesign.processes.telling import _elapsed
 
 STEPS = 4
@@ -21,7 +21,7 @@ def told_work(name, progress):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_shares_of_all_tasks_are_told_together_and_never_fall(jobs):
     told = []
-    with local_processes(jobs), told_together(lambda *what: told.append(what), 2) as together:
+    with local_processes(jobs), reported_together(lambda *what: told.append(what), 2) as together:
         for number in as_finished(told_work, (), zip("ab", together.tellers, strict=True)):
             assert number == STEPS - 1
     activities, shares = zip(*told, strict=True)
@@ -40,13 +40,13 @@ def test_the_share_is_that_of_the_time():
 
 def test_a_finished_task_is_told_at_once():
     told = []
-    with told_together(lambda *what: told.append(what), 2) as together:
+    with reported_together(lambda *what: told.append(what), 2) as together:
         together.finished(1, "b is done")
         assert told == [("b is done", 0.5)]
 
 
 def test_tasks_without_a_way_back_work_in_silence(tmp_path):
-    with told_together(lambda *_: None, 1) as together:
+    with reported_together(lambda *_: None, 1) as together:
         (teller,) = together.tellers
     teller("at work", 0.5)  # as on another machine: the file is not there
     assert not teller.path.exists()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from expdesign.errors import NotInformative
-from expdesign.export.diagnosis_page import RollTold, roll_sentences
+from expdesign.export.diagnosis_page import RollVerdict, roll_sentences
 from expdesign.export.diagnosis_page.roll import with_roll
 from expdesign.roll.record import RollJudgement, judge_roll
 from expdesign.scenario import load_vessel
@@ -85,11 +85,11 @@ def test_a_file_that_does_not_know_is_not_contradicted() -> None:
 def test_a_load_is_written_into_the_file_as_a_mass_at_a_height() -> None:
     told = judged(9200, "load") or judged(9201, "load")
     assert told is not None
-    pendulum = with_roll(SHIP, RollTold(judgement=told)).pendulum
+    pendulum = with_roll(SHIP, RollVerdict(judgement=told)).pendulum
     assert pendulum is not None
     assert pendulum.load.mass_kg == pytest.approx(HIGH.mass_kg, rel=0.05)
     assert pendulum.load.z_m == pytest.approx(HIGH.z_m, abs=0.01)
-    assert "kg on board at a height of 0.2" in roll_sentences(RollTold(judgement=told))[0]
+    assert "kg on board at a height of 0.2" in roll_sentences(RollVerdict(judgement=told))[0]
 
 
 def test_a_run_that_is_too_short_is_left_out() -> None:

@@ -123,7 +123,7 @@ def _moved(batch: Batch, name: str, change_s: float) -> Batch:
     return replace(batch, delivered=steps, inputs=steps.mean)
 
 
-def told(found: Estimate, record: Record, stated: Vessel, vessel: Vessel) -> Estimate:
+def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Vessel) -> Estimate:
     """An estimate with times in place of their changes, and a sentence on what became of uncertain ones.
 
     Args:

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from expdesign.assessment.actuator_times import considered, delivered_anew, found_times, known_times, told, with_times
+from expdesign.assessment.actuator_times import (
+    considered,
+    delivered_anew,
+    found_times,
+    known_times,
+    with_times,
+    with_times_noted,
+)
 from expdesign.assessment.limits import Limits, decomposed
 from expdesign.assessment.prior import NONE, PARAMETER_STD, PRIORS, check_prior, with_prior
 from expdesign.assessment.residuals import one_step
@@ -13,7 +20,7 @@ from expdesign.assessment.runs import ESTIMATION, TEST, check_run
 from expdesign.assessment.tuning import TUNING
 from expdesign.assessment.values import INSTRUMENTAL, Assessed, Assessment, Disturbances
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative, UnknownName
-from expdesign.estimation.disturbance import current_moments, felt_moments, measured_wind, tells_current
+from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current
 from expdesign.estimation.equation_wise import ALL, EQUATION_WISE, SAMPLES
 from expdesign.estimation.excitation import check_excitation, worst_case
 from expdesign.estimation.methods import Method, estimate, method_named
@@ -246,7 +253,7 @@ def _assessed(
         found = with_prior(found, vessel.model)
     wind = USES_WIND[method.predictor]
     now = with_times(vessel, found_times(found, vessel))
-    found = told(found, record, stated, vessel)
+    found = with_times_noted(found, record, stated, vessel)
     model = found.model(now.model)
     runs = [
         check_run(model, batch, use=use, wind=wind, integration=options.integration)
@@ -273,7 +280,7 @@ def _disturbances(found: Estimate, record: Record, vessel: Vessel, method: Metho
     noise, tells = vessel.sensors.heading_rad, method.predictor in TELL_CURRENT and tells_current(found)
     return Disturbances(
         current=current_moments(found, heading_std_rad=noise) if tells else None,
-        felt=felt_moments(found, heading_std_rad=noise),
+        combined=combined_moments(found, heading_std_rad=noise),
         wind=measured_wind(record) if USES_WIND[method.predictor] else None,
     )
 

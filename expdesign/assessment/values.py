@@ -25,12 +25,12 @@ class Disturbances:
 
     Attributes:
         current: its moments, or None where the method does not tell them.
-        felt: of current and wind together, for equations that feel both and do not tell them apart.
+        combined: of current and wind together, for equations in which they cannot be distinguished.
         wind: the measured one, or None where none is used.
     """
 
     current: Moments | None
-    felt: tuple[Moments, ...]
+    combined: tuple[Moments, ...]
     wind: MeasuredWind | None
 
 

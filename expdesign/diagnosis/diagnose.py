@@ -101,8 +101,10 @@ def diagnose(
     samples = sum(map(len, record.batches))
     if samples > MOST_SAMPLES:
         raise InputError(f"the data have {samples} samples, expected at most {MOST_SAMPLES}: give fewer runs at a time")
-    told = Estimated(silent) if progress is None else progress
-    told.tell("simulating the model in use", SIMULATED + SELECTION_TUNING.first_rounds * SELECTION_TUNING.round_work)
+    reported = Estimated(silent) if progress is None else progress
+    reported.tell(
+        "simulating the model in use", SIMULATED + SELECTION_TUNING.first_rounds * SELECTION_TUNING.round_work
+    )
     record = with_reduced_wind(record, vessel.sensors)
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
@@ -111,9 +113,9 @@ def diagnose(
         raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
     begun, windows = with_longer_windows(ship, record, windows)
     motion = simulate_from_measured(ship, windows)
-    told.done = SIMULATED
-    chosen = _select(ship, begun, (windows, record), seed, told)
-    concluding = told.part(CONCLUDED, 0.0)
+    reported.done = SIMULATED
+    chosen = _select(ship, begun, (windows, record), seed, reported)
+    concluding = reported.part(CONCLUDED, 0.0)
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
@@ -201,16 +203,16 @@ class _Selected:
 
 
 def _select(
-    ship: ExtendedModel, begun: ExtendedModel, data: tuple[Windows, Record], seed: int, told: Estimated
+    ship: ExtendedModel, begun: ExtendedModel, data: tuple[Windows, Record], seed: int, reported: Estimated
 ) -> _Selected:
     """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
     rng, (windows, _) = np.random.default_rng(seed), data
     validation = CrossValidation(*data)
-    found = select_forward(begun, windows, initial_states(windows), rng, told, validation)
+    found = select_forward(begun, windows, initial_states(windows), rng, reported, validation)
     as_stated = validation.without(None, ship)
 
     def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
-        progress = told.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
+        progress = reported.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
         return errors_as_judged(found, as_stated, validation, windows, progress, seed)
 
     comparable = found.steps and found.first.keys and within_stated_std(found.first)

@@ -38,8 +38,8 @@ READINGS = (
 )
 """Damping, then the nuisance parameters that are it times the current to north and to east, with their signs."""
 FIRST, SECOND = (NORTH, EAST), (DIFFERENCE, PRODUCT)
-FELT = ("u", "v")
-"""Equations whose air and water terms of second degree are told together."""
+COMBINED = ("u", "v")
+"""Equations whose air and water terms of second degree are estimated as one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,8 +47,8 @@ class Moments:
     """Mean and second moments of a disturbance (N, E), over ground to north and to east.
 
     Attributes:
-        of: "current", or the equation "u" or "v" whose quadratic terms felt current and wind together.
-        shares: parameters of the air, and those of the water that hold both, where felt together; () for a current.
+        of: "current", or the equation "u" or "v" in whose quadratic terms current and wind are combined.
+        shares: parameters of the air, and those of the water that hold both, where combined; () for a current.
         mean: (2,) E N and E E [m/s].
         second: (2,) E N^2 - E E^2 and E N E [m^2/s^2]; nan where nothing tells them.
         central: (2,) the same about the mean: var N - var E and cov(N, E) [m^2/s^2].
@@ -118,11 +118,11 @@ def current_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> Mome
     return _moments(estimate, "current", (), _mean_current(estimate, heading_std_rad), second, heading_std_rad)
 
 
-def felt_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Moments, ...]:
+def combined_moments(estimate: Estimate, *, heading_std_rad: float = 0.0) -> tuple[Moments, ...]:
     """Moments of current and wind combined, for each equation whose air terms coincide with its water terms."""
     factor, found = np.exp(-0.5 * heading_std_rad**2), []
-    for equation in FELT:
-        columns, shares = _felt_columns(estimate, equation)
+    for equation in COMBINED:
+        columns, shares = _combined_columns(estimate, equation)
         parts = [[n for n, own in enumerate(shares) if _of(own, moments)] for moments in (FIRST, SECOND)]
         first, second = (
             _read(estimate, [columns[n] for n in part], [shares[n] for n in part], moments)
@@ -189,7 +189,7 @@ def _of(shares: Sequence[Share], moments: Sequence[str]) -> bool:
     return any(share.moment in moments for share in shares)
 
 
-def _felt_columns(estimate: Estimate, equation: str) -> tuple[list[int], list[tuple[Share, ...]]]:
+def _combined_columns(estimate: Estimate, equation: str) -> tuple[list[int], list[tuple[Share, ...]]]:
     """Nuisance parameters of an equation that one term of the air and its partner have to themselves.
 
     Their shares are those of the air, with the partner's parameter, which holds the sum of both.

@@ -195,12 +195,12 @@ def _vane_notes(record: Record, layout: Layout, method: Method) -> tuple[str, ..
 def _steered_notes(steered: Steered, method: Method) -> tuple[str, ...]:
     if not steered.samples:
         return ()
-    told = f"{steered.samples} of {steered.of} samples are marked as steered"
+    share = f"{steered.samples} of {steered.of} samples are marked as steered"
     if steered.treatment == LEAVE_OUT:
-        return (f"{told}; they are left out, and {steered.of - steered.samples} are used.",)
+        return (f"{share}; they are left out, and {steered.of - steered.samples} are used.",)
     if steered.treatment == PLANNED:
-        return (f"{told}; all are used, those with instruments from the inputs as planned.",)
-    return (f"{told} and used all the same; {HOLDS_STEERED[method.solver]}",)
+        return (f"{share}; all are used, those with instruments from the inputs as planned.",)
+    return (f"{share} and used all the same; {HOLDS_STEERED[method.solver]}",)
 
 
 def _fitting(choices: Settings, *, current: bool) -> Fitting:

@@ -348,13 +348,13 @@ def _against(
         index = [number for number, name in enumerate(rivals.causes) if name == cause]
         lead, best = mine - net[:, index].max(axis=1), float(cosine[index].max())
         first &= lead > 0.0
-        told = lead[significant] >= SELECTION_TUNING.equivalent_within
+        apart = lead[significant] >= SELECTION_TUNING.equivalent_within
         confusions.append(
             Confusion(
                 cause=cause,
                 cosine=best,
                 noncentrality=noncentrality * (1.0 - best**2),
-                told_apart=float(told.mean()) if len(told) else 0.0,
+                told_apart=float(apart.mean()) if len(apart) else 0.0,
             )
         )
     return float(first.mean()), tuple(sorted(confusions, key=lambda item: item.told_apart))

@@ -53,7 +53,7 @@ class Wanted:
         prior: (d, d).
         columns: number of the effect's own rows, the last ones.
         least: noncentrality that is needed.
-        freedom, level: of its test; where it is told from another cause, of a gain that decides.
+        freedom, level: of its test; where it is distinguished from another cause, of a gain that decides.
     """
 
     cause: str
@@ -81,7 +81,7 @@ class Wanted:
     def name(self) -> str:
         """The wanted effect in words."""
         shown = self.cause if self.cause.endswith(f":{self.effect}") else f"{self.cause} as {self.effect}"
-        return f"{shown} told from {self.apart_from}" if self.apart_from else f"power to reveal {shown}"
+        return f"{shown} distinguished from {self.apart_from}" if self.apart_from else f"power to reveal {shown}"
 
 
 def causes_by_runs(model: VesselModel) -> tuple[str, ...]:
@@ -168,7 +168,7 @@ def wanted(
     )
     return (
         *(several.revealed(place) for place, item in enumerate(hidden) if item.cause in reveal),
-        *(several.told(place, other) for pair in apart for one, other in (pair, pair[::-1])
+        *(several.distinguished(place, other) for pair in apart for one, other in (pair, pair[::-1])
           for place, item in enumerate(hidden) if item.cause == one),
     )  # fmt: skip
 
@@ -197,8 +197,8 @@ class _Several:
         least = needed_noncentrality(TUNING.wanted_power, freedom, level)
         return self._wanted(place, (), "", (least, freedom, level))
 
-    def told(self, place: int, other: str) -> Wanted:
-        """An effect told from the most similar one of another cause."""
+    def distinguished(self, place: int, other: str) -> Wanted:
+        """An effect distinguished from the most similar one of another cause."""
         precision = self.known.base.precision
         A = beside_nuisance(self.each.sum(axis=0), precision)
         own = self.rows[place] - len(precision)

@@ -53,7 +53,7 @@ class LoadPlan:
         design: time shares over pairs of its loads and all manoeuvres, loads first, with certificate and whole runs.
         repeats: (l, q) whole runs at each load of the step.
         std_before, std_after: (p,) standard deviations of the free parameters, infinite where nothing is known.
-        faintest: the combination that is told worst, relative standard deviation 1 / size.
+        faintest: the combination with the least information, relative standard deviation 1 / size.
     """
 
     question: Question
@@ -108,8 +108,8 @@ def choose_loads(
     design = solve_durations(problems.of(chosen.options))
     repeats = np.array(design.repeats).reshape(len(chosen.options), len(primitives))
     _check_runs(question, chosen, repeats, total_s)
-    told = question.prior + np.einsum("lq,lqij->ij", repeats, matrices[list(chosen.options)])
-    sizes, vectors = np.linalg.eigh(told)
+    information = question.prior + np.einsum("lq,lqij->ij", repeats, matrices[list(chosen.options)])
+    sizes, vectors = np.linalg.eigh(information)
     return LoadPlan(
         question=question,
         manoeuvres={item.name: item.duration_s for item in primitives},
@@ -118,7 +118,7 @@ def choose_loads(
         design=design,
         repeats=repeats,
         std_before=_std(question.prior) * question.size,
-        std_after=_std(told) * question.size,
+        std_after=_std(information) * question.size,
         faintest=direction(question.free, question.generic, vectors[:, 0], float(np.sqrt(max(sizes[0], 0.0)))),
     )
 

@@ -98,8 +98,8 @@ def _moments(ship: Vessel, primitive: Primitive, values: Array) -> Array:
     sailed = simulate(ship, commands, velocity=primitive.entry_velocity, standing=primitive.entry_inputs)
     assert sailed.auxiliary is not None
     rudder = rudder_angle(ship, commands, standing=primitive.entry_inputs)
-    told = sailed.auxiliary[:-1]
-    signals = np.column_stack([told[:, RATE], told[:, ANGLE], told[:, READING], -sailed.velocity[:-1, 2], -rudder])
+    roll = sailed.auxiliary[:-1, [RATE, ANGLE, READING]]
+    signals = np.column_stack([roll, -sailed.velocity[:-1, 2], -rudder])
     spectrum = np.fft.rfft(signals - signals.mean(axis=0), axis=0)[1:]
     frequency = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(signals), commands.sample_time_s)[1:], dtype=float)
     both = np.full(len(frequency), 2.0)  # positive and negative frequencies, but for the highest of an even number

@@ -31,7 +31,7 @@ class Change:
     whole: float = 0.0
     load: float = 0.0
 
-    def told(self, value: float, std: float | None = None) -> str:
+    def in_words(self, value: float, std: float | None = None) -> str:
         """A value in words, e.g. "+12 +- 3 %"."""
         divisor, name = self.unit
         spread = "" if std is None else f" ± {abs(std / divisor):.2g}"

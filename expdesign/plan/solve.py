@@ -64,9 +64,9 @@ def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: 
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
             one key helps, if one of those tried does.
     """
-    told = never_falling(progress)
+    reported = never_falling(progress)
     try:
-        return _in_water(problem, told, _planned) if drafted is None else _checked(problem, drafted, told)
+        return _in_water(problem, reported, _planned) if drafted is None else _checked(problem, drafted, reported)
     except NoPlan as error:
         progress("looking for what would help", 0.95)
         raise advised(replace(problem, area=error.within or (drafted or problem).area), error) from None

@@ -11,7 +11,7 @@ from expdesign.processes.sharing import (
     processors,
     shared_among,
 )
-from expdesign.processes.telling import told_together
+from expdesign.processes.telling import reported_together
 
 __all__ = [
     "ahead",
@@ -22,6 +22,6 @@ __all__ = [
     "local_processes",
     "on_cluster",
     "processors",
+    "reported_together",
     "shared_among",
-    "told_together",
 ]

@@ -66,7 +66,7 @@ class Together:
 
 
 @contextmanager
-def told_together(progress: Progress, count: int) -> Iterator[Together]:
+def reported_together(progress: Progress, count: int) -> Iterator[Together]:
     """Progress of so many tasks, begun in this order, of about the same length: told while this block lasts."""
     with TemporaryDirectory(prefix="expdesign-") as folder:
         tellers = tuple(Teller(Path(folder) / str(number)) for number in range(count))

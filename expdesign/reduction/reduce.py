@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.reduction.remarks import remarks
-from expdesign.reduction.sensors import Told, measured, shrinkage, turned, undone
+from expdesign.reduction.sensors import Stated, measured, shrinkage, turned, undone
 from expdesign.reduction.tuning import TUNING
 from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 from expdesign.signals import Batch, Delivered, Record
@@ -165,16 +165,16 @@ def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = Fal
     """The record with stated faults of sensors undone; arguments and errors as of `reduced`."""
     if not _faulty(sensors):
         return record
-    told = [Told(batch, sensors, smoothed) for batch in record.batches]
-    kept = [cut for item in told if (cut := _without_ends(item.batch, undone(item))) is not None]
+    stated = [Stated(batch, sensors, smoothed) for batch in record.batches]
+    kept = [cut for item in stated if (cut := _without_ends(item.batch, undone(item))) is not None]
     if not kept:
         raise InputError(
             f"no batch is longer than the delays of the vessel's sensors by {TUNING.shortest_batch} samples or more, "
             "expected such a batch"
         )
-    notes = list(dict.fromkeys(remark for item in told for remark in remarks(item)))
-    if len(kept) < len(told):
-        notes.append(f"{len(told) - len(kept)} batches too short for the delays of the sensors are left out.")
+    notes = list(dict.fromkeys(remark for item in stated for remark in remarks(item)))
+    if len(kept) < len(stated):
+        notes.append(f"{len(stated) - len(kept)} batches too short for the delays of the sensors are left out.")
     return replace(record, batches=tuple(kept), notes=(*record.notes, *notes))
 
 
@@ -189,7 +189,7 @@ def with_reduced_wind(record: Record, sensors: Sensors) -> Record:
 def _with_wind(batch: Batch, sensors: Sensors) -> Batch:
     if batch.wind is None or not _faulty(sensors):
         return batch
-    there = undone(Told(batch, sensors, smoothed=False))
+    there = undone(Stated(batch, sensors, smoothed=False))
     assert there.wind is not None  # as it was measured
     return replace(batch, wind=batch.velocity[:, :2] - (there.velocity[:, :2] - there.wind))
 

@@ -6,26 +6,26 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from expdesign.reduction.sensors import Told, measured, off_centre, prompt, shrinkage
+from expdesign.reduction.sensors import Stated, measured, off_centre, prompt, shrinkage
 from expdesign.values import Array
 from expdesign.vessel import Mounting
 
 STATED = "As the vessel file states, "
 
 
-def remarks(told: Told) -> Iterator[str]:
+def remarks(stated: Stated) -> Iterator[str]:
     """One sentence for each stated fault of a sensor in the data."""
-    sensors, signals = told.sensors, _signals(told)
+    sensors, signals = stated.sensors, _signals(stated)
     for name, (words, values) in signals.items():
         mounting: Mounting = getattr(sensors, name)
         if not prompt(mounting):
-            yield STATED + _timing(words, mounting, as_stated=told.readings(name, values)[1])
+            yield STATED + _timing(words, mounting, as_stated=stated.readings(name, values)[1])
         if off_centre(mounting) and name in PLACED:
-            yield from _moved(words, mounting, told)
+            yield from _moved(words, mounting, stated)
     if "heading" in signals and sensors.heading_bias_rad:
         yield f"{STATED}{sensors.heading_bias_rad:.4g} rad is taken off the headings."
     if "velocity" in signals and sensors.velocity_angle_rad:
-        yield from _along_axes(told)
+        yield from _along_axes(stated)
     if "yaw_rate" in signals and sensors.yaw_rate_scale != 1.0:
         yield f"{STATED}the yaw rate is divided by {sensors.yaw_rate_scale:.4g}."
     if "wind" in signals and (shrunk := shrinkage(sensors)) < 1.0:
@@ -37,9 +37,9 @@ WORDS = {"position": "positions", "heading": "headings", "velocity": "velocities
          "wind": "winds"}  # fmt: skip
 
 
-def _signals(told: Told) -> dict[str, tuple[str, Array]]:
+def _signals(stated: Stated) -> dict[str, tuple[str, Array]]:
     """Sensor -> its words and measured values (k, c), for the sensors that the data come from."""
-    batch = told.batch
+    batch = stated.batch
     values: dict[str, Array] = {}
     if batch.pose is not None:
         values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
@@ -63,19 +63,19 @@ def _timing(words: str, mounting: Mounting, *, as_stated: bool) -> str:
     return ", and ".join(filter(None, (late, held if mounting.interval_s else ""))) + "."
 
 
-def _moved(words: str, mounting: Mounting, told: Told) -> Iterator[str]:
+def _moved(words: str, mounting: Mounting, stated: Stated) -> Iterator[str]:
     """What is done about a place off the reference point."""
-    if words != WORDS["position"] and not measured(told.batch.velocity[:, 2]):
+    if words != WORDS["position"] and not measured(stated.batch.velocity[:, 2]):
         yield f"{words.capitalize()} are not moved from {_where(mounting)}, as that needs a yaw rate."
-    elif words == WORDS["position"] and told.batch.pose is not None and not measured(told.batch.pose[:, 2]):
+    elif words == WORDS["position"] and stated.batch.pose is not None and not measured(stated.batch.pose[:, 2]):
         yield f"{words.capitalize()} are not moved from {_where(mounting)}, as that needs a heading."
     else:
         yield f"{STATED}{words} are measured {_where(mounting)}; they are moved to amidships."
 
 
-def _along_axes(told: Told) -> Iterator[str]:
-    angle = told.sensors.velocity_angle_rad
-    if np.isfinite(told.batch.velocity[:, :2]).any(axis=0).all():
+def _along_axes(stated: Stated) -> Iterator[str]:
+    angle = stated.sensors.velocity_angle_rad
+    if np.isfinite(stated.batch.velocity[:, :2]).any(axis=0).all():
         yield f"{STATED}velocities are measured along axes {angle:.4g} rad to starboard; they are turned to the ship's."
     else:
         yield f"Velocities are not turned by {angle:.4g} rad to the ship's axes, as that needs surge and sway."

@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Stated:
     """A batch with what is stated of the sensors that measured it.
 
     Attributes:
@@ -52,14 +52,14 @@ class Told:
         return found.at(self.grid), found.shown(len(self.grid))
 
 
-def undone(told: Told) -> Batch:
+def undone(stated: Stated) -> Batch:
     """The batch of the reference point, of the same samples; nan where no reading shows a sample's own time."""
-    batch = told.batch
-    pose = None if batch.pose is None else _pose(told, batch.pose)
-    velocity, read = _velocity(told, pose)
-    wind = None if batch.wind is None else _wind(told, batch.wind, velocity, pose)
+    batch = stated.batch
+    pose = None if batch.pose is None else _pose(stated, batch.pose)
+    velocity, read = _velocity(stated, pose)
+    wind = None if batch.wind is None else _wind(stated, batch.wind, velocity, pose)
     interpolated = None if read.all() else 1.0 - read
-    vane_std = told.sensors.wind_angle_rad if told.sensors.wind_sensor == "vane" else 0.0
+    vane_std = stated.sensors.wind_angle_rad if stated.sensors.wind_sensor == "vane" else 0.0
     return replace(batch, pose=pose, velocity=velocity, wind=wind, interpolated=interpolated, vane_std_rad=vane_std)
 
 
@@ -83,25 +83,25 @@ def shrinkage(sensors: Sensors) -> float:
     return float(np.exp(-(sensors.wind_angle_rad**2) / 2.0)) if sensors.wind_sensor == "vane" else 1.0
 
 
-def _pose(told: Told, pose: Array) -> Array:
-    heading, _ = told.in_time("heading", pose[:, 2:])
-    position, _ = told.in_time("position", pose[:, :2])
-    psi, place = heading[:, 0] - told.sensors.heading_bias_rad, told.sensors.position
+def _pose(stated: Stated, pose: Array) -> Array:
+    heading, _ = stated.in_time("heading", pose[:, 2:])
+    position, _ = stated.in_time("position", pose[:, :2])
+    psi, place = heading[:, 0] - stated.sensors.heading_bias_rad, stated.sensors.position
     if off_centre(place):
         arm = np.broadcast_to((place.forward_m, place.starboard_m), position.shape)
         position = position - turned(arm, psi)
     return np.column_stack([position, psi])
 
 
-def _velocity(told: Told, pose: Array | None) -> tuple[Array, Array]:
+def _velocity(stated: Stated, pose: Array | None) -> tuple[Array, Array]:
     """(k, 3) velocities over ground, and (k, 3) one where they are read and zero where they are interpolated."""
-    batch, sensors = told.batch, told.sensors
-    derived = _derived(told, pose)
-    r, r_read = told.in_time("yaw_rate", batch.velocity[:, 2:])
+    batch, sensors = stated.batch, stated.sensors
+    derived = _derived(stated, pose)
+    r, r_read = stated.in_time("yaw_rate", batch.velocity[:, 2:])
     r = r / sensors.yaw_rate_scale
     if "r" in batch.derived:
         r, r_read = derived[:, 2:], np.ones(len(batch), dtype=bool)
-    uv, uv_read = told.in_time("velocity", batch.velocity[:, :2])
+    uv, uv_read = stated.in_time("velocity", batch.velocity[:, :2])
     if measured(uv[:, 0]) and measured(uv[:, 1]):
         uv = turned(uv, np.full(len(uv), sensors.velocity_angle_rad))
     uv = _at_centre(uv, sensors.velocity, r[:, 0])
@@ -113,17 +113,17 @@ def _velocity(told: Told, pose: Array | None) -> tuple[Array, Array]:
     return velocity, read
 
 
-def _derived(told: Told, pose: Array | None) -> Array:
+def _derived(stated: Stated, pose: Array | None) -> Array:
     """(k, 3) velocities of the batch, derived from the pose again where that has changed and any came from it."""
-    batch = told.batch
+    batch = stated.batch
     if not batch.derived or pose is None or np.array_equal(pose, batch.pose, equal_nan=True):  # type: ignore[arg-type]
         return batch.velocity
     seen = np.flatnonzero(np.isfinite(pose if "u" in batch.derived else pose[:, 2:]).all(axis=1))
     result = np.full_like(batch.velocity, np.nan)
     if len(seen) < 4:
         return result
-    part, noise = slice(int(seen[0]), int(seen[-1]) + 1), told.sensors.heading_rad
-    if told.smoothed:
+    part, noise = slice(int(seen[0]), int(seen[-1]) + 1), stated.sensors.heading_rad
+    if stated.smoothed:
         result[part] = smoothed_velocity(pose[part], batch.sample_time_s, heading_std_rad=noise or None)
     else:
         inside = slice(part.start + 1, part.stop - 1)
@@ -131,18 +131,18 @@ def _derived(told: Told, pose: Array | None) -> Array:
     return result
 
 
-def _wind(told: Told, wind: Array, velocity: Array, pose: Array | None) -> Array:
+def _wind(stated: Stated, wind: Array, velocity: Array, pose: Array | None) -> Array:
     """Relative wind; between readings the air's velocity over ground is interpolated, which turns less than the ship.
 
     Where no heading is measured, the relative wind is.
     """
-    place, wind = told.sensors.wind, wind / shrinkage(told.sensors)
+    place, wind = stated.sensors.wind, wind / shrinkage(stated.sensors)
     if prompt(place) or pose is None or not measured(pose[:, 2]):
-        return _at_centre(told.in_time("wind", wind)[0], place, velocity[:, 2])
-    found, _ = told.readings("wind", wind)
+        return _at_centre(stated.in_time("wind", wind)[0], place, velocity[:, 2])
+    found, _ = stated.readings("wind", wind)
     then = Readings(0.0, 1.0, np.column_stack([velocity, pose[:, 2]])).at(found.times)
     relative = _at_centre(found.values, place, then[:, 2])
-    air = Readings(found.first, found.interval, turned(then[:, :2] - relative, then[:, 3])).at(told.grid)
+    air = Readings(found.first, found.interval, turned(then[:, :2] - relative, then[:, 3])).at(stated.grid)
     return np.asarray(velocity[:, :2] - turned(air, -pose[:, 2]))
 
 

@@ -241,11 +241,10 @@ def _unanswered(problem: RollProblem, weighted: Sequence[Weighted], theta: Array
     hertz = np.array([roll_frequency(theta, problem.body, case.load) for case in problem.cases])
     if not (hertz > 0).all():
         return float("nan")
-    told = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
-    return chance_of_answers(
-        problem.cases, weighted, _noise(problem, weighted, theta), [rows[:, problem.places] for rows in told], sensed,
-        (1.0 / (hertz * problem.step_s)).tolist(),
-    )  # fmt: skip
+    jacobians = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
+    slopes = [rows[:, problem.places] for rows in jacobians]
+    periods = (1.0 / (hertz * problem.step_s)).tolist()
+    return chance_of_answers(problem.cases, weighted, _noise(problem, weighted, theta), slopes, sensed, periods)
 
 
 def _surprise(left: Array, fitted: int) -> float:
@@ -365,5 +364,6 @@ def _strength(
         jacobian = discrete(theta, problem.body, case.load, problem.step_s).jacobian[:, problem.places]
         noise += jacobian.T @ by @ jacobian
     size = np.outer(std[found], std[found])
-    told, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
-    return float(scipy.linalg.eigh(told, seeming + 1e-12 * np.trace(seeming) * np.eye(len(told)), eigvals_only=True)[0])
+    information, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
+    regular = seeming + 1e-12 * np.trace(seeming) * np.eye(len(seeming))
+    return float(scipy.linalg.eigh(information, regular, eigvals_only=True)[0])

@@ -12,16 +12,16 @@ def fitted_pendulum(estimate: RollEstimate) -> RollPendulum:
     Raises:
         InputError: the estimate is no pendulum, as its inertia is not positive.
     """
-    told = {name: std for name, std in estimate.std.items() if name in ROLL_PARAMETERS and std > 0}
+    stds = {name: std for name, std in estimate.std.items() if name in ROLL_PARAMETERS and std > 0}
     place = estimate.problem.free.index
     return RollPendulum(
         body=estimate.problem.body,
         parameters={name: estimate.values[name] for name in ROLL_PARAMETERS},
-        parameter_std=told,
+        parameter_std=stds,
         parameter_correlation={
-            (one, other): float(estimate.covariance[place(one), place(other)] / (told[one] * told[other]))
-            for one in told
-            for other in told
+            (one, other): float(estimate.covariance[place(one), place(other)] / (stds[one] * stds[other]))
+            for one in stds
+            for other in stds
             if place(other) < place(one)
         },
     )

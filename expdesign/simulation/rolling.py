@@ -38,23 +38,24 @@ def rolled(
     mode, pendulum = vessel.model.roll, vessel.pendulum
     if pendulum is None and (mode is None or not mode.heel_rad_per_mps2):
         return None
-    told: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     first, last = _at_ends(vessel, commands, standing)
     first = np.concatenate([first, last[-1:]])
     flow = np.broadcast_to(sea, (len(commands), 4))
     sway = _sway(vessel, states, first, np.concatenate([flow, flow[-1:]]))
-    told["sway_acceleration_mps2"] = sway
-    told["lateral_acceleration_mps2"] = side = sway + states[:, 3] * states[:, 5]
+    columns["sway_acceleration_mps2"] = sway
+    columns["lateral_acceleration_mps2"] = side = sway + states[:, 3] * states[:, 5]
     if mode is not None:
-        told["roll_rad"], told["roll_rate_radps"] = mode.heel_rad_per_mps2 * states[:, STATES:].T
+        columns["roll_rad"], columns["roll_rate_radps"] = mode.heel_rad_per_mps2 * states[:, STATES:].T
     if pendulum is not None:
         end_side = _sway(vessel, states[1:], last, flow) + states[1:, 3] * states[1:, 5]
         begin = pendulum.acceleration(0.0, 0.0, side, states[:, 5], _mean_angle(commands.names, first))
         end = pendulum.acceleration(0.0, 0.0, end_side, states[1:, 5], _mean_angle(commands.names, last))
-        told["roll_rad"], told["roll_rate_radps"] = roll, rate = _followed(pendulum, begin, end, commands.sample_time_s)
+        roll, rate = _followed(pendulum, begin, end, commands.sample_time_s)
+        columns["roll_rad"], columns["roll_rate_radps"] = roll, rate
         spin = begin + pendulum.acceleration(roll, rate, 0.0, 0.0, 0.0)
-        told["imu_lateral_mps2"] = -pendulum.reading(roll, spin, side)
-    return np.column_stack([told.get(name, np.full(len(states), np.nan)) for name in AUXILIARY])
+        columns["imu_lateral_mps2"] = -pendulum.reading(roll, spin, side)
+    return np.column_stack([columns.get(name, np.full(len(states), np.nan)) for name in AUXILIARY])
 
 
 def in_waves(vessel: Vessel, sailed: Trajectory, rng: np.random.Generator) -> Trajectory:

@@ -187,9 +187,9 @@ def _auxiliary(sensors: Sensors, trajectory: Trajectory, count: int, rng: np.ran
     if trajectory.auxiliary is None:
         return {}
     given = np.isfinite(trajectory.auxiliary[0])
-    told, noise = trajectory.auxiliary[:count, given], _auxiliary_std(sensors)[given]
-    told = told + noise * rng.standard_normal(told.shape)
-    return dict(zip(np.array(AUXILIARY)[given].tolist(), told.T, strict=True))
+    values, noise = trajectory.auxiliary[:count, given], _auxiliary_std(sensors)[given]
+    values = values + noise * rng.standard_normal(values.shape)
+    return dict(zip(np.array(AUXILIARY)[given].tolist(), values.T, strict=True))
 
 
 def _auxiliary_std(sensors: Sensors) -> Array:

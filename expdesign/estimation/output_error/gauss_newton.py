@@ -23,11 +23,11 @@ def _cost(problem: Problem, values: Array, residuals: Array) -> float:
 
 
 Step = Callable[[float], None]
-"""Is told, at each step of Gauss and Newton, its expected decrease over the one that ends the search."""
+"""Called at each step of Gauss and Newton, with its expected decrease over the one that ends the search."""
 
 
 def minimised(
-    problem: Problem, values: Array, starts: Array, *, settled: float, told: Step = lambda excess: None
+    problem: Problem, values: Array, starts: Array, *, settled: float, report: Step = lambda excess: None
 ) -> tuple[Array, Array]:
     """Values and starts (W, n) of least cost.
 
@@ -35,7 +35,7 @@ def minimised(
         problem: to be solved.
         values, starts: to begin with.
         settled: expected decrease of the cost that ends the search, in squared standard deviations of the estimate.
-        told: of every step.
+        report: called at every step.
 
     Raises:
         NoAnswer: the model to begin with diverges, or its derivatives do.
@@ -51,7 +51,7 @@ def minimised(
             newer = None
             while newer is None:
                 move = _step(normal, damping)
-                told(move.expected / least)
+                report(move.expected / least)
                 if move.expected < least or damping > TUNING.most_damping:
                     return point.values, point.starts
                 newer = _lower(problem, point, move, before)

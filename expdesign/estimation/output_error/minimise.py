@@ -83,7 +83,7 @@ def minimise_output_error(
         steps.begin()
         starts = first_states(problem, found)
         problem = _weighed(problem, values, starts)
-        values, starts = minimised(problem, values, starts, settled=stage.settled, told=steps.told)
+        values, starts = minimised(problem, values, starts, settled=stage.settled, report=steps.report)
         found = dict(zip(problem.places, starts, strict=True))
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
     steps.end()

@@ -2,6 +2,6 @@
 
 from expdesign.export.diagnosis_page.page import diagnosis_html
 from expdesign.export.diagnosis_page.results import diagnosis_json, diagnosis_tables, extended_vessel
-from expdesign.export.diagnosis_page.roll import RollTold, roll_sentences
+from expdesign.export.diagnosis_page.roll import RollVerdict, roll_sentences
 
-__all__ = ["RollTold", "diagnosis_html", "diagnosis_json", "diagnosis_tables", "extended_vessel", "roll_sentences"]
+__all__ = ["RollVerdict", "diagnosis_html", "diagnosis_json", "diagnosis_tables", "extended_vessel", "roll_sentences"]

@@ -27,7 +27,7 @@ from expdesign.export.diagnosis_page.figures import (
     suspect_figure,
     window_figure,
 )
-from expdesign.export.diagnosis_page.roll import RollTold, roll_sentences
+from expdesign.export.diagnosis_page.roll import RollVerdict, roll_sentences
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import cause_title, estimate_words
 from expdesign.export.files import plus_minus
@@ -40,7 +40,7 @@ NO_NUMBER = "\N{EN DASH}"
 
 
 def diagnosis_html(
-    found: Diagnosis, *, command: str, version: str, roll: RollTold | None = None, progress: Progress = silent
+    found: Diagnosis, *, command: str, version: str, roll: RollVerdict | None = None, progress: Progress = silent
 ) -> str:
     """One HTML page without any outside reference."""
     figures = _figures(found, progress)

@@ -8,7 +8,7 @@ from typing import Any
 
 from expdesign.diagnosis import Accuracy, Diagnosis, Finding, Unexplained
 from expdesign.diagnosis.accuracy import Residuals, dependence
-from expdesign.export.diagnosis_page.roll import RollTold, roll_entry, roll_sentences, with_roll
+from expdesign.export.diagnosis_page.roll import RollVerdict, roll_entry, roll_sentences, with_roll
 from expdesign.export.files import plus_minus, strict_json, vessel_toml
 from expdesign.values import Array
 
@@ -16,7 +16,7 @@ SMALL = 1e-99
 """p-values below are printed as this bound: they are beyond floating-point accuracy."""
 
 
-def diagnosis_json(found: Diagnosis, roll: RollTold | None = None) -> str:
+def diagnosis_json(found: Diagnosis, roll: RollVerdict | None = None) -> str:
     """The whole diagnosis, with that of roll; numbers that are not finite are null."""
     return strict_json(
         {
@@ -108,7 +108,7 @@ def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str,
     return ("cause", "estimate", "p", "gain of fit [points]", "not distinguishable from"), rows
 
 
-def extended_vessel(found: Diagnosis, *, command: str, roll: RollTold | None = None) -> str:
+def extended_vessel(found: Diagnosis, *, command: str, roll: RollVerdict | None = None) -> str:
     """The vessel file with all findings."""
     comments = [f"Extended by a diagnosis: {found.verdict}", *(item.explanation for item in found.findings)]
     comments += roll_sentences(roll)

@@ -17,7 +17,7 @@ UNCHANGED = "She rolls as her file says"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RollTold:
+class RollVerdict:
     """The judgement of the roll of a vessel file.
 
     Attributes:
@@ -29,13 +29,13 @@ class RollTold:
     reason: str = ""
 
 
-def roll_sentences(told: RollTold | None) -> tuple[str, ...]:
+def roll_sentences(roll: RollVerdict | None) -> tuple[str, ...]:
     """The verdict; nothing for a vessel file without [roll]."""
-    if told is None:
+    if roll is None:
         return ()
-    if told.judgement is None:
-        return (f"Roll, [roll] of the vessel file, was not judged: {told.reason}.",)
-    return tuple(_sentences(told.judgement))
+    if roll.judgement is None:
+        return (f"Roll, [roll] of the vessel file, was not judged: {roll.reason}.",)
+    return tuple(_sentences(roll.judgement))
 
 
 def _sentences(found: RollJudgement) -> Iterator[str]:
@@ -81,12 +81,12 @@ def _stability(found: RollJudgement, change: RollChange) -> str:
     return stability_words(before.righting_nm, change.righting_nm, mass_kg=mass_kg, load=change.load)
 
 
-def roll_entry(told: RollTold | None) -> dict[str, Any]:
+def roll_entry(roll: RollVerdict | None) -> dict[str, Any]:
     """The entry of roll in diagnosis.json; nothing for a vessel file without [roll]."""
-    if told is None:
+    if roll is None:
         return {}
-    entry: dict[str, Any] = {"verdict": list(roll_sentences(told))}
-    found = told.judgement
+    entry: dict[str, Any] = {"verdict": list(roll_sentences(roll))}
+    found = roll.judgement
     if found is not None:
         entry |= {
             "p_value": found.p_value,
@@ -111,9 +111,9 @@ def _change(one: RollChange) -> dict[str, Any]:
     }
 
 
-def with_roll(ship: Vessel, told: RollTold | None) -> Vessel:
+def with_roll(ship: Vessel, roll: RollVerdict | None) -> Vessel:
     """The vessel with the change of roll, where a single explanation is left and a file can hold it."""
-    changes = () if told is None or told.judgement is None else told.judgement.changes
+    changes = () if roll is None or roll.judgement is None else roll.judgement.changes
     if len(changes) != 1 or changes[0].pendulum is None:
         return ship
     return replace(ship, pendulum=changes[0].pendulum)

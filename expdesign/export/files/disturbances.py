@@ -33,7 +33,7 @@ def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
     """One entry for each disturbance that a method tells; empty where it tells none."""
     found = item.disturbances
     steady = item.method.estimates_steady_current
-    entries = [_moments_entry(own, steady=steady) for own in _told(item)]
+    entries = [_moments_entry(own, steady=steady) for own in _moments_of(item)]
     return [*entries, *([] if found.wind is None else [_wind_entry(found.wind)])]
 
 
@@ -41,7 +41,7 @@ def disturbance_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[st
     """Header and rows: one for each disturbance that a method tells."""
     rows = []
     for item in found.methods:
-        for own in _told(item):
+        for own in _moments_of(item):
             std = own.covariance.diagonal() ** 0.5
             cells = [_pair(part, std[2 * n : 2 * n + 2]) for n, part in enumerate((own.mean, own.second, own.central))]
             rows.append((item.method.name, _short(own), *cells))
@@ -75,21 +75,21 @@ def _short(own: Moments) -> str:
     return "water" if own.of == "current" else f"water and air, as {own.shares[0][1]} feels them"
 
 
-def _told(item: Assessed) -> tuple[Moments, ...]:
+def _moments_of(item: Assessed) -> tuple[Moments, ...]:
     found = item.disturbances
-    return (*(() if found.current is None else (found.current,)), *found.felt)
+    return (*(() if found.current is None else (found.current,)), *found.combined)
 
 
 def _moments_entry(own: Moments, *, steady: bool) -> dict[str, Any]:
     std = own.covariance.diagonal() ** 0.5
-    told = bool(np.isfinite(own.second).all())
+    seen = bool(np.isfinite(own.second).all())
     return {
         "of": "current" if own.of == "current" else f"current and wind in d{own.of}/dt",
         "meaning": meaning(own),
         "mean_mps": _named(DIRECTIONS, own.mean, std[:2]),
-        "second_moments_m2ps2": _named(SECOND, own.second, std[2:4]) if told else None,
-        "covariance_m2ps2": _named(CENTRAL, own.central, std[4:]) if told else None,
-        "not_told": UNSEEN if told else (CONSTANT if steady else TOGETHER),
+        "second_moments_m2ps2": _named(SECOND, own.second, std[2:4]) if seen else None,
+        "covariance_m2ps2": _named(CENTRAL, own.central, std[4:]) if seen else None,
+        "not_told": UNSEEN if seen else (CONSTANT if steady else TOGETHER),
     }
 
 

@@ -15,11 +15,11 @@ from expdesign.values import Array
 ALIKE = 0.95
 """Correlation of scores from which two changes count as not distinguishable."""
 CLEAR, LARGE = 4.0, 0.5
-"""Standard errors and sizes by which the ship of the reference differs from its file, that are told."""
+"""Standard errors and sizes by which the ship of the reference differs from its file, from which a sentence says so."""
 SHOWN_CALLS = 5
-"""Port calls that are told, the latest."""
+"""Largest number of port calls that are listed, the latest."""
 CLEAR_LOAD = 2.0
-"""Standard errors from which a change of the load is told."""
+"""Standard errors from which a change of the load is reported."""
 MUCH_LEFT_OUT = 0.05
 HOUR = 3600.0
 
@@ -94,10 +94,10 @@ def hours(time_s: float) -> str:
     return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
 
 
-def told(content: MonitorContent, alarm: Alarm) -> str:
+def size_in_words(content: MonitorContent, alarm: Alarm) -> str:
     """The size of a change in words."""
     change = content.changes[alarm.change]
-    return change.told(alarm.value * change.size, alarm.std * change.size)
+    return change.in_words(alarm.value * change.size, alarm.std * change.size)
 
 
 def sentences(content: MonitorContent) -> tuple[str, ...]:
@@ -144,7 +144,7 @@ def _call(content: MonitorContent, call: Call) -> str:
     if not clear.any():
         return text + "The ship carries the same load afterwards, as far as the data tell."
     parts = [
-        f"{change.words} {change.told(value * change.size, std * change.size)}"
+        f"{change.words} {change.in_words(value * change.size, std * change.size)}"
         for change, value, std, known in zip(content.changes, call.value, call.std, clear, strict=True)
         if known
     ]
@@ -154,8 +154,8 @@ def _call(content: MonitorContent, call: Call) -> str:
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     text = (
-        f"Since {hours(alarm.since_s)} the ship is another: {change.words} by {told(content, alarm)}. The alarm came "
-        f"at {hours(alarm.time_s)}, with the statistic {alarm.statistic:.1f}."
+        f"Since {hours(alarm.since_s)} the ship is another: {change.words} by {size_in_words(content, alarm)}. "
+        f"The alarm came at {hours(alarm.time_s)}, with the statistic {alarm.statistic:.1f}."
     )
     if alarm.as_likely:
         others = ", ".join(content.changes[number].words for number in alarm.as_likely)
@@ -173,12 +173,12 @@ def _baseline(content: MonitorContent) -> Iterator[str]:
     off = [(i, content.changes[i]) for i in np.flatnonzero(clear).tolist()]
     if off:
         sizes = [(change, c.baseline[i] * change.size, c.baseline_std[i] * change.size) for i, change in off]
-        parts = ", ".join(f"{change.words} {change.told(value, std)}" for change, value, std in sizes)
+        parts = ", ".join(f"{change.words} {change.in_words(value, std)}" for change, value, std in sizes)
         yield f"Already in the reference the ship differs from its file: {parts}. Changes are counted from there."
 
 
 def alike(content: MonitorContent, number: int) -> list[str]:
-    """Changes that this one cannot be told apart from."""
+    """Changes that this one cannot be distinguished from."""
     row = np.abs(content.calibration.alike[number])
     watched = content.calibration.watched
     return [
@@ -205,11 +205,11 @@ def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
         watched = bool(content.calibration.watched[number])
         since = "\N{EN DASH}"
         if last is not None and np.isfinite(last.std[number]) and last.std[number] < 1e3:
-            since = change.told(last.value[number] * change.size, last.std[number] * change.size)
+            since = change.in_words(last.value[number] * change.size, last.std[number] * change.size)
         rows.append(
             (
                 change.words,
-                change.told(change.size).lstrip("+-"),
+                change.in_words(change.size).lstrip("+-"),
                 hours(delay_s(content, number)) if watched else "not watched: the reference tells too little",
                 since,
                 ", ".join(alike(content, number)) if watched else "",
@@ -278,7 +278,7 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "effect": change.effect,
         "value": alarm.value * change.size,
         "std": alarm.std * change.size,
-        "in_words": f"{change.words} by {told(content, alarm)}",
+        "in_words": f"{change.words} by {size_in_words(content, alarm)}",
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
         "settled": alarm.settled,
     }

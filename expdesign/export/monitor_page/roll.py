@@ -51,13 +51,13 @@ def roll_entry(watch: RollWatch | None, *, false_alarm_days: float) -> dict[str,
     """The entry of roll in monitor.json; nothing for a vessel file without [roll]."""
     if watch is None:
         return {}
-    told = {
+    entry = {
         "verdict": list(roll_sentences(watch, false_alarm_days=false_alarm_days)),
         "judged_h": watch.judged_s / HOUR,
         "not_judged_h": watch.left_out_s / HOUR,
         "changes": [_entry(event) for event in watch.events],
     }
-    return {"roll": told}
+    return {"roll": entry}
 
 
 def _entry(event: RollEvent) -> dict[str, Any]:

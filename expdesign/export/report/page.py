@@ -25,11 +25,11 @@ from expdesign.export.report.glossary import GLOSSARY
 from expdesign.export.report.growth import growth_rows, growth_sentences
 from expdesign.export.report.parameters import (
     Expected,
+    accuracy_table,
     equation_sentence,
     expected,
     measures_velocity,
     parameter_rows,
-    told_table,
     unknown_current_sentence,
 )
 from expdesign.export.report.procedure import day_sentence, procedure_sentences
@@ -91,7 +91,7 @@ def report_html(content: ReportContent) -> str:
         procedure=procedure_sentences(content.plan),
         day_rows=[] if content.day is None else tables.day_rows(content, content.day),
         day_sentences=[] if content.day is None else tables.day_sentences(content.day),
-        told=((), []) if content.day is None else told_table(content.day),
+        told=((), []) if content.day is None else accuracy_table(content.day),
         growth=[] if content.growth is None else growth_rows(content.growth),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,

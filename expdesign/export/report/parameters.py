@@ -56,7 +56,7 @@ def _std(value: float) -> str:
     return "not estimable" if np.isnan(value) else _small(value)
 
 
-def told_table(day: ShortestDay) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def accuracy_table(day: ShortestDay) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """How well each parameter and outcome is told by every day planned, the shortest first: header and rows."""
     days = sorted((item for item in enumerate(day.tried, start=1) if item[1].told), key=lambda item: item[1].day_s)
     names = list(dict.fromkeys(name for _, item in days for name in item.told))

@@ -35,7 +35,7 @@ class RollContent:
 
     Attributes:
         estimate: the parameters.
-        report: what is not told apart.
+        report: the combinations that the data do not determine.
         filter: that the data passed.
         notes: on the data.
         command, version: to reproduce it.
@@ -185,7 +185,7 @@ def roll_json(content: RollContent) -> str:
                 "rank": report.rank,
                 "singular_values": report.singular_values.tolist(),
                 "open": [one.change for one in report.open],
-                "faint": [_told(one) for one in report.faint],
+                "faint": [_direction_entry(one) for one in report.faint],
                 "cures": [vars(one) for one in report.cures],
             },
             "filter": {
@@ -213,18 +213,18 @@ def _scaled(content: RollContent) -> dict[str, object]:
     std = np.array([estimate.std.get(name, 0.0) for name in PARAMETERS])
     values, stds = froude_scaled(estimate.theta, scale).tolist(), froude_scaled(std, scale).tolist()
     rows = zip(PARAMETERS, values, stds, strict=True)
-    told = {
+    entries = {
         name: {"value": value, "std": deviation or None, "determined": _determined(content, name)}
         for name, value, deviation in rows
     }
-    return {"scale": scale, **told}
+    return {"scale": scale, **entries}
 
 
 def _determined(content: RollContent, name: str) -> bool:
     return name in content.estimate.problem.free and name not in content.report.undetermined
 
 
-def _told(one: Direction) -> dict[str, object]:
+def _direction_entry(one: Direction) -> dict[str, object]:
     return {"change": one.change, "relative_std": 1.0 / one.size}
 
 

@@ -13,11 +13,11 @@ from expdesign.export.step_trial_page.content import (
 from expdesign.export.step_trial_page.live import (
     TO_DO_HEADER,
     LiveContent,
+    event_line,
     live_json,
     live_sentences,
     to_do_csv,
     to_do_table,
-    told,
 )
 from expdesign.export.step_trial_page.page import step_trial_html
 
@@ -27,6 +27,7 @@ __all__ = [
     "LiveContent",
     "StepTrialContent",
     "Validated",
+    "event_line",
     "live_json",
     "live_sentences",
     "nominal_rows",
@@ -37,5 +38,4 @@ __all__ = [
     "to_do_csv",
     "to_do_table",
     "to_repeat",
-    "told",
 ]

@@ -131,12 +131,12 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
 
 
 def _compared(content: StepTrialContent) -> Iterator[str]:
-    told = [one for one in content.trial.found if one.p_value < TUNING.significant]
-    for one in told:
+    significant = [one for one in content.trial.found if one.p_value < TUNING.significant]
+    for one in significant:
         size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
-    if content.trial.found and not told:
+    if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})
         yield f"No sign of {' or '.join(kinds)} at the level of {TUNING.significant:g}."
 

@@ -34,12 +34,12 @@ class LiveContent:
     version: str
 
 
-def told(event: Event, steps: StepList) -> str:
+def event_line(event: Event, steps: StepList) -> str:
     """One line about an event."""
-    return f"{event.time_s:8.1f} s  {_told(event, steps)}{_following(event, steps)}"
+    return f"{event.time_s:8.1f} s  {_event_words(event, steps)}{_following(event, steps)}"
 
 
-def _told(event: Event, steps: StepList) -> str:
+def _event_words(event: Event, steps: StepList) -> str:
     step = f"step {event.step.number}" if event.step is not None else "this hold"
     commands = inputs_text(event.inputs, steps) if event.inputs else ""
     at = "" if event.state is None else f"U {event.state[0]:.2f} m/s, r {event.state[1]:.3f} rad/s"

@@ -37,14 +37,14 @@ def day_figure(content: WhatIfContent) -> str | None:
         return None
     figure = new_figure(6.4, 3.6)
     axes = figure.subplots()
-    for (case, told), colour in zip(known, LINES * 9, strict=False):
+    for (case, share), colour in zip(known, LINES * 9, strict=False):
         planned, median, most = (float(str(case.plan[key])) / 60 for key in DAY)
-        axes.plot([planned, most], [told, told], "-", color=colour, linewidth=1.2)
-        axes.plot(median, told, "|", color=colour, markersize=9)
-        axes.plot(planned, told, "o", color=colour, label=plain(case.name))
+        axes.plot([planned, most], [share, share], "-", color=colour, linewidth=1.2)
+        axes.plot(median, share, "|", color=colour, markersize=9)
+        axes.plot(planned, share, "o", color=colour, label=plain(case.name))
     axes.set_xlabel("day [min]")
     axes.set_ylabel("information / that of the scenario")
-    axes.set_ylim(0.0, 1.08 * max(told for _, told in known))
+    axes.set_ylim(0.0, 1.08 * max(share for _, share in known))
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes)
     return svg(figure, key="days", label="Length of the day against what its whole track tells, for each case")

@@ -97,9 +97,9 @@ def estimate_yaw_by_instruments(
     low, high = signs(model)
     halves, last = split(data, smoothing_s=smoothing_s), np.full(x.shape, np.inf)
     for _ in range(STEPS):
-        told = [simulate_yaw(model, half, (x * scale)[owner]) for half in halves]
-        errors = [half.r - rates for half, (rates, _) in zip(halves, told, strict=True)]
-        Z, other = (slopes * scale for _, slopes in told)
+        simulated = [simulate_yaw(model, half, (x * scale)[owner]) for half in halves]
+        errors = [half.r - rates for half, (rates, _) in zip(halves, simulated, strict=True)]
+        Z, other = (slopes * scale for _, slopes in simulated)
         across = np.swapaxes(other, 1, 2) @ Z
         G = np.einsum("gn,nij->gij", pool, across + np.swapaxes(across, 1, 2))
         moments = other * errors[0][..., None] + Z * errors[1][..., None]

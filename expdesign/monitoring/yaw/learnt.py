@@ -58,7 +58,7 @@ def learnt_ship(
         f"The yaw model {model.name}, learnt by output error from {minutes:.0f} min of the reference, simulates the "
         f"yaw rate with a fit of {whole.fit[0]:.1f} %: {_listed(whole)}.",
         _crossed_in_words(crossed),
-        _told_in_words(model, data, whole),
+        _determined_in_words(model, data, whole),
         halves_in_words(halves),
     )
     return YawShip(model=model, vessel=vessel, parameters=values), notes
@@ -80,28 +80,28 @@ def _listed(found: YawEstimate) -> str:
 
 def _crossed_in_words(found: YawEstimate) -> str:
     if not np.isfinite(found.parameters).all():
-        return "By instruments, too little is told of it: the estimate does not settle."
+        return "By instruments, too little is determined of it: the estimate does not settle."
     return (
         f"By instruments, which noise of the inputs does not bias if it is independent from sample to sample: "
         f"{_listed(found)}."
     )
 
 
-def _told_in_words(model: YawModel, data: YawData, found: YawEstimate) -> str:
-    """Rank test: combinations of parameters that are told better than to their own size."""
+def _determined_in_words(model: YawModel, data: YawData, found: YawEstimate) -> str:
+    """Rank test: combinations of parameters that are determined better than to their own size."""
     values = found.parameters[0]
     rates, slopes = simulate_yaw(model, data, values)
     columns = (slopes * np.abs(values)).reshape(-1, len(values))
     noise = float(np.sqrt(((data.r - rates) ** 2).mean()))
     _, size, directions = np.linalg.svd(columns / max(noise, 1e-12), full_matrices=False)
-    told = size > 1.0
-    if told.all():
+    determined = size > 1.0
+    if determined.all():
         return f"The reference tells all {len(values)} parameters apart, each combination better than to its own size."
-    weak = np.abs(directions[~told]).max(axis=0) > MAIN
+    weak = np.abs(directions[~determined]).max(axis=0) > MAIN
     names = ", ".join(name for name, here in zip(model.parameters, weak, strict=True) if here)
     return (
-        f"The reference tells {int(told.sum())} of {len(values)} combinations of the parameters better than to their "
-        f"own size; it does not tell {names} apart."
+        f"The reference tells {int(determined.sum())} of {len(values)} combinations of the parameters better than to "
+        f"their own size; it does not tell {names} apart."
     )
 
 

@@ -65,8 +65,8 @@ def _delivered(batch: Batch, given: Array, ship: Vessel | None) -> Array:
     for signal, response in zip(ship.model.inputs, ship.responses, strict=True):
         if signal in batch.input_names and response != IDEAL:
             column = batch.input_names.index(signal)
-            told = inputs[:, [column]]
-            inputs[:, column] = delivered_at_samples([response], told, sample_time_s=batch.sample_time_s)[:-1, 0]
+            commanded = inputs[:, [column]]
+            inputs[:, column] = delivered_at_samples([response], commanded, sample_time_s=batch.sample_time_s)[:-1, 0]
     return inputs
 
 

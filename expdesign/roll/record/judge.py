@@ -8,7 +8,7 @@ with that of its parameters. Their difference has the sum V of both as covarianc
 has Hotelling's distribution with 5 numbers and as many degrees of freedom as the power of the noise has at a frequency:
 waves are narrow, so that V is no better known than their power. A cause explains it when the rest, after the best size
 of the cause, is within chance. The weight's share of the righting moment is no part of the stiffness in this equation,
-as the accelerometer feels gravity too: hull and load are told apart.
+as the accelerometer feels gravity too: hull and load can be distinguished.
 
 Source: doctoral thesis on grey-box identification of ship roll with few sensors, (5.17)-(5.24), for the equation; L. P.
 Hansen, Econometrica 50 (1982), 1029-1054, for the test; H. Hotelling, Annals of Mathematical Statistics 2 (1931),
@@ -34,11 +34,11 @@ from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.masses import G_MPS2, Load
 
 ALARM_P = 0.01
-"""Chance of a change that is told where there is none."""
+"""Chance that a change is reported where there is none."""
 ENOUGH_P = 0.01
 """Of a rest beyond it where the cause is right."""
 ALIKE = 6.0
-"""Difference of sums of squares up to which two explanations are not told apart."""
+"""Difference of sums of squares up to which two explanations cannot be distinguished."""
 MOST_CAUSES = 2
 LOAD = "load"
 CAUSES = {
@@ -110,7 +110,7 @@ def judge_roll(
         pendulum: of the vessel file, with the load that was on board.
         runs: at one load; those that are too short are left out, if others are not.
         beam_m: of the ship.
-        alarm_p: chance of a change that is told where there is none.
+        alarm_p: chance that a change is reported where there is none.
 
     Raises:
         InputError, NotInformative: the record tells nothing that may be believed, and why.
@@ -261,13 +261,13 @@ def _pendulum(
         else:
             size, stds[cause] = next(numbers)
             values[cause] += size
-    told = None if added is None else (added[0], -added[1])
+    mass_and_height = None if added is None else (added[0], -added[1])
     try:
         pairs = {pair: value for pair, value in pendulum.parameter_correlation.items() if not set(pair) & set(causes)}
         changed = replace(pendulum, parameters=values, parameter_std=stds, parameter_correlation=pairs)
-        return (changed if added is None else replace(changed, load=_together(pendulum.load, *added))), told
+        return (changed if added is None else replace(changed, load=_together(pendulum.load, *added))), mass_and_height
     except InputError:
-        return None, told
+        return None, mass_and_height
 
 
 def _together(load: Load, mass_kg: float, z_m: float) -> Load:

@@ -19,7 +19,7 @@ from expdesign.step_trials.steady_holds import LEAST_MEMORY_SAMPLES, given_up, u
 from expdesign.step_trials.steady_state import STEADY, advanced, begun, calibrated, stepped
 from expdesign.step_trials.tuning import TUNING
 
-Told = tuple[State, tuple[Event, ...]]
+StateAndEvents = tuple[State, tuple[Event, ...]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ def beginning(setup: Setup) -> State:
     return State(left=setup.steps.steps)
 
 
-def after_row(state: State, row: Row, setup: Setup) -> Told:
+def after_row(state: State, row: Row, setup: Setup) -> StateAndEvents:
     """State after one more row, and what it gives to tell."""
     if not state.left:
         return state, ()
@@ -64,14 +64,14 @@ def after_row(state: State, row: Row, setup: Setup) -> Told:
     return state, (*events, *more, *steady)
 
 
-def _learning(state: State, row: Row, setup: Setup) -> Told:
+def _learning(state: State, row: Row, setup: Setup) -> StateAndEvents:
     """Rows of the first commands until there are enough for the thresholds."""
     held, steps = state.held, setup.steps
     there = steps.same(row.inputs, steps.start)
     if held is None or not there or not steps.same(held.rows[-1].inputs, steps.start) or _gap_s(held, row):
-        told = Event(time_s=row.time_s, kind=values.UNLISTED, inputs=row.inputs, following=(steps.start, None))
+        event = Event(time_s=row.time_s, kind=values.UNLISTED, inputs=row.inputs, following=(steps.start, None))
         new = held is None or steps.same(held.rows[-1].inputs, steps.start)
-        return replace(state, held=Held(rows=(row,))), (told,) if new and not there else ()
+        return replace(state, held=Held(rows=(row,))), (event,) if new and not there else ()
     held = replace(held, rows=(*held.rows, row))
     state = replace(state, held=held)
     return _calibrated(state, held, setup) if held.elapsed_s >= setup.learn_s else (state, ())
@@ -84,7 +84,7 @@ def _gap_s(held: Held, row: Row) -> float:
     return step_s if step_s > TUNING.gap_sample_times * usual_s else 0.0
 
 
-def _calibrated(state: State, held: Held, setup: Setup) -> Told:
+def _calibrated(state: State, held: Held, setup: Setup) -> StateAndEvents:
     step_s = held.elapsed_s / (len(held.rows) - 1)
     settling = int(len(held.rows) * TUNING.settling_share)
     speed = _states(held.rows[settling:])
@@ -128,7 +128,7 @@ def _watching(state: State, sample: np.ndarray) -> State:
     return replace(state, watched=watched)
 
 
-def _with_row(state: State, held: Held, row: Row, setup: Setup) -> Told:
+def _with_row(state: State, held: Held, row: Row, setup: Setup) -> StateAndEvents:
     """Take a row; a new hold begins where the commands change."""
     assert state.tests is not None
     events: tuple[Event, ...] = ()
@@ -156,7 +156,7 @@ def _again(state: State, row: Row) -> State:
     return replace(state, watched=tuple(begun(test, value) for test, value in zip(state.tests, first, strict=True)))
 
 
-def _ended(state: State, held: Held, row: Row, setup: Setup) -> Told:
+def _ended(state: State, held: Held, row: Row, setup: Setup) -> StateAndEvents:
     """Take the last row of a hold; one that was left too early is judged by the rows it has."""
     assert held.inputs is not None
     events: tuple[Event, ...] = ()
@@ -168,7 +168,7 @@ def _ended(state: State, held: Held, row: Row, setup: Setup) -> Told:
     return replace(state, before=None if steady is None else (held.inputs, steady)), events
 
 
-def _settled(state: State, setup: Setup) -> Told:
+def _settled(state: State, setup: Setup) -> StateAndEvents:
     """Commands that have stood for long enough, and the step that they are."""
     held, steps = state.held, setup.steps
     assert held is not None
@@ -192,7 +192,7 @@ def _settled(state: State, setup: Setup) -> Told:
     return state, (Event(time_s=now.time_s, kind=kind, step=step, inputs=inputs, following=following),)
 
 
-def _judged(state: State, setup: Setup) -> Told:
+def _judged(state: State, setup: Setup) -> StateAndEvents:
     """What follows from the tests: steady, over, or never steady."""
     held = state.held
     assert held is not None
@@ -205,12 +205,12 @@ def _judged(state: State, setup: Setup) -> Told:
         turn_s = 2 * math.pi / max(abs(state.watched[1].mean), 1e-9)
         hold_s = turn_s if turn_s <= TUNING.longest_turn_s else TUNING.least_plateau_s
         state = replace(state, held=replace(held, steady=len(held.rows) - 1, hold_s=hold_s))
-        told = Event(
+        event = Event(
             time_s=now, kind=values.STEADY, step=held.step, inputs=held.inputs, seconds=hold_s,
             whole_turn=turn_s <= TUNING.longest_turn_s,
             state=(state.watched[0].mean, state.watched[1].mean),
         )  # fmt: skip
-        return state, (told,)
+        return state, (event,)
     if held.elapsed_s > setup.longest_s:
         state = replace(state, held=replace(held, over=True))
         return _failed(state, replace(held, over=True), f"not steady within {setup.longest_s:.0f} s", now, setup)
@@ -229,7 +229,7 @@ def _held_long_enough(held: Held) -> bool:
     return turned >= 2 * math.pi or passed >= 1.5 * held.hold_s
 
 
-def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> Told:
+def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> StateAndEvents:
     """A hold that was steady: its step counts, or is bad; `quiet` as in `_failed`."""
     held = replace(held, over=True)
     state = replace(state, held=held)
@@ -258,7 +258,7 @@ def _end(state: State, now: float) -> tuple[Event, ...]:
     return () if state.left else (Event(time_s=now, kind=values.DONE),)
 
 
-def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, quiet: bool = False) -> Told:
+def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, quiet: bool = False) -> StateAndEvents:
     """A step that does not count: to the end of the list, or left out after too many attempts.
 
     Args:
@@ -279,8 +279,8 @@ def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, qui
             state = replace(state, left=rest, left_out=(*state.left_out, again))
     kind = values.LEFT_OUT if step is not None and step.attempts + 1 >= TUNING.most_attempts else values.BAD
     following = None if quiet else _following(state, setup)
-    told = Event(time_s=now, kind=kind, step=step, inputs=held.inputs or (), why=why, following=following)
-    return state, (told, *_end(state, now))
+    event = Event(time_s=now, kind=kind, step=step, inputs=held.inputs or (), why=why, following=following)
+    return state, (event, *_end(state, now))
 
 
 def _following(state: State, setup: Setup) -> tuple[Inputs, Listed | None] | None:

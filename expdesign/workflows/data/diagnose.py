@@ -15,7 +15,7 @@ from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.regression import model_for
 from expdesign.export import write_files
 from expdesign.export.diagnosis_page import (
-    RollTold,
+    RollVerdict,
     diagnosis_html,
     diagnosis_json,
     diagnosis_tables,
@@ -73,10 +73,10 @@ def diagnose(
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
-    told = Estimated(progress, after=drawing)
+    reported = Estimated(progress, after=drawing)
     with workers(jobs if samples > FEW_SAMPLES else 1, load=None):
-        found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=told)
-    told.after = 0.0
+        found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=reported)
+    reported.after = 0.0
     roll = _roll(ship, record)
     command = command_text(
         "diagnose",
@@ -87,7 +87,7 @@ def diagnose(
     files = {
         "diagnosis.json": diagnosis_json(found, roll),
         "diagnosis.html": diagnosis_html(
-            found, command=command, version=__version__, roll=roll, progress=told.part(drawing, 0.0)
+            found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
         ),
         "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
     }
@@ -97,18 +97,18 @@ def diagnose(
     return Outcome(files=written, summary=summary, tables=_tables(found))
 
 
-def _roll(ship: Vessel, record: Record) -> RollTold | None:
+def _roll(ship: Vessel, record: Record) -> RollVerdict | None:
     """Whether the ship rolls as [roll] says; None without it."""
     if ship.pendulum is None:
         return None
     missing = dict.fromkeys(name for batch in record.batches for name in missing_columns(batch))
     if missing:
-        return RollTold(reason=f"the data do not measure {' and '.join(missing)}")
+        return RollVerdict(reason=f"the data do not measure {' and '.join(missing)}")
     try:
         runs = with_one_source([roll_run(batch, ship=ship) for batch in record.batches])
-        return RollTold(judgement=judge_roll(ship.pendulum, runs, beam_m=ship.beam_m))
+        return RollVerdict(judgement=judge_roll(ship.pendulum, runs, beam_m=ship.beam_m))
     except (InputError, NotInformative) as error:
-        return RollTold(reason=str(error))
+        return RollVerdict(reason=str(error))
 
 
 def _proposals(scenario: Path, model: VesselModel) -> tuple[Proposal, ...]:

@@ -270,8 +270,8 @@ def _summary(content: MonitorContent) -> dict[str, object]:
 
 
 def _tables(content: MonitorContent) -> tuple[TextTable, ...]:
-    told = tuple((sentence,) for sentence in sentences(content))
+    verdict = tuple((sentence,) for sentence in sentences(content))
     return (
-        TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=told),
+        TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=verdict),
         TextTable(title="Changes that are watched for", header=HEADER, rows=tuple(monitor_tables(content))),
     )

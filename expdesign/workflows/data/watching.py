@@ -164,8 +164,8 @@ def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch
         rows = len(piece.lines)
         reading = replace(reading.noted(f"{rows} rows are not judged: {error}"), unread_rows=reading.unread_rows + rows)
         return replace(now, reading=reading)
-    told = [text.replace(PIECE, piece.source.name) for text in read.record.notes]
-    reading = replace(reading.noted(*told, *read.notes), now_s=float(piece.time_s[-1]) + reading.offset_s)
+    remarks = [text.replace(PIECE, piece.source.name) for text in read.record.notes]
+    reading = replace(reading.noted(*remarks, *read.notes), now_s=float(piece.time_s[-1]) + reading.offset_s)
     return replace(now, changes=now.changes or read.changes, reading=reading)
 
 

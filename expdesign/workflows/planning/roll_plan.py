@@ -162,20 +162,20 @@ def _commands(scenario: Path, folder: Path, plan: LoadPlan) -> tuple[str, ...]:
 
 
 def _placed(
-    case: Scenario, information: tuple[PrimitiveInformation, ...], told: LoadContent, seed: int, progress: Progress
+    case: Scenario, information: tuple[PrimitiveInformation, ...], loads: LoadContent, seed: int, progress: Progress
 ) -> list[Files]:
     """Files of every load case: a plan with routes, run cards and report.
 
     Loads do not change the ship's path: load cases with the same runs are sailed alike, and planned once.
     """
     design = designed(case, information, seed=seed, progress=within(progress, 0.0, 0.1))
-    order = [list(told.plan.manoeuvres).index(item.primitive.name) for item in information]
-    rows = told.plan.repeats.astype(int).tolist()
+    order = [list(loads.plan.manoeuvres).index(item.primitive.name) for item in information]
+    rows = loads.plan.repeats.astype(int).tolist()
     trips: dict[tuple[int, ...], tuple[DurationDesign, Plan]] = {}
     found = []
     for number, row in enumerate(rows):
         part = within(progress, 0.1 + 0.9 * number / len(rows), 0.1 + 0.9 * (number + 1) / len(rows))
-        name = f"load case {number + 1}: {told.options[number].name}"
+        name = f"load case {number + 1}: {loads.options[number].name}"
         repeats = tuple(row[place] for place in order)
         if repeats not in trips:
             runs = with_repeats(design, list(repeats))
@@ -185,7 +185,7 @@ def _placed(
         loaded_case = replace(case, name=f"{case.name}, {name}")
         route = built_route(loaded_case, trip)
         content = report_content(loaded_case, information, runs, trip, seed)
-        content = replace(content, route=route, command=told.commands[number])
+        content = replace(content, route=route, command=loads.commands[number])
         drawing = within(_of_case(name, part), 0.8, 1.0)
         found.append(trial_files(loaded_case, None, content, route, progress=drawing))
     return found

@@ -18,7 +18,7 @@ from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
 from expdesign.plan.verify import track_covariance
-from expdesign.processes import as_finished, told_together
+from expdesign.processes import as_finished, reported_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
@@ -79,7 +79,7 @@ def whatif(
     with (
         remembering(memory),
         workers(jobs, scheduler=scheduler, load=load_plans),
-        told_together(within(progress, 0.0, WORKED), len(cases)) as together,
+        reported_together(within(progress, 0.0, WORKED), len(cases)) as together,
     ):
         tasks = [(*case, teller) for case, teller in zip(cases, together.tellers, strict=True)]
         for found in as_finished(_case, (with_plan, seed, memory), tasks):
@@ -113,10 +113,10 @@ def _case(
 
 
 def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int, progress: Progress) -> Case:
-    def told(activity: str, share: float) -> None:
+    def report(activity: str, share: float) -> None:
         progress(f"{case.name}: {activity}", share)
 
-    scoring, sharing, planning, comparing = in_phases(told, *WORK)
+    scoring, sharing, planning, comparing = in_phases(report, *WORK)
     try:
         information, _ = ready(case, seed=seed, progress=scoring)
         design = designed(case, information, seed=seed, progress=sharing)

@@ -20,7 +20,7 @@ from expdesign.plan.assembly import check_start, ship_on_legs
 from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan, PlanSettings
-from expdesign.processes import begin, in_order, told_together
+from expdesign.processes import begin, in_order, reported_together
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
@@ -108,7 +108,7 @@ def _shortest_of(
         NoAnswer: no search has an answer; what the first says.
     """
     begin()
-    with told_together(progress, starts) as together:
+    with reported_together(progress, starts) as together:
         tasks = list(enumerate(together.tellers))
         found = list(in_order(_answered, (memory_in_use(), *shared), tasks))
     days = [item for item in found if isinstance(item, Day)]
@@ -222,7 +222,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
         "day_95_s": finite(found.plan.day.most_s),
         "goes_to": asdict(found.parts),
         "information": found.information,
-        **({} if found.most_s is None else {"most_s": found.most_s, **_most_told(found)}),
+        **({} if found.most_s is None else {"most_s": found.most_s, **_information_bound(found)}),
         **_bound(found),
         "added": {spec.name: {"family": spec.family, **spec.settings} for spec in day.added},
         "cost_of_runs_s": found.cost_s,
@@ -274,7 +274,7 @@ def _bound(found: ShortestDay) -> dict[str, object]:
     }
 
 
-def _most_told(found: ShortestDay) -> dict[str, object]:
+def _information_bound(found: ShortestDay) -> dict[str, object]:
     """No day of the class and of this length holds more; nothing where that is not known."""
     bound = found.bound
     if bound is None or not bound.information_s > 0 or found.most_s is None or found.design.problem.prior.any():
@@ -294,7 +294,7 @@ def day_summary(day: Day) -> dict[str, object]:
         "day_95_s": found.plan.day.most_s,
         "information_of_what_was_asked": found.information,
         **{name: value for name, value in _bound(found).items() if name != "bound"},
-        **_most_told(found),
+        **_information_bound(found),
         "manoeuvres_added": len(day.added),
         "days_tried": len(found.tried),
     }

@@ -133,8 +133,8 @@ def _check_heel(case: Scenario, used: Sequence[Primitive]) -> None:
     """Raise NoPlan for runs that heel the ship more than her file allows."""
     most = np.inf if case.vessel.pendulum is None else case.vessel.pendulum.heel_max_rad
     for item in used:
-        told = item.trajectory.auxiliary
-        heel = 0.0 if told is None else float(np.abs(told[:, AUXILIARY.index("roll_rad")]).max())
+        auxiliary = item.trajectory.auxiliary
+        heel = 0.0 if auxiliary is None else float(np.abs(auxiliary[:, AUXILIARY.index("roll_rad")]).max())
         if heel > most:
             raise NoPlan(
                 f"{item.name} heels the ship by {np.degrees(heel):.1f} deg, more than heel_max_deg of [roll] in the "

@@ -60,19 +60,19 @@ def incline(
         {"mass_kg": mass, "shift_m": shift, **{name: finite(value) for name, value in asdict(one).items()}}
         for (mass, shift), one in zip(pairs, found, strict=True)
     ]
-    told = {
+    summary = {
         "displacement_kg": pendulum.body.mass_kg + pendulum.load.mass_kg,
         "metacentric_height_m": pendulum.metacentric_height_m,
         "period_s": pendulum.period_s,
     }
     files = write_files(
-        out or Path("runs") / f"{ship.name}-incline", {"incline.json": strict_json({**told, "tests": rows})}
+        out or Path("runs") / f"{ship.name}-incline", {"incline.json": strict_json({**summary, "tests": rows})}
     )
     progress("done", 1.0)
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     return Outcome(
         files=files,
-        summary=told,
+        summary=summary,
         tables=(TextTable(title="Inclining tests", header=HEADER, rows=tuple(table)),),
     )
 

@@ -16,11 +16,11 @@ from expdesign.export import write_files
 from expdesign.export.step_trial_page import (
     TO_DO_HEADER,
     LiveContent,
+    event_line,
     live_json,
     live_sentences,
     to_do_csv,
     to_do_table,
-    told,
 )
 from expdesign.monitoring import saved
 from expdesign.progress import Progress, silent
@@ -131,7 +131,7 @@ def watch_steps(
     work = _Work(setup=setup, folder=folder, command=command)
     now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))
     now = _through(now, data, work, tell, progress)
-    _check_told(now.state, setup)
+    _check_learnt(now.state, setup)
     content = _content(now, work)
     written = write_files(folder, _files(now, work))
     progress("done", 1.0)
@@ -149,7 +149,7 @@ def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], 
         for row in columns.rows(piece):
             state, events = after_row(now.state, row, work.setup)
             for event in events:
-                tell(told(event, work.setup.steps))
+                tell(event_line(event, work.setup.steps))
             now = replace(now, state=state, events=now.events + len(events))
         now = _read(now, piece, columns)
         done += len(piece.text)
@@ -217,7 +217,7 @@ class _Columns:
         return float(value)
 
 
-def _check_told(state: State, setup: Setup) -> None:
+def _check_learnt(state: State, setup: Setup) -> None:
     """Raise where the data gave nothing.
 
     Raises:
