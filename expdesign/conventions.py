@@ -25,7 +25,7 @@ KNOTS_PER_MPS = 3600.0 / METRES_PER_NAUTICAL_MILE
 
 
 def wrap_angle(angle_rad: Array | float) -> Array:
-    """The same direction in [-pi, pi)."""
+    """The angle of the same direction in [-pi, pi)."""
     return np.asarray((np.asarray(angle_rad) + np.pi) % (2.0 * np.pi) - np.pi)
 
 

@@ -132,7 +132,7 @@ def _stretches(model: VesselModel, batch: Batch, wind: bool, integration: Integr
 
 
 def _shares(stretches: Stretches, values: Array, measured: Array, misfit: Array) -> tuple[Array, float]:
-    """(3, n) of constant, slow and quick residuals, and the growth of an error over the run."""
+    """(3, n) shares of constant, slow and quick residuals, and the growth of an error over the run."""
     one_step = _one_step(stretches)
     held = np.repeat(values, len(measured) - 1, axis=0)
     eps = measured[1:] - one_step.states(held, measured[:-1])[1]

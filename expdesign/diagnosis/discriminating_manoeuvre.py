@@ -79,7 +79,7 @@ def _shown(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Array |
 
 
 def _turning(ship: ExtendedModel, windows: Windows, proposal: Proposal, wind: Array | None) -> Windows:
-    """The same windows with the simulated heading, so that current and wind act from the right side."""
+    """The windows with the simulated heading, so that current and wind act from the right side."""
     for _ in range(ROUNDS):
         heading_change = _sailed(ship, windows, proposal).heading_change
         heading = np.array(HEADINGS)[:, None] + heading_change

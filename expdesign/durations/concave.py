@@ -197,7 +197,7 @@ class Collected:
         return self.pieces[0].measure.degree
 
     def totals(self, shares: Array) -> tuple[Array, ...]:
-        """(d, d) for each model: prior plus the information of shares (q,)."""
+        """(d, d) information for each model: the prior plus that of shares (q,)."""
         return tuple(piece.matrix(shares) for piece in self.pieces)
 
     def values(self, totals: tuple[Array, ...]) -> Array:
@@ -228,7 +228,7 @@ class Collected:
         return float(np.exp((self.value(shares) - self.value(reference)) / self.degree))
 
     def efficiency_of(self, collected: Array, reference: Array) -> float:
-        """The same of given information (d, d), in physical parameter scale; one model only."""
+        """Efficiency of given information (d, d), in physical parameter scale; one model only."""
         piece = self.pieces[0]
         total = piece.prior + congruent(piece.transformation, collected)
         return float(np.exp((self.values((total[None],))[0] - self.value(reference)) / self.degree))

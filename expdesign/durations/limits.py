@@ -144,7 +144,7 @@ class Polytope:
         return bool(answer.status == 0)
 
     def loosened(self) -> Polytope:
-        """The same with limits of rows moved by `Tuning.loosening`."""
+        """The polytope with limits of rows moved by `Tuning.loosening`."""
         return Polytope(
             least=self.least, most=self.most, rows=self.rows, limits=self.limits + TUNING.loosening, labels=self.labels
         )

@@ -252,7 +252,7 @@ def _improved_shares(problem: DurationProblem) -> DurationDesign:
 
 
 def with_repeats(design: DurationDesign, repeats: Sequence[int]) -> DurationDesign:
-    """The same optimum with other whole runs and their efficiency.
+    """The optimum with other whole runs and their efficiency.
 
     Raises:
         NotInformative: the runs do not inform about every parameter.

@@ -261,7 +261,7 @@ def _moments(
 
 
 def _fused(readings: Array, slopes: Array, P: Array) -> _Reading:
-    """(2,) from readings (2 m,) of north and east in turn, by generalised least squares."""
+    """(2,) mean current from readings (2 m,) of north and east in turn, by generalised least squares."""
     if len(readings) == 2:
         return _Reading(readings, slopes)
     gain = _gain(np.tile(np.eye(2), (len(readings) // 2, 1)), slopes @ P @ slopes.T)
@@ -269,7 +269,7 @@ def _fused(readings: Array, slopes: Array, P: Array) -> _Reading:
 
 
 def _gain(H: Array, covariance: Array) -> Array:
-    """(q, c) of the generalised least squares of H (c, q) under noise (c, c); of plain ones without an inverse."""
+    """(q, c) gain of generalised least squares of H (c, q) under noise (c, c); of plain ones without an inverse."""
     size = np.sqrt(np.diag(covariance))
     size = np.where(size > 0, size, size.max() or 1.0)
     weights = np.linalg.pinv(covariance / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)

@@ -50,7 +50,7 @@ def with_strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: W
 
 
 def _strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: WorstCase) -> Integers:
-    """(k, n) of each row and equation: 0 where it is not used, else a number for the sides that its moduli are on."""
+    """(k, n) stratum of each row and equation: 0 where it is not used, else a number for the signs of its moduli."""
     if layout.guess is not None:
         raise InputError("equation-wise samples are for methods without a steady current; those need no such samples")
     model, wind = layout.model, layout.predictor.wind

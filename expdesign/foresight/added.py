@@ -42,7 +42,7 @@ class Offers:
     blocks: tuple[NDArray[np.int64], ...]
 
     def noncentralities(self, runs: Array) -> Array:
-        """(e,) of every effect once so many runs (q,) are added."""
+        """(e,) noncentrality of every effect once so many runs (q,) are added."""
         A = beside_nuisance(self.known + np.tensordot(runs, self.each, axes=1), self.precision)
         return np.array([np.linalg.eigvalsh(A[np.ix_(index, index)])[0] for index in self.blocks])
 

@@ -109,7 +109,7 @@ def _is_one_of_a_kind(key: str, ship: ExtendedModel) -> bool:
 
 
 def lasting(direction: Direction) -> Direction:
-    """The same effect where a change of the ship has happened from the beginning."""
+    """The effect where a change of the ship has happened from the beginning."""
     fixed = {key: 0.0 if key == "change:time" else value for key, value in direction.fixed.items()}
     return replace(direction, fixed=fixed)
 

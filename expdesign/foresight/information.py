@@ -40,7 +40,7 @@ def batch_information(
 def unit_information(
     linear: LinearisedMotion, keys: Sequence[str], disturbances: Sequence[Disturbance], noise: Noise, unit: Array
 ) -> Array:
-    """The same of every unit of the data, given the unit (w,) that each window belongs to."""
+    """Information of every unit of the data, given the unit (w,) that each window belongs to."""
     own = effect_disturbances(linear, keys)
     found = build_sensitivities(linear, [*own, *disturbances], random_current=noise.current_std_mps > 0)
     grams = gram_matrices(found, noise)

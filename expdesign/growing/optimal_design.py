@@ -44,7 +44,7 @@ def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) 
 def shared(
     information: Sequence[PrimitiveInformation], fractions: Array, mean_subtraction: str = "complete"
 ) -> Optimum:
-    """The same for given time fractions (q,)."""
+    """The information of given time fractions (q,)."""
     matrices = np.array([bordered(item, mean_subtraction) for item in information])
     white, offset = whitened(matrices)
     total = np.tensordot(fractions, matrices, axes=1)

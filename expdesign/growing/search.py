@@ -42,7 +42,7 @@ class Worth:
         seal(self, gradient="d d")
 
     def of(self, matrices: Array, made_good_m: Array, run_s: float) -> Array:
-        """(n,) of runs with information B (n, d, d) and distances made good (n,)."""
+        """(n,) scores of runs with information B (n, d, d) and distances made good (n,)."""
         cost = 1.0 + (self.leg_s - self.saved_s_per_m * made_good_m) / run_s
         return np.asarray(np.einsum("ij,nji->n", self.gradient, matrices) / np.maximum(cost, TUNING.least_cost))
 

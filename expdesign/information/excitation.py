@@ -75,7 +75,7 @@ def strata(
     sigmas: float = SIGMAS,
     air_measured: bool = False,
 ) -> Strata:
-    """(outputs, k, ...) for signals that broadcast to (k, ...).
+    """(outputs, k, ...) strata for signals that broadcast to (k, ...).
 
     Args:
         vessel: model and sensors.

@@ -216,7 +216,7 @@ def _strata(
     *,
     begins: Sequence[int],
 ) -> NDArray[np.int8]:
-    """(k, n) of the samples of a part; those of an interval whose ends differ are not used."""
+    """(k, n) strata of the samples of a part; intervals whose ends differ are not used."""
     if excitation == FREE:
         return np.ones((len(inputs), len(vessel.model.outputs)), dtype=np.int8)
     first, *others = [
@@ -253,7 +253,7 @@ def _by_current(model: VesselModel, trajectory: Trajectory, commands: Commands, 
 
 
 def _weights(variance: Array) -> Array:
-    """(n,) of the outputs, which the current couples: one over the variance of the noise; all alike without noise."""
+    """(n,) weights of the outputs, which the current couples: one over the noise variance; all alike without noise."""
     if not variance.any():
         return np.ones(len(variance))
     return np.asarray(1.0 / np.maximum(variance, TUNING.ideal_share * variance.max()))

@@ -66,7 +66,7 @@ def bordered_runs(
 def _states(
     vessel: Vessel, commands: Array, start: tuple[Array, Array], environment: Environment, headings: Array
 ) -> Array:
-    """(h, k + 1, n, 6) from entry velocities (n, 3) through water, standing commands (n, m), headings (h, n or 1)."""
+    """(h, k + 1, n, 6) states from velocities (n, 3) through water, standing commands (n, m), headings (h, n or 1)."""
     count, runs = len(headings), len(commands)
     heading = np.broadcast_to(headings, (count, runs)).ravel()
     current_b = np.stack([*to_body(environment.current_to, heading, NUMPY), np.zeros(count * runs)], axis=1)
@@ -124,12 +124,12 @@ def _matrices(
 
 
 def _current_rows(vessel: Vessel, table: Signals, heading_rad: Array) -> Array:
-    """(n, outputs, k, 2) of runs at headings (k, n)."""
+    """(n, outputs, k, 2) regressors of the current, of runs at headings (k, n)."""
     signals = {name: np.broadcast_to(values, heading_rad.shape).ravel() for name, values in table.items()}
     found = current_slopes(vessel, signals, heading_rad.ravel())
     return found.reshape(*heading_rad.shape, *found.shape[1:]).transpose(1, 2, 0, 3)
 
 
 def _block(A: Array, B: Array, C: Array) -> Array:
-    """(n, a + c, a + c) of [A B; B' C]."""
+    """(n, a + c, a + c) block matrices [A B; B' C]."""
     return np.concatenate([np.concatenate([A, B], axis=2), np.concatenate([B.transpose(0, 2, 1), C], axis=2)], axis=1)

@@ -98,7 +98,7 @@ def _pseudo_inverse(M: Array) -> Array:
 
 
 def _noise(vessel: Vessel) -> Array:
-    """(n,) of each output's equation, see `equation_noise`."""
+    """(n,) noise variance of each output's equation, see `equation_noise`."""
     sensors, model = vessel.sensors, vessel.model
     of = {"u": sensors.velocity_mps, "v": sensors.velocity_mps, "r": sensors.yaw_rate_radps}
     noise = np.array([of[name] for name in model.outputs])

@@ -93,7 +93,7 @@ def _check(vessel: Vessel, pendulum: RollPendulum, option: LoadOption) -> None:
 
 
 def _moments(ship: Vessel, primitive: Primitive, values: Array) -> Array:
-    """(5, 5) of one run."""
+    """(5, 5) moments of one run."""
     commands = primitive.commands
     sailed = simulate(ship, commands, velocity=primitive.entry_velocity, standing=primitive.entry_inputs)
     assert sailed.auxiliary is not None

@@ -148,7 +148,7 @@ def _independent(grams: Grams) -> tuple[Array, Array, Array]:
 
 
 def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array, Array]:
-    """The same after one step of expectation-maximisation."""
+    """The force after one step of expectation-maximisation."""
     m, c = grams.changes, grams.products.shape[-1]
     whole = np.einsum("c,cwij->wij", 1.0 / std**2, grams.products)
     nuisance, others = slice(m, c - 1), np.r_[:m, c - 1]

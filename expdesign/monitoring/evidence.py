@@ -241,7 +241,7 @@ class Stretches:
         return len(self.time_s)
 
     def less(self, change: Array) -> Stretches:
-        """The same with the error of a ship that differs by a change (m,), in sizes."""
+        """The stretches with the error of a ship that differs by a change (m,), in sizes."""
         after = np.eye(self.products.shape[-1])
         after[: self.changes, -1] = -change
         return replace(self, products=after.T @ self.products @ after)

@@ -87,11 +87,11 @@ class Sums:
         return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
 
     def again(self, places: np.ndarray, time_s: float, weather: float = 1.0) -> Sums:
-        """The same with some (n,) begun anew."""
+        """The sums with some (n,) begun anew."""
         return self._where(places, Sums.begun(1, self.score.shape[1], self.taken.shape[1], time_s, weather))
 
     def first(self, places: np.ndarray, one: Judged, time_s: float, surprise: float, weather: float) -> Sums:
-        """The same with some (n,) begun with a stretch."""
+        """The sums with some (n,) begun with a stretch."""
         begun = Sums(
             since_s=np.array([time_s]),
             taken=(one.gain @ one.seen[0])[None],

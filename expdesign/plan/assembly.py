@@ -259,7 +259,7 @@ def footprints(problem: PlanProblem, grid: ClearanceField, off_m: Sequence[Array
 
 
 def dispersions(problem: PlanProblem) -> list[Array]:
-    """(k + 1,) of each run that is used.
+    """(k + 1,) dispersion along each run that is used.
 
     The probability of leaving that room is shared evenly among all runs, so that together they keep the confidence.
     """

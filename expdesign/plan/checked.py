@@ -54,7 +54,7 @@ def drawn_risk(
 
 
 def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Array:
-    """(legs,) by how much longer than planned drawn trials take on each leg, on average, go-arounds included [s].
+    """(legs,) mean time that drawn trials take on each leg beyond the plan, go-arounds included [s].
 
     Fewer trials than of a plan's risk, from a stream of their own: enough to compare days by their expected time.
     """

@@ -45,7 +45,7 @@ class Stated:
         return readings(values, getattr(self.sensors, name), sample_time_s=self.batch.sample_time_s)
 
     def in_time(self, name: str, values: Array) -> tuple[Array, Mask]:
-        """(k, c) at the samples' own times, and (k,) whether a sample is the nearest to a reading."""
+        """(k, c) readings at the samples' own times, and (k,) whether a sample is the nearest to a reading."""
         if prompt(getattr(self.sensors, name)) or not measured(values):
             return values, np.ones(len(values), dtype=bool)
         found, _ = self.readings(name, values)

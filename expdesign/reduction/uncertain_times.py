@@ -52,7 +52,7 @@ class Division:
     lateness: tuple[int, ...]
 
     def shares(self, responses: Sequence[Response], sample_time_s: float) -> Array:
-        """(s,) of the sample, which parts take; responses may differ a little from those that it is made for."""
+        """(s,) shares of the sample that its parts take; responses may differ a little from the original ones."""
         begins = np.full(len(self.begins) + len(self.arriving), np.nan)
         begins[list(self.places)] = [
             responses[column].delay_s / sample_time_s - self.lateness[column] for column in self.arriving

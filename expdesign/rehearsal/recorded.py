@@ -259,7 +259,7 @@ def _tried(pieces: Pieces, subset: Subset) -> tuple[Array, float]:
 
 
 def _weights(labels: Sequence[str], used: Subset) -> Array:
-    """(m,) of the pieces that are not used, adding up to one, every label alike; of all pieces where none is left."""
+    """(m,) weights of the pieces not used, of all where none is left: they add up to one, every label alike."""
     free = np.array([place not in used for place in range(len(labels))])
     if not free.any():
         free[:] = True

@@ -232,7 +232,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
 
 
 def _by_rudder(problem: RollProblem) -> RollProblem:
-    """The same with instruments from the rudder itself, whose estimate may be biased and begins near the best one."""
+    """The problem with instruments from the rudder itself: its estimate may be biased, and is a good start."""
     cases = [replace(case, runs=tuple(replace(run, planned=None) for run in case.runs)) for case in problem.cases]
     return replace(problem, cases=tuple(cases))
 
@@ -325,7 +325,7 @@ def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
 def _covariance(
     problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, held: Sequence[str], method: str
 ) -> Array:
-    """(p, p) with the spectra of the last residuals, flat ones for least squares; zero for what is held.
+    """(p, p) covariance from the spectra of the last residuals, flat ones for least squares; zero for what is held.
 
     The same residuals give the spectrum and are weighed by it. With 2 K degrees of freedom at each frequency the
     inverse of the curvature comes out too small by (K - 1) / K, and the variance is larger by K / (K - 1) than with the

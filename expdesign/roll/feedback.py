@@ -62,7 +62,7 @@ def chance_of_answers(
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:
-    """(n, l) of each run: changes of the rudder up to a period of roll later, as they will be, and then as the last."""
+    """(n, l) rudder changes of each run up to a period of roll later; the last one repeats past its end."""
     first = TUNING.left_out_samples
     result = []
     for run in case.runs:
@@ -77,7 +77,7 @@ def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Ar
 def _covariance(
     weighted: Sequence[Weighted], columns: Sequence[Sequence[Array]], spectra: Sequence[Spectrum], inverse: Array
 ) -> Array:
-    """(l, l) of the moments at the estimate, whose errors move them by `inverse` (l, q) of the weighted residuals."""
+    """(l, l) covariance of the moments at the estimate, whose errors move them by `inverse` (l, q) of the residuals."""
     result, first = np.zeros((len(inverse),) * 2), 0
     for part, own, left in zip(weighted, columns, spectra, strict=True):
         by = inverse[:, first : first + len(part.top)].T

@@ -179,7 +179,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
 
 
 def _hidden(rows: Sequence[Rows], instruments: Sequence[Sequence[Fold]], noise: NoiseModel) -> tuple[Array, ...]:
-    """(n, 5) of each run."""
+    """(n, 5) parts of the regressors of each run that instruments do not explain."""
     first = TUNING.left_out_samples
     found = []
     for own in instruments:

@@ -47,7 +47,7 @@ class Rows:
         seal(self, y="n", X="n 5")
 
     def residuals(self, values: Array) -> Array:
-        """(n,) of coefficients (5,)."""
+        """(n,) residuals at coefficients (5,)."""
         return np.asarray(self.y - self.X @ values)
 
 
@@ -101,7 +101,7 @@ def without_start(table: Array, noise: NoiseModel) -> Array:
 
 
 def regressors(signals: Array) -> Array:
-    """(k, 5) of signals (k, 4) as in a run, measured or simulated."""
+    """(k, 5) regressors from signals (k, 4) as in a run, measured or simulated."""
     return np.column_stack([-delayed(signals[:, 0], (1, 2)), difference(signals[:, 1:])])
 
 
@@ -128,18 +128,18 @@ class Spectrum:
         return np.asarray(np.fft.irfft(changed, self.length, axis=0)[: len(signals)])
 
     def covariance(self, columns: Sequence[Array]) -> Array:
-        """(q, q) of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
+        """(q, q) covariance of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
         seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
         return np.asarray(sum((F.conj().T @ ((self.shares * self.density)[:, None] * F)).real for F in seen))
 
     def power(self, columns: Sequence[Array]) -> Array:
-        """(f,) of all columns (k, q) of each run, whose products with a density sum to a trace of covariances."""
+        """(f,) power of all columns (k, q) of each run; its product with a density sums to a trace of covariances."""
         seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
         return np.asarray(self.shares * sum((np.abs(F) ** 2).sum(axis=1) for F in seen))
 
     @property
     def shares(self) -> Array:
-        """(f,) of each frequency, with that of its negative, among all n."""
+        """(f,) share of each frequency and its negative among all n."""
         return np.asarray(np.r_[1.0, np.full(len(self.density) - 2, 2.0), 1.0] / self.length)
 
 
@@ -169,7 +169,7 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
 
 
 def cross_spectrum(first: Sequence[Array], second: Sequence[Array]) -> Array:
-    """(f,) of two signals (k,) of each run, at the frequencies of `spectrum`."""
+    """(f,) cross spectrum of two signals (k,) of each run, at the frequencies of `spectrum`."""
     length, total = _transform_length(first), sum(map(len, first))
     parts = [
         len(a) / total * scipy.signal.csd(a, b, nperseg=n, nfft=length, return_onesided=False)[1]

@@ -158,7 +158,7 @@ def deliver(
 def deliver_through(
     maps: Sequence[SampleMap | None], commands: Array, substeps: int, *, standing: Array | None = None
 ) -> Array:
-    """(k, substeps, m, ...) by the map of each signal over a sample, None where its response is ideal."""
+    """(k, substeps, m, ...) inputs delivered by each signal's map over a sample, None where its response is ideal."""
     result = np.repeat(commands[:, None], substeps, axis=1)
     for column, through in enumerate(maps):
         if through is None:

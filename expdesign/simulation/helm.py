@@ -90,7 +90,7 @@ class Helm:
         return self._row(drive, angle_rad, SCALAR)
 
     def rows(self, drive: Array, angle_rad: Array) -> Array:
-        """(..., m) the same for orders (...,) and angles (...,)."""
+        """(..., m) inputs for orders (...,) and angles (...,)."""
         return np.stack(np.broadcast_arrays(*self._row(drive, angle_rad, NUMPY), drive + angle_rad)[:-1], axis=-1)
 
     def _row(self, drive: Any, angle_rad: Any, ops: Operators) -> list[Any]:

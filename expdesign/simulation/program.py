@@ -77,7 +77,7 @@ class RatesProgram:
         self._take(memory)
 
     def part(self, runs: np.ndarray) -> RatesProgram:
-        """The same for some of the runs (k,), by index."""
+        """The program for some of the runs (k,), by index."""
         some = copy(self)
         some._take(self._memory.take(runs, axis=1))
         return some

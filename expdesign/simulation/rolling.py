@@ -24,7 +24,7 @@ from expdesign.vessel import IDEAL, RollPendulum, Vessel
 def rolled(
     vessel: Vessel, states: Array, commands: Commands, sea: Array, *, standing: Array | None = None
 ) -> Array | None:
-    """(k + 1, 8) of `AUXILIARY`, nan where not given; None where the vessel has no roll in radians.
+    """(k + 1, 8) columns of `AUXILIARY`, nan where not given; None where the vessel has no roll in radians.
 
     Accelerations are those just after the inputs of a sample, of the last one's at the end. A pendulum begins upright.
 
@@ -59,7 +59,7 @@ def rolled(
 
 
 def in_waves(vessel: Vessel, sailed: Trajectory, rng: np.random.Generator) -> Trajectory:
-    """The same with the roll that drawn waves add, upright at first; unchanged where the vessel file states none.
+    """The motion with the roll that drawn waves add, upright at first; unchanged where the vessel file states none.
 
     Roll is linear, so that theirs comes on top. Their moment is the righting moment by their slope.
     """

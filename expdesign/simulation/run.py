@@ -229,7 +229,7 @@ class _Runs:
         return np.stack(runs, axis=1)[..., :STATES]
 
     def together(self) -> Array:
-        """The same by operations on all runs at once."""
+        """The motion by operations on all runs at once."""
         program = RatesProgram(self.model, runs=len(self.parameters), parameters=self.parameters)
         result = np.empty((len(self.sea) + 1, len(self.parameters), STATES))
         steps_s = self.sample_time_s * self.shares

@@ -138,5 +138,5 @@ def unseen_after_s(tests: tuple[RatioTest, RatioTest]) -> float:
 
 
 def given_up(state: Watched) -> Watched:
-    """The same, no longer waiting for a response."""
+    """The state, no longer waiting for a response."""
     return stepped(state, responds=False) if state.mode == "waiting" else state

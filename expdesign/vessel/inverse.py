@@ -52,7 +52,7 @@ def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> 
 
 
 def _columns(rows: Array) -> Array:
-    """The same (m, ...) as (..., m), in place."""
+    """Rows (m, ...) as columns (..., m), in place."""
     return rows.transpose(*range(1, rows.ndim), 0)
 
 

@@ -132,7 +132,7 @@ class VesselModel:
         return any(SHOAL in expression.signals for expression in self.expressions)
 
     def with_parameters(self, values: Mapping[str, float] | Array) -> VesselModel:
-        """The same structure with other parameter values, all (p,) or some by name."""
+        """The model with other parameter values, all (p,) or some by name."""
         if not isinstance(values, Mapping):
             return replace(self, parameters=values)
         for name in values:
@@ -143,7 +143,7 @@ class VesselModel:
         )
 
     def with_covariance(self, names: Sequence[str], covariance: Array) -> VesselModel:
-        """The same with another prior covariance of its parameters; those not named count as known.
+        """The model with another prior covariance of its parameters; those not named count as known.
 
         Args:
             names: of parameters.

@@ -70,7 +70,7 @@ def _slopes(error: Array, sample_s: float) -> tuple[Array, Array]:
 
 
 def _variables(ship: ExtendedModel, short: Windows) -> dict[str, Array]:
-    """(w,) of every variable."""
+    """Values (w,) of every variable."""
     middle = short.steps // 2
     measured = short.measured[..., :3]
     count = np.maximum(np.isfinite(measured).sum(axis=1), 1)
@@ -123,7 +123,7 @@ def mean_residual(found: Residuals, output: str) -> tuple[float, float]:
 
 
 def _covariance(rest: Array, share: Array, run: Array) -> tuple[Array, float]:
-    """(b, b) of the groups' means, and the effective number of independent stretches.
+    """(b, b) covariance of the groups' means, and the effective number of independent stretches.
 
     Args:
         rest: (k,) residuals less the mean of their group.

@@ -82,11 +82,11 @@ class ExtendedModel:
         return unit_terms(self.model, self.library, self.effects)
 
     def with_effects(self, effects: Effects) -> ExtendedModel:
-        """The same with some effects set to other values."""
+        """The model with some effects set to other values."""
         return replace(self, effects={**self.effects, **effects})
 
     def without_effects(self, keys: Set[str]) -> ExtendedModel:
-        """The same with some effects as the vessel file states them, if it does."""
+        """The model with some effects as the vessel file states them, if it does."""
         others = {key: value for key, value in self.effects.items() if key not in keys}
         return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
 

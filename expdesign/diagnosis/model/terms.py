@@ -167,7 +167,7 @@ def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
 
 
 def ahead_force_text(model: VesselModel) -> str:
-    """The same as an expression."""
+    """The signal of `ahead_force` as an expression."""
     if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
         return "tau_x"
     return " + ".join(f"abs({name})*{name}" for name in model.inputs if stem(name) == "n")

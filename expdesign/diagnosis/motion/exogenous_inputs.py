@@ -94,7 +94,7 @@ def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
 def _forces_like(
     ship: ExtendedModel, windows: Windows, other: ExtendedModel, known: ExogenousInputs
 ) -> ExogenousInputs:
-    """The same, from the signals of another ship where its actuators deliver the same."""
+    """Forces as of `_forces`, from the signals of another ship where its actuators deliver the same."""
     names = _force_names(ship.model)
     shape = known[names[0]].shape if names[0] in known else None
     if actuator_effects(ship) != actuator_effects(other) or shape != windows.heading.shape:

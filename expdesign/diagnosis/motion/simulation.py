@@ -35,7 +35,7 @@ def simulate_windows(
 
 
 def simulate_nearby(ship: ExtendedModel, windows: Windows, start: Array, near: LinearisedMotion) -> Motion | None:
-    """The same from a similar motion; None where Newton's method does not converge from there, so that it is not near.
+    """The simulation from a similar motion; None where Newton's method does not converge from there.
 
     A motion with another number of states is simulated step by step.
     """
@@ -87,7 +87,7 @@ def _step_by_step(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
 def _newton_from(
     ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, near: LinearisedMotion
 ) -> Array | None:
-    """(w, k, n) by Newton's method from a similar motion; None where that does not converge."""
+    """(w, k, n) states by Newton's method from a similar motion; None where that does not converge."""
     if near.motion.states.shape != (len(start), windows.steps, ship.states):
         return None
     return _newton_over_all_steps(ship, windows, exogenous, start, near.motion.states, near.transition)
@@ -96,7 +96,7 @@ def _newton_from(
 def _newton_from_measured(
     ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array
 ) -> Array | None:
-    """(w, k, n) by Newton's method from the measured velocities, without roll; None where that does not converge."""
+    """(w, k, n) states by Newton's method from the measured velocities, without roll; None without convergence."""
     states = np.zeros((len(start), windows.steps, ship.states))
     states[..., :3] = _measured_states(windows)
     jacobian = state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, exogenous.without_last_step())
@@ -116,7 +116,7 @@ def _measured_states(windows: Windows) -> Array:
 def _newton_over_all_steps(
     ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, start: Array, states: Array, transition: Array
 ) -> Array | None:
-    """(w, k, n) by Newton's method for all steps as one system of equations, or None without convergence.
+    """(w, k, n) states by Newton's method for all steps as one system of equations; None without convergence.
 
     Each iteration computes all steps from the last states and propagates the gaps between them by transition matrices
     of a similar motion (multiple shooting). At convergence the gaps vanish, and the result is the stepwise

@@ -60,7 +60,7 @@ def missing_effects(base: Fit, windows: Windows, rng: np.random.Generator) -> tu
 
 
 def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
-    """The same in the windows of a fit."""
+    """Missing effects in the windows of a fit."""
     windows, ship = base.linear.motion.windows, base.ship
     terms = term_dictionary(ship.model, ship.library)
     wider = replace(ship, library={**ship.library, **terms})
@@ -115,7 +115,7 @@ def _impossible(given: UnitInformation, terms: int, others: tuple[Kind, ...]) ->
 
 
 def _without(given: UnitInformation, places: list[int]) -> UnitInformation:
-    """The same without information about some regressors, so that they are never chosen."""
+    """The information without that about some regressors, so that they are never chosen."""
     A, s = given.A.copy(), given.s.copy()
     rows = [len(given.precision) + place for place in places]
     A[:, rows], A[:, :, rows], s[:, rows] = 0.0, 0.0, 0.0

@@ -49,7 +49,7 @@ class Measure(Protocol):
         ...
 
     def transformed(self, T: Array) -> Measure:
-        """The same measure for matrices T M T^T."""
+        """The measure for matrices T M T^T."""
         ...
 
 

@@ -168,5 +168,5 @@ def whitening(matrices: Array, prior: Array, shares: Array | None = None) -> Arr
 def pieces_of(
     stacks: Iterable[Array], prior: Array, measure: Measure, *, within: Array | None = None
 ) -> tuple[Piece, ...]:
-    """The same measure and prior with matrices (q, d, d) of several models."""
+    """One measure and prior with matrices (q, d, d) of several models."""
     return tuple(Piece.of(B, prior, measure, within=within) for B in stacks)

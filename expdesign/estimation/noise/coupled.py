@@ -139,7 +139,7 @@ class _Spectra:
         return bool((self.frequency > 0).any() and self.ordinates.any())
 
     def expected(self, variances: Array, common: Array) -> Array:
-        """(b, n, n) for variances (n, 2 + m), and forces of correlation (n, n)."""
+        """(b, n, n) expected cross periodograms for variances (n, 2 + m), and forces of correlation (n, n)."""
         n = len(variances)
         own = np.einsum("oi,oibpq->bpq", variances, self.designs)
         S = own + self._shared(variances) * (common - np.eye(n))
@@ -221,6 +221,6 @@ def _spectra(eps: Array, A: Array, parts: Sequence[Stretch], left: Iterable[Sequ
 
 
 def _cross_periodograms(eps: Array, part: Stretch) -> Array:
-    """(n, n, f) of the outputs of a stretch."""
+    """(n, n, f) cross periodograms of the outputs of a stretch."""
     lines = np.fft.rfft(part.spread(eps[part.rows]), part.padded, axis=0).T
     return np.asarray(lines[:, None] * lines[None].conj() / len(part.places))

@@ -90,7 +90,7 @@ def _common(residuals: Array, variances: Array) -> Array:
 
 
 def as_correlation(found: Array) -> Array:
-    """(n, n) with ones on the diagonal, none above one, positive semidefinite."""
+    """(n, n) correlation matrix near the one found: ones on the diagonal, none above one, positive semidefinite."""
     found = np.clip(found, -1.0, 1.0)
     np.fill_diagonal(found, 1.0)
     least = float(np.linalg.eigvalsh(found)[0])

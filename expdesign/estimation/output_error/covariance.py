@@ -199,7 +199,7 @@ class _Steps:
     parts: list[Stretch]
 
     def of(self, values: Array) -> Array:
-        """(k, ...) from (L - 1, W, ...)."""
+        """Rows (k, ...) from (L - 1, W, ...)."""
         return np.asarray(values.swapaxes(0, 1)[self.there])
 
 

@@ -70,7 +70,7 @@ STEPS = (STEP_MPS, -STEP_MPS)
 
 
 def _accelerations(model: VesselModel, parameters: Array, table: Table) -> Array:
-    """(k, n) by all terms."""
+    """(k, n) accelerations by all terms."""
     total = np.zeros((len(table["psi"]), len(model.outputs)))
     for term, expression, value in zip(model.terms, model.expressions, parameters, strict=True):
         total[:, model.outputs.index(term.equation)] += value * np.asarray(expression.evaluate(table, NUMPY))

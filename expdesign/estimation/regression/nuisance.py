@@ -81,7 +81,7 @@ class Nuisance:
         return f"{self.equation}: {' '.join([*parts, *([self.heading] if self.heading else [])])}"
 
     def evaluate(self, table: SignalTable) -> Any:
-        """(k,) for a table of signals that includes the signs of the batch and the result of `headings`."""
+        """(k,) regressor, from a table of signals that includes the signs of the batch and the result of `headings`."""
         return self.factor.evaluate(table, self.algebra.functions) * table[self.heading]
 
 

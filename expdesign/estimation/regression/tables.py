@@ -119,7 +119,7 @@ def inputs_within(model: VesselModel, batch: Batch) -> tuple[tuple[float, Table]
 
 
 def _delivered(model: VesselModel, batch: Batch) -> Array:
-    """(k, s, m) in the model's order."""
+    """(k, s, m) delivered inputs in the model's order."""
     assert batch.delivered is not None  # asked before
     return np.asarray(batch.delivered.values[:, :, [batch.input_names.index(name) for name in model.inputs]])
 

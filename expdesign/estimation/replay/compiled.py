@@ -79,7 +79,7 @@ class Compiled:
         return by_values, by_start
 
     def slope_blocks(self, values: Array, states: Array) -> Iterator[Slopes]:
-        """The same block by block of samples, without what lies behind the ends of stretches."""
+        """The derivatives block by block of samples, without what lies behind the ends of stretches."""
         (length, count, n), counts = states.shape, self.stretches.counts
         carried = np.zeros((count, n, values.shape[1])), np.tile(np.eye(n), (count, 1, 1))
         yield Slopes(

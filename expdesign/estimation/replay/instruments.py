@@ -83,7 +83,7 @@ class InstrumentModel:
         frozen_set(self, "measured", signed)
 
     def instruments(self, parameters: Array) -> Array:
-        """(k, n, p) for a model with all parameters (all,) in model order.
+        """(k, n, p) instruments from a model with all parameters (all,) in model order.
 
         Raises:
             Diverged: that model is unstable.
@@ -136,7 +136,7 @@ class InstrumentModel:
 
 
 def apart_from_start(rows: Rows) -> Rows:
-    """The same without the first pair of samples of every batch, whose noise the instruments share.
+    """Rows without the first pair of samples of every batch, whose noise the instruments share.
 
     Raises:
         NotInformative: nothing is left.
@@ -149,7 +149,7 @@ def apart_from_start(rows: Rows) -> Rows:
 
 
 def _run(places: Integers) -> Integers | slice:
-    """The same places, as a slice where none is left out between them."""
+    """Places as a slice, where none is left out between them."""
     if not len(places):
         return slice(0, 0)
     whole = len(places) == places[-1] - places[0] + 1

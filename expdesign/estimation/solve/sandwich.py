@@ -142,7 +142,7 @@ class _Terms:
         return np.asarray(np.einsum("knp,kn->kp", self.zeta, self.n))
 
     def white_factor(self) -> Array:
-        """(p,) by how much changing variance adds to the variance of parameters, where it clearly does; else 1."""
+        """(p,) factors by which heteroscedastic noise clearly enlarges the variance of parameters; 1 elsewhere."""
         even, changing, chance = np.zeros((3, self.zeta.shape[2]))
         for output in range(self.n.shape[1]):
             squares = self.n[self.when.place, output] ** 2

@@ -144,7 +144,7 @@ def solve_quick(equations: Equations, instruments: Array) -> tuple[Array, Array]
 
 
 def _fitting(equations: Equations, instruments: Array) -> Equations:
-    """The same, or split again where the instruments couple the parts."""
+    """The equations, split again where the instruments couple the parts."""
     power = _power(equations.regression, instruments)
     if not ((equations.uses == 0) & (power > 0)).any():
         return equations

@@ -45,7 +45,7 @@ class System:
     parts: list[slice]
 
     def cut(self, whole: Array) -> Array:
-        """(k, n, p) of this part from (all, all, all)."""
+        """(k, n, p) rows of this part, from (all, all, all)."""
         return _cut(whole[self.rows], self.outputs, self.columns)
 
     def without_mean(self, rows: Array, mean: str) -> Array:

@@ -92,7 +92,7 @@ def _named(item: Detectability) -> str:
 
 
 def operation_json(content: OperationContent) -> str:
-    """The same with key names in English; a delay of null is longer than a voyage."""
+    """The content as JSON; a delay of null is longer than a voyage."""
     found = content.found
     rows = []
     for item in found.rows:

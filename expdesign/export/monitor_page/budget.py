@@ -81,7 +81,7 @@ def _after(delay_s: float) -> str:
 
 
 def budget_entries(content: MonitorContent) -> list[dict[str, object]]:
-    """The same for a file, by kind of stretch; accelerations in m/s2 and rad/s2."""
+    """The budget for a file, by kind of stretch; accelerations in m/s2 and rad/s2."""
     budget, delays = content.state.budget, delays_s(content)
     mean = budget.terms / np.maximum(budget.stretches, 1.0)[:, None, None]
     return [

@@ -50,7 +50,7 @@ class YawShip:
         return self.gain if effect == GAIN else self.parameters[effect.removeprefix(KEY)]
 
     def with_effects(self, effects: Mapping[str, float]) -> YawShip:
-        """The same with other values of some effects."""
+        """The ship with other values of some effects."""
         own = {key.removeprefix(KEY): value for key, value in effects.items() if key != GAIN}
         return replace(self, parameters={**self.parameters, **own}, gain=effects.get(GAIN, self.gain))
 

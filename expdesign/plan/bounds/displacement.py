@@ -104,7 +104,7 @@ def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) 
 
 
 def _displacement_in_weather(tracks: list[Array], headway: Headway) -> Displacement:
-    """The same from tracks (k, 2) over ground at headings all round."""
+    """The displacement from tracks (k, 2) over ground at headings all round."""
     chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
     paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
     return Displacement(

@@ -40,15 +40,15 @@ class SpeedChanges:
         return float(self.faster_mps2[-1].mean()) / CONTROL.rate_margin
 
     def most(self, speed_mps: float, time_s: Array) -> Array:
-        """(n,) speed that is reached at most at even times (n,) from one, or from which one can be reached."""
+        """(n,) largest speed at even times (n,) after the given speed, or before it."""
         return self._followed(speed_mps, time_s, self.faster_mps2, 1.0)
 
     def least(self, speed_mps: float, time_s: Array) -> Array:
-        """(n,) the same, at least."""
+        """(n,) least speed at even times (n,) after the given speed, or before it."""
         return self._followed(speed_mps, time_s, self.slower_mps2, -1.0)
 
     def reversed(self) -> SpeedChanges:
-        """The same backwards in time."""
+        """The changes backwards in time."""
         return SpeedChanges(
             edges_mps=self.edges_mps,
             until_s=self.until_s,

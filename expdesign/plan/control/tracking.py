@@ -35,7 +35,7 @@ class Reference:
         seal(self, states="k 6")
 
     def at(self, sample: Array) -> Array:
-        """(n, 6) at fractional samples (n,)."""
+        """(n, 6) reference at fractional samples (n,)."""
         return self._between(self._rows, sample)
 
     def velocity_at(self, sample: Array) -> Array:

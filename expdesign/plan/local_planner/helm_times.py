@@ -123,14 +123,14 @@ def _between(table: Array, low: float, high: Array) -> Array:
 
 
 def _speeding_up(ship: HelmShip) -> Array:
-    """(k, 3) from rest to transit speed, full ahead as fast as the engines answer."""
+    """(k, 3) motion from rest to transit speed, full ahead as fast as the engines answer."""
     approach = ship.approach
     speed = np.hypot(*full_ahead(approach)[:, 3:5].T)
     return _table(speed, approach.helm.vessel.sample_time_s, ship.transit_speed_mps)
 
 
 def _stopping(ship: HelmShip) -> Array:
-    """(k, 3) from transit speed to rest, backwards in time."""
+    """(k, 3) motion from transit speed to rest, backwards in time."""
     approach = ship.approach
     vessel = approach.helm.vessel
     speed = np.hypot(*stopped(vessel, ship.transit_speed_mps).velocity[::-1, :2].T)

@@ -164,7 +164,7 @@ class SearchSpace:
         return found
 
     def refusing(self, before: str, placement: Placement) -> SearchSpace:
-        """The same space after a leg to, or a run from, a placement failed: not there again, and more run-up."""
+        """The space without a placement to which a leg failed, or from which a run did, and with more run-up."""
         pair = (before, placement.primitive)
         grown = {**self.run_up, pair: self.run_up.get(pair, 0.0) + 0.5}
         return replace(self, run_up=grown, refused=np.vstack([self.refused, placement.pose]))

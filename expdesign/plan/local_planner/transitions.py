@@ -37,7 +37,7 @@ def pairs_of(placements: Sequence[Placement]) -> list[Pair]:
 def with_transitions(
     space: SearchSpace, ship: AgileShip, times: LegTimes, pairs: Sequence[Pair], trials: TransitionTrials
 ) -> SearchSpace:
-    """The same space with transitions of pairs that had none, as far as the budget goes.
+    """The space with transitions of pairs that had none, as far as the budget goes.
 
     Each is optimised on its own. Their work is counted in the order of the pairs, so the result does not depend on the
     number of processes.

@@ -185,7 +185,7 @@ class Fleet:
         return state
 
     def _one_by_one(self, given: Array) -> Array:
-        """The same by compiled steps, the quicker way for few ships."""
+        """The states a sample later by compiled steps, the quicker way for few ships."""
         from expdesign.simulation._casadi import compiled_sample  # CasADi is loaded when a motion is integrated
 
         sample = compiled_sample(self.vessel.model, rows=len(given), substeps=len(self._shares))

@@ -82,7 +82,7 @@ class Table:
         return rows_in_words(np.flatnonzero(wrong) + self.first_row)
 
     def noted(self, *notes: str) -> Table:
-        """The same with more notes."""
+        """The table with more notes."""
         return replace(self, notes=(*self.notes, *notes))
 
 

@@ -53,7 +53,7 @@ def planned_everywhere(runs: Sequence[Run]) -> bool:
 
 
 def with_one_source(runs: Sequence[Run]) -> tuple[Run, ...]:
-    """The same with planned rudders in all or in none."""
+    """Runs with planned rudders in all of them or in none."""
     return tuple(runs) if planned_everywhere(runs) else tuple(replace(run, planned=None) for run in runs)
 
 

@@ -229,7 +229,7 @@ def _sizes(pendulum: RollPendulum, stated: Array, causes: tuple[str, ...]) -> It
 
 
 def _coefficients(pendulum: RollPendulum, stated: Array, causes: tuple[str, ...], x: Array) -> Array:
-    """(5,) with the causes at these sizes; a load adds a moment [kg m] and an inertia A2 [kg m2]."""
+    """(5,) coefficients with the causes at these sizes; a load adds a moment [kg m] and an inertia A2 [kg m2]."""
     theta, moment, inertia, numbers = np.array(stated), 0.0, 0.0, iter(x.tolist())
     for cause in causes:
         if cause == LOAD:

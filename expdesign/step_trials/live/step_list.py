@@ -35,7 +35,7 @@ class Listed:
     why: str = ""
 
     def failed(self, why: str) -> Listed:
-        """The same after an attempt that failed."""
+        """The step after an attempt that failed."""
         return replace(self, attempts=self.attempts + 1, why=why)
 
 
@@ -89,7 +89,7 @@ class StepList:
         )
 
     def _width(self) -> Array:
-        """(2,) of throttle and rudder."""
+        """(2,) widths of throttle and rudder."""
         levels = np.array([self.start, *(step.after for step in self.steps)])
         ranges = np.ptp(commands_of(self.controls, self.names, levels), axis=0)
         return np.asarray(TUNING.constant_share * ranges + 1e-9)

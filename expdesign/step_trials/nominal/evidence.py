@@ -33,7 +33,7 @@ class States:
     inputs: Array
 
     def through_water(self, course: Array, to_mps: Array) -> States:
-        """The same through water that moves to north and east (n, 2), at mean headings' cosines and sines (n, 2)."""
+        """The evidence in water that moves to north and east (n, 2), at mean headings' cosines and sines (n, 2)."""
         ahead = (course * to_mps).sum(axis=1)
         starboard = course[:, 0] * to_mps[:, 1] - course[:, 1] * to_mps[:, 0]
         return replace(self, state=self.state - np.stack([ahead, 0.0 * ahead], axis=1), sway=self.sway - starboard)
@@ -81,7 +81,7 @@ class Evidence:
         return int(self.record.max(initial=0)) + 1
 
     def without_sway(self) -> Evidence:
-        """The same, had sway not been measured."""
+        """The evidence as if sway had not been measured."""
         unknown = [replace(part, sway=np.full(len(part.sway), np.nan)) for part in (self.steady, self.middle)]
         std = self.steady_std * [1.0, np.inf, 1.0]
         return replace(self, steady=unknown[0], middle=unknown[1], steady_std=std)

@@ -293,7 +293,7 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
 
 
 def shift_of(now: Watch) -> Array:
-    """(m,) by which the ship is known to have changed, in sizes."""
+    """(m,) known changes of the ship, in sizes."""
     return now.phase.state.shift if isinstance(now.phase, Watching) else np.zeros(len(now.changes))
 
 

@@ -29,7 +29,7 @@ def run_times(vessel: Vessel, request: PrimitiveSpec) -> Array:
 
 
 def steered(approach: Approach) -> Approach:
-    """The same approach.
+    """The approach, if its helm turns the vessel.
 
     Raises:
         InputError: the helm does not turn the vessel.
