@@ -66,13 +66,13 @@ def meaning(own: Moments) -> str:
         return CURRENT
     (air, water) = own.shares[0]
     return (
-        f"velocity over ground of wind and current as {water} feels them in d{own.of}/dt: the wind by the share of "
+        f"velocity over ground of wind and current combined, as {water} acts on them in d{own.of}/dt: the wind by the share of "
         f"{air} in the sum of both parameters, the current by that of {water}"
     )
 
 
 def _short(own: Moments) -> str:
-    return "water" if own.of == "current" else f"water and air, as {own.shares[0][1]} feels them"
+    return "water" if own.of == "current" else f"water and air combined, in {own.shares[0][1]}"
 
 
 def _moments_of(item: Assessed) -> tuple[Moments, ...]:
