@@ -21,10 +21,10 @@ INSTRUMENTAL = "iv"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbances:
-    """What an estimate and its data tell about current and wind.
+    """Current and wind: as estimated, and as measured.
 
     Attributes:
-        current: its moments, or None where the method does not tell them.
+        current: its moments, or None where the method does not estimate them.
         combined: of current and wind together, for equations in which they cannot be distinguished.
         wind: the measured one, or None where none is used.
     """

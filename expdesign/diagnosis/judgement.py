@@ -164,8 +164,8 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
 
     It does if it runs away where the model in use does not; if its mean fit in short stretches is less by more than
     `Tuning.most_loss_points`; and if it simulates some output of whole runs worse than a constant, while the model in
-    use simulates none so. A loss in whole runs short of that tells little: slow errors decide there, and a wrong model
-    may have the luck that they cancel.
+    use simulates none so. A smaller loss in whole runs is weak evidence: it depends on slow errors, which in a wrong
+    model may cancel by chance.
     """
     for length_s in (AHEAD_S, WHOLE_S):
         windows = cut_windows(ship.model, record, longest_s=length_s)

@@ -93,7 +93,7 @@ def information_floor(floor: InformationFloor) -> Objective:
     """A least information as a concave function that must not be negative: the log of its share of what is asked for.
 
     Raises:
-        FloorOutOfReach: equal shares tell nothing of it, so that no shares do.
+        FloorOutOfReach: equal shares have no such information, so that no shares do.
     """
     try:
         asked = LogTrace(floor.L * np.sqrt(floor.least))

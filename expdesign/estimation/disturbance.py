@@ -1,20 +1,20 @@
-"""What an estimate tells about current and wind: their means and second moments, from the nuisance parameters.
+"""Means and second moments of current and wind, from the nuisance parameters of an estimate.
 
 With a current (N, E) over ground, the term f(u, v) of a parameter theta leaves theta times a first moment E N or E E
 with cos psi and sin psi, and theta times a second moment with cos^2 psi and sin 2psi. The second moments are
 E N^2 - E E^2 and E N E; the sum of the squares is a constant, which zero-mean instruments do not see. So
 
 - the mean current is read from the linear damping: X_u (u - u_c) leaves -X_u times it with cos psi (north) and sin psi
-  (east), Y_v (v - v_c) leaves Y_v times it with sin psi (north) and -cos psi (east). Where both equations tell it, the
+  (east), Y_v (v - v_c) leaves Y_v times it with sin psi (north) and -cos psi (east). Where both equations have it, the
   readings are fused by their covariance;
 - its second moments are read from all parameters with cos^2 psi and sin 2psi, by least squares whose weights count
   that terms are uncertain, too. The mean's products taken off, they are its variance to north less that to east, and
   its covariance;
-- where the wind is not measured, terms of the air fall together with those of the water. Their common nuisance
-  parameters tell, equation by equation, a mean of the current and the wind, each by its share of the two parameters.
+- where the wind is not measured, terms of the air coincide with those of the water. Their common nuisance parameters
+  give, equation by equation, a mean of current and wind, weighted by the two parameters.
 
 First moments are too large by 1 / E cos(heading noise), second ones by 1 / E cos(2 heading noise), which is corrected.
-A measured wind is told by its samples.
+A measured wind has the moments of its samples.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.30)-(5.35), (7.61); for sway and yaw derived alike.
 """

@@ -23,7 +23,7 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Offers:
-    """Runs that may be added to a trial, and what they tell.
+    """Runs that may be added to a trial, with their information.
 
     Attributes:
         names: (q,) of the manoeuvres.

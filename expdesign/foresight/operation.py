@@ -112,7 +112,7 @@ class OperationForesight:
         voyage_s: length of the voyages [s].
         nominal: voyages without a change; false_alarms: of them with an alarm.
         false_alarm_days: average time between false alarms that the threshold allows at most [d].
-        watched: changes that the reference tells well enough; not_watched: the others, in words.
+        watched: changes that the reference determines well enough; not_watched: the others, in words.
         reference_s: length of the reference [s].
     """
 
@@ -274,7 +274,7 @@ def foresee_operation(
         progress: of the simulations.
 
     Raises:
-        NotInformative: the reference tells nothing.
+        NotInformative: the reference has no information.
         Diverged: the ship cannot sail such voyages.
     """
     stretch_s, length_s = stretch_length(vessel.length_m), 3600.0 * hours

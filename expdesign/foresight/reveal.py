@@ -1,8 +1,8 @@
-"""What durations must tell a diagnosis: least information about causes, linear in the time of every manoeuvre.
+"""Least information about causes that durations must give a diagnosis, linear in the time of every manoeuvre.
 
 The noncentrality of a cause's test is a Schur complement of an information matrix that is linear in the durations, so
-that a least noncentrality is a convex constraint. To tell one cause from another, the noncentrality that is left where
-the other one is free too must be large enough: locally T-optimality, as a constraint.
+that a least noncentrality is a convex constraint. To distinguish one cause from another, the noncentrality that is left
+while the other one is estimated too must be large enough: local T-optimality, as a constraint.
 
 Sources: F. Pukelsheim, Optimal Design of Experiments (2006), 3.2; A. C. Atkinson and V. V. Fedorov, Biometrika 62
 (1975), 57-70, for T-optimality; R. D. Cook and W. K. Wong, J. Amer. Statist. Assoc. 89 (1994), 687-692: a constrained
@@ -42,7 +42,7 @@ NOT_BY_RUNS = ("change_point",)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wanted:
-    """One effect that a trial must reveal, or tell from another.
+    """One effect that a trial must reveal, or distinguish from another.
 
     Attributes:
         cause, effect: names.

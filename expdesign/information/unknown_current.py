@@ -71,7 +71,7 @@ def beside_current(whole: Array, parameters: int) -> Array:
         parameters: number p of them; d - p means follow, then the current.
 
     Concave in `whole`, and zero between parameters and means, as both are eliminated at once: in data with one heading
-    the current cannot be told from the means.
+    current and means cannot be distinguished.
     """
     p, d = parameters, len(whole) - len(STEADY_CURRENT)
     left = np.zeros((d, d))

@@ -6,7 +6,7 @@
 Data are cut into short stretches. Each is simulated from a free initial state under an unmeasured force with the
 covariance that the reference shows. The error of the simulation, compared with its sensitivities to every change that
 is watched for, gives the score and the information of the stretch. Sums of log-likelihood ratios of these changes,
-begun anew whenever they fall below zero, raise the alarm (CUSUM). Stretches that tell nothing, as in steady transit,
+begun anew whenever they fall below zero, raise the alarm (CUSUM). Stretches without information, as in steady transit,
 add nothing to the sums.
 
 Sources: E. S. Page, Biometrika 41 (1954), 100-115; G. Lorden, Annals of Mathematical Statistics 42 (1971), 1897-1908;

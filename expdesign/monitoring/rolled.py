@@ -3,7 +3,7 @@
 The reference gives the parameters of the roll equation, piece by piece, weighted by their covariances. Every later
 piece is judged against it (`roll.record`), at a chance of a false alarm that is its share of the time asked for. After
 an alarm the next piece settles the size, and is the new reference. After a port call the ship may carry another load:
-what the next piece tells is no alarm, and the new reference.
+the next piece raises no alarm, and is the new reference.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class RollWatch:
     """What is known of roll, from piece to piece.
 
     Attributes:
-        free: names of the parameters that pieces tell.
+        free: names of the parameters that are estimated from pieces.
         mean, covariance: (p,), (p, p) of the reference; none before the first piece.
         called: whether a port call came after the last piece.
         judged_s, left_out_s: of the data, judged or not [s]; learnt_s, of the references.

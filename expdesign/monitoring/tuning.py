@@ -29,7 +29,7 @@ class Tuning:
         as_likely: difference of log-likelihood up to which another change explains the data as well.
         settled: information, in inverse squared sizes, from which a change is settled; patience: factor of it where
             other changes explain the data as well.
-        known_within: a change is watched for where the reference tells its size so many times better than the size.
+        known_within: a change is watched for where its size is so many standard errors of the reference.
         quick_s, slow_s: correlation times of the unmeasured force: first guess of the quick one, and the slow one [s].
         spare: variance of the slow part beside what the reference shows, as a multiple of it and by the number of times
             `slow_s` that the reference covers.

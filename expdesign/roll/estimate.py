@@ -131,10 +131,10 @@ class RollEstimate:
         sensed: (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters.
         rounds: (r, 9) parameters after each round of spectra.
         settled: whether the last round changed little.
-        strength: of the instruments, what they tell of the worst combination of parameters over what noise alone would
-            seem to tell; nan for least squares.
+        strength: of the instruments: their information about the least certain combination of parameters over what
+            noise alone would give; nan for least squares.
         surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
-        unanswered: how often a rudder that answers nothing goes with what rolls the ship as much as this one, 0 to 1;
+        unanswered: chance that a rudder without feedback correlates with the roll moment as much as this one, 0 to 1;
             nan for least squares and a ship that does not stay upright.
         freedom: degrees of freedom of the noise's power, of the case with the fewest, at each frequency.
     """
@@ -252,7 +252,7 @@ def _surprise(left: Array, fitted: int) -> float:
 
 
 def _held(problem: RollProblem) -> tuple[str, ...]:
-    """Free parameters without which the rest has a rank as large, those first that other trials tell."""
+    """Free parameters without which the rank stays as large; first those that other trials can give."""
     generic = np.where(np.abs(problem.start) > 0.01 * problem.scale, problem.start, problem.scale)
     loads, kept = [case.load for case in problem.cases], list(problem.free)
 

@@ -1,13 +1,13 @@
-"""Whether the rudder answers what rolls the ship, which no instrument from the rudder allows.
+"""Whether the rudder answers the moment that rolls the ship, as then no instrument comes from the rudder.
 
-Noise of the equation knows nothing of a rudder that was set beforehand, neither of what it did nor of what it will do.
-A rudder that answers roll goes with the noise somewhat later:
+Noise of the equation is independent of a rudder that was set beforehand, at earlier and at later times. A rudder that
+answers roll correlates with the noise of somewhat earlier times:
 
     h = sum over cases of W' (y - X c(theta)),          W: changes of the rudder some time later, weighed as instruments
 
 With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h is distributed as chi-square if nothing
-answers. Changes, as the equation takes them: the rudder itself would weigh frequency zero most, where noise has its
-zero and no spectrum tells how much is left.
+answers. Changes of the rudder are used, as in the equation: the rudder itself would weigh frequency zero most, where
+the noise is zero and its spectrum cannot be estimated.
 
 Source: L. Ljung, System Identification (1999), 16.6, for residuals that go with later inputs; L. P. Hansen,
 Econometrica 50 (1982), 1029-1054, for the covariance of moments at an estimate.

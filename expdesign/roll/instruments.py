@@ -1,10 +1,9 @@
-"""Instruments: what the ship would have done by the rudder alone, without noise and waves.
+"""Instruments: the motion that the rudder alone would have caused, without noise and waves.
 
-The rudder moves sway, yaw and roll in ways that nobody models: black boxes from rudder to each signal tell what it
-does. Where a helm answers the ship, the rudder that was planned takes its place, and the rudder is one of the signals.
-A box that is fitted to the noise among which it is used makes instruments that follow this noise, and intervals that
-are too short; so the record is split into parts, and each has the boxes that the others were fitted to. Errors of the
-boxes then cost accuracy, not consistency.
+Black boxes from the rudder to each signal model how it moves sway, yaw and roll. Where a helm answers the ship, the
+rudder that was planned takes its place, and the rudder is one of the signals. A box that is fitted to the noise among
+which it is used makes instruments that follow this noise, and intervals that are too short; so the record is split into
+parts, and each has the boxes that the others were fitted to. Errors of the boxes then cost accuracy, not consistency.
 
 Source: doctoral thesis on grey-box identification of roll with few sensors, algorithm 5.1, step A; J. D. Angrist, G. W.
 Imbens and A. B. Krueger, J. Applied Econometrics 14 (1999), 57-67, for instruments fitted elsewhere. The simulation of

@@ -1,8 +1,9 @@
-"""Roll of a ship with a load, as an equation between what an inertial sensor and the rudder tell.
+"""Roll of a ship with a load, as an equation between the readings of an inertial sensor and the rudder.
 
     A1 phi'' = -(k + g S1) phi - d phi' + (K_vd + S1) v' + (K_ur + S1) U r + K_delta delta + tau
 
-With the reading a_s = z_s phi'' + g phi - v' - U r of an accelerometer (to port) the sway, which nobody measures, goes:
+With the reading a_s = z_s phi'' + g phi - v' - U r of an accelerometer (to port) the sway, which is not measured, is
+eliminated:
 
     A2 phi'' = -(k - K_vd g) phi - d phi' - (K_vd + S1) a_s + K_r r + K_delta delta + tau,    K_r = (K_ur - K_vd) U
     A2 = A_x + M z_g (z_g - z_s) + m z_m (z_m - z_s) - K_vd z_s

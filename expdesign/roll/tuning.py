@@ -35,12 +35,13 @@ class Tuning:
         most_rounds: of instruments and noise models.
         settled: change in a round, in standard deviations of each parameter, that ends them.
         most_surprise: least sum of squares over its expected value, beyond which intervals are not to be trusted.
-        least_strength: of instruments, below which noise alone would seem to tell as much, and no interval is trusted.
+        least_strength: of instruments, below which noise alone would give as much information, and no interval is
+            trusted.
         leads: to which the rudder is looked at, up to a period of roll later, to see whether it answers.
         least_unanswered: chance of an estimate whose rudder answers nothing, below which it is said to answer.
         unseen: relative sensitivity below which the equations themselves leave a direction open.
         open_sizes: change along an open direction that is counted with, in sizes of the parameter that it moves most.
-        faint_std: relative standard deviation along a direction from which data are said not to tell it.
+        faint_std: relative standard deviation along a direction from which data are said not to determine it.
         small_share: of a direction's largest relative change, below which a parameter is not named.
     """
 

@@ -184,7 +184,7 @@ class VesselModel:
         return np.concatenate(kept)[:count]
 
     def share_in_range(self) -> float:
-        """The share of the normal prior that is within `parameter_range`, of as many draws as tell it to 1 %."""
+        """The share of the normal prior that is within `parameter_range`, to about 1 %."""
         drawn = self._normal_parameters(SHARE_DRAWN, np.random.default_rng(0))
         return float(self._in_range(drawn).mean())
 

@@ -134,8 +134,8 @@ def _mixed(point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> tu
 def unit(problem: Problem, states: Array) -> float:
     """The cost of a squared standard deviation of the estimate; 1 for white residuals of the variance of the weights.
 
-    Residuals with correlation rho from sample to sample tell (1 - rho) / (1 + rho) as much as white ones: errors of a
-    simulation last for hundreds of samples. The least correlated output counts.
+    Residuals with correlation rho from sample to sample have (1 - rho) / (1 + rho) of the information of white ones:
+    errors of a simulation last for hundreds of samples. The least correlated output counts.
     """
     residuals = problem.residuals(states)
     power = np.einsum("lwn,lwn->n", residuals, residuals)

@@ -1,4 +1,4 @@
-"""What a diagnosis tells of roll: sentences, JSON, and the vessel that it leaves."""
+"""Roll in a diagnosis: sentences, JSON, and the vessel with the changes found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Current and wind that estimates and their data tell: as entries of estimate.json, and as tables."""
+"""Current and wind, estimated and measured: as entries of estimate.json, and as tables."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HEADER = (
 
 
 def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
-    """One entry for each disturbance that a method tells; empty where it tells none."""
+    """One entry for each disturbance that a method estimates; empty where it estimates none."""
     found = item.disturbances
     steady = item.method.estimates_steady_current
     entries = [_moments_entry(own, steady=steady) for own in _moments_of(item)]
@@ -38,7 +38,7 @@ def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
 
 
 def disturbance_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: one for each disturbance that a method tells."""
+    """Header and rows: one for each disturbance that a method estimates."""
     rows = []
     for item in found.methods:
         for own in _moments_of(item):
@@ -66,8 +66,8 @@ def meaning(own: Moments) -> str:
         return CURRENT
     (air, water) = own.shares[0]
     return (
-        f"velocity over ground of wind and current combined, as {water} acts on them in d{own.of}/dt: the wind by the share of "
-        f"{air} in the sum of both parameters, the current by that of {water}"
+        f"velocity over ground of wind and current combined, as {water} acts on them in d{own.of}/dt: the wind by the "
+        f"share of {air} in the sum of both parameters, the current by that of {water}"
     )
 
 

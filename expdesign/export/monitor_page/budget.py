@@ -1,4 +1,4 @@
-"""What each term of the model contributes in every kind of stretch, and how soon such stretches tell a change.
+"""What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
 
 Source of the idea: a master's thesis on the estimation of a ship's yaw dynamics in operation, section on the influence
 of terms (absolute contributions beside each other, by manoeuvre).

@@ -248,7 +248,7 @@ def _signed(seconds: float) -> str:
 
 
 def found_sentence(day: ShortestDay) -> str:
-    """What the day is the best of, and how much it tells."""
+    """What the day is the best of, and its information."""
     tried = words.counted(len(day.tried), "day")
     if day.most_s is not None:
         return (

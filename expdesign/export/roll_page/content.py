@@ -91,7 +91,7 @@ def scaled_rows(content: RollContent) -> list[tuple[str, ...]]:
 
 
 def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
-    """What would tell apart what is not, the best first."""
+    """What would determine the open directions, the best first."""
     count = len(content.report.free)
     return [(one.what, str(count - one.rank), f"{one.smallest:.1e}") for one in content.report.cures]
 

@@ -31,7 +31,7 @@ def time_figure(content: WhatIfContent) -> str:
 
 
 def day_figure(content: WhatIfContent) -> str | None:
-    """Length of the day against what its whole track tells, a point for each case; None where no day is known."""
+    """Length of the day against the information of its whole track, a point a case; None where no day is known."""
     known = [(case, against.track) for case in content.cases if (against := content.against(case)) and against.track]
     if not known:
         return None

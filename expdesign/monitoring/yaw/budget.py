@@ -14,13 +14,13 @@ RANK_TOLERANCE = 1e-6
 
 
 def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> dict[str, Array]:
-    """Parameter -> (n, k) moment of its term [Nm] along the measured motion; the largest name what a voyage tells."""
+    """Parameter -> (n, k) moment of its term [Nm] along the measured motion."""
     values = model.terms(data)
     return {name: parameters[name] * values[..., place] for place, name in enumerate(model.parameters[1:])}
 
 
 def excitation_rank(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> int:
-    """Number of parameters that one voyage tells apart: rank of the sensitivities of the simulated yaw rate."""
+    """Number of parameters that one voyage determines: rank of the sensitivities of the simulated yaw rate."""
     scale = np.array([abs(parameters[name]) for name in model.parameters])
     values = np.array([parameters[name] for name in model.parameters])
     columns = simulate_yaw(model, data, values)[1][0] * scale

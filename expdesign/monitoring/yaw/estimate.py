@@ -189,7 +189,7 @@ def _pooled(pool: Array, A: Array, B: Array) -> Array:
 def halves_differ(one: YawEstimate, other: YawEstimate, *, factor: float = 3.0) -> Array:
     """(n, p) parameters of two halves of a voyage that differ by more than a factor, or in sign.
 
-    Where they do although both halves are fitted alike, the voyage does not tell these parameters.
+    Where they do although both halves are fitted alike, the voyage does not determine these parameters.
     """
     a, b = one.parameters, other.parameters
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -46,7 +46,7 @@ def for_room(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
 def _clearances(problem: PlanProblem, water: LegWater, space: RunSpace, lacking: set[str]) -> Iterator[Change]:
     """Shares of the largest clearance with which every run has a place by itself.
 
-    The grid tells distances to the shore, whatever the clearance, and room for runs only grows as that falls.
+    The grid holds distances to the shore for any clearance, and a smaller clearance only leaves more room.
     """
     asked = problem.settings.clearance_m
     off_m = dispersions(problem)

@@ -30,9 +30,9 @@ def realised_efficiencies(
     By the design's criterion and the nominal model, of the information collected, not per second. What the runs lose
     against the design's whole runs is due to their places: headings in wind, and entries that a leg reached within its
     tolerance. What the whole trial has more is due to its legs; above 1 where they add more than rounding and places
-    take. A steady current that the forecast leaves unknown is estimated along; the optimum is for runs of any heading,
-    which tell the same then. None where the design has nuisance regressors, recorded primitives, or samples of each
-    equation's own: of these the track says nothing.
+    take. A steady current that the forecast leaves unknown is estimated too; the optimum is for runs of any heading,
+    whose information is then the same. None where the design has nuisance regressors, recorded primitives, or samples
+    of each equation's own: their information is not that of the track.
     """
     problem = replace(design.problem, robust="nominal", sampled=np.zeros((0, 0, 0, 0)))
     known = set(problem.parameters) <= set(vessel.model.names) and problem.excitation == "free"
@@ -51,8 +51,8 @@ def realised_efficiencies(
 def track_information(vessel: Vessel, problem: DurationProblem, environment: Environment, sailed: SailedTrial) -> Array:
     """(legs, d, d) information of each leg of a trial: sums over its samples, bordered as B_q.
 
-    Where the forecast leaves a steady current unknown, it is (legs, d + 2, d + 2), about the current, too. What a sum
-    of them tells of the ship is `about_ship`.
+    Where the forecast leaves a steady current unknown, it is (legs, d + 2, d + 2), about the current, too. `about_ship`
+    reduces a sum of them to the ship's parameters.
     """
     names, mean = problem.parameters, problem.mean_subtraction
     commands = delivered(vessel, sailed.commands)
@@ -69,7 +69,7 @@ def track_information(vessel: Vessel, problem: DurationProblem, environment: Env
 
 
 def about_ship(problem: DurationProblem, information: Array) -> Array:
-    """(d, d) what information (d, d), or with an unknown current (d + 2, d + 2), tells of the ship."""
+    """(d, d) information about the ship in information (d, d), or (d + 2, d + 2) with an unknown current."""
     if len(information) == problem.dimension:
         return information
     return beside_current(information, len(problem.parameters))

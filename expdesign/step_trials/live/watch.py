@@ -50,7 +50,7 @@ def beginning(setup: Setup) -> State:
 
 
 def after_row(state: State, row: Row, setup: Setup) -> StateAndEvents:
-    """State after one more row, and what it gives to tell."""
+    """State after one more row, and the events that it causes."""
     if not state.left:
         return state, ()
     if state.held is not None and row.time_s <= state.held.rows[-1].time_s:

@@ -2,9 +2,9 @@
 
 Sway makes the yaw rate begin faster than a first order response, which makes the dead time of one too short. All
 responses have one shape instead, second order with a zero, each stretched in time, as the time constants of a hull go
-with length over speed (K. Nomoto et al., Int. Shipbuilding Progress 4, 1957). One step in noise cannot tell a dead time
-from a shape, all together can, with what is known of hulls in general: their T3 is less than T1 + T2 and their poles
-are real, or nearly so. The plateaus are estimated beside it, within their standard errors.
+with length over speed (K. Nomoto et al., Int. Shipbuilding Progress 4, 1957). One step in noise cannot separate dead
+time and shape. All steps together can, with a prior on hulls in general: T3 is less than T1 + T2, and the poles are
+real or nearly so. The plateaus are estimated too, within their standard errors.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What accuracy costs: the days planned, by their length and by what their tracks tell."""
+"""What accuracy costs: the days planned, by their length and the information of their tracks."""
 
 from __future__ import annotations
 
