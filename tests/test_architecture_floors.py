@@ -74,7 +74,7 @@ FLOORS = {
         ("feasibility",),
         ("assembly", "checked"),
         ("sailing",),
-        ("remedies",),
+        ("remedies", "replanning"),
         ("solve",),
     ),
     "workflows": (

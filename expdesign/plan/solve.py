@@ -16,11 +16,8 @@ from expdesign.plan.assembly import (
     check_connected,
     check_start,
     confidence_of_run,
-    dispersions,
-    footprints,
     phases_of,
     roomy_water,
-    search_space,
     ship_on_legs,
     top_mps,
     waters,
@@ -31,18 +28,22 @@ from expdesign.plan.checked import drawn_lateness_s, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
-    Trials,
     failed_chance_constraint,
-    trials_needed,
-    violates_chance_constraint,
-    worst_leg,
 )
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised
+from expdesign.plan.replanning import (
+    Refused,
+    not_again,
+    replanning_progress,
+    too_risky,
+    with_more_room,
+    worth_replanning,
+)
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Leg, Plan, RiskEstimate, SailedTrial, Verification
+from expdesign.plan.values import Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
@@ -107,11 +108,11 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
     made = list[Refused]()
     for attempt in range(PLAN.replans + 1):
         if attempt:
-            before_s, progress = budget.spent_s, _replanning(progress)
+            before_s, progress = budget.spent_s, replanning_progress(progress)
             try:
                 sailed = sail_all(problem, room, progress, stated=water, budget=budget)
             except NoPlan as error:
-                raise _not_again(error, made) from None
+                raise not_again(error, made) from None
         checking = phases_of(problem, room.space.planner, progress).trials
         checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((verified,), (_bound_s,)))
@@ -122,13 +123,13 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
         budget.sailed(int(trials.samples.max(axis=1).sum()))
         made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed))
-        if not _worth_replanning(problem, risk, budget, attempt=attempt, before_s=before_s):
+        if not worth_replanning(problem, risk, budget, attempt=attempt, before_s=before_s):
             break
         try:
-            room = _wider(problem, room, trials, sailed.legs)
+            room = with_more_room(problem, room, trials, sailed.legs)
         except NoPlan as error:
-            raise _too_risky(problem, draft.room, made, f"; {error.obstacle}") from None
-    raise _too_risky(problem, draft.room, made)
+            raise too_risky(problem, draft.room, made, f"; {error.obstacle}") from None
+    raise too_risky(problem, draft.room, made)
 
 
 def _budget(problem: PlanProblem) -> WorkBudget:
@@ -213,115 +214,6 @@ def _drafted(
 
 def _check(problem: PlanProblem, water: LegWater, sailed: SailedTrial, check: Callable[..., Any]) -> Any:
     return check(problem, water, sailed)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Refused:
-    """A plan that is too risky.
-
-    Attributes:
-        sailed: commands, motion and legs.
-        risk, trials: by drawn trials.
-        failed: why it is refused.
-    """
-
-    sailed: SailedTrial
-    risk: RiskEstimate
-    trials: Trials
-    failed: str
-
-    @property
-    def place(self) -> Array | None:
-        """(2,) where most trials left allowed water, or None where none did."""
-        places = self.trials.place[worst_leg(self.trials)]
-        left = ~np.isnan(places[:, 0])
-        return np.median(places[left], axis=0) if left.any() else None
-
-    @property
-    def worst(self) -> str:
-        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
-        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
-        return self.sailed.legs[int(failing.argmax())].name
-
-
-def _worth_replanning(
-    problem: PlanProblem, risk: RiskEstimate, budget: WorkBudget, *, attempt: int, before_s: float
-) -> bool:
-    """Whether more room may help: once anyway, again where the budget is expected to be enough."""
-    leaving = violates_chance_constraint(risk, problem.settings.confidence)
-    expected_s = budget.spent_s + (budget.spent_s - before_s)
-    return leaving and attempt < PLAN.replans and (attempt == 0 or expected_s <= budget.most_s)
-
-
-def _too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: str = "") -> NoPlan:
-    """The refusal of plans of which too many drawn trials fail, with the confidence that accepts the first of them."""
-    last, best = made[-1], min(made, key=lambda plan: plan.risk.left)
-    again = f"; planned {len(made)} times, each with more room than before" if len(made) > 1 else ""
-    error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", place=best.place)
-    error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
-    error.poses = last.sailed.trajectory.pose
-    lower = _met(problem, made[0].risk)
-    if lower is not None and _accepts(problem, first, made[0], lower):
-        error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
-        return error
-    error.what, error.which = "risk", last.worst
-    if lower is not None:
-        words = "which the first plan would meet, but with which runs would get less room"
-        error.remedies = (f"not tried: plan.confidence = {lower:g}, {words}",)
-    return error
-
-
-def _met(problem: PlanProblem, risk: RiskEstimate) -> float | None:
-    """The lower confidence that a plan would meet; None where aborted trials are the reason, or far too many leave."""
-    lower = float(np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0)
-    return lower if PLAN.least_confidence <= lower < problem.settings.confidence else None
-
-
-def _accepts(problem: PlanProblem, first: PlanRoom, plan: Refused, confidence: float) -> bool:
-    """Whether the planner makes the first plan once more with a lower confidence, and accepts it."""
-    if trials_needed(confidence) != trials_needed(problem.settings.confidence):
-        return False
-    if failed_chance_constraint(plan.risk, plan.trials, plan.sailed.legs, problem.area, confidence=confidence):
-        return False
-    changed = replace(problem, settings=replace(problem.settings, confidence=confidence))
-    runs = footprints(changed, first.space.field, dispersions(changed))
-    return all(np.array_equal(a.room_m, b.room_m) for a, b in zip(runs, first.space.footprints, strict=True))
-
-
-def _not_again(error: NoPlan, made: list[Refused]) -> NoPlan:
-    """Where a plan with more room fails: what was wrong with the one before comes first."""
-    if made:
-        error.obstacle = f"the plan found is too risky: {made[0].failed}; made anew with more room: {error.obstacle}"
-        error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
-        error.poses = made[-1].sailed.trajectory.pose if error.poses is None else error.poses
-    return error
-
-
-def _wider(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...]) -> PlanRoom:
-    """More room where most trials leave the water: for that run, or for all legs.
-
-    Raises:
-        NoPlan: with more room there is no path at all.
-    """
-    worst, space = legs[worst_leg(trials)], room.space
-    if worst.kind == "primitive":
-        widened = tuple(
-            replace(run, room_m=PLAN.widening * run.room_m) if run.name == worst.name else run
-            for run in space.footprints
-        )
-        return replace(room, space=replace(space, footprints=widened))
-    clearance_m = room.water.clearance_m + (PLAN.widening - 1.0) * problem.vessel.length_m
-    water = replace(room.water, clearance_m=clearance_m)
-    try:
-        found = search_space(problem, water, space.planner)
-    except NoPlan:
-        raise NoPlan("there is no path to the goal with more clearance") from None
-    return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
-
-
-def _replanning(progress: Progress) -> Progress:
-    """Progress of a replan: most of the work is done, however much of it is to be repeated."""
-    return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
 
 
 def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> float:

@@ -14,7 +14,8 @@ from expdesign.errors import FileError
 from expdesign.plan.values import PlannerName, PlanSettings, UnderWay
 from expdesign.scenario.berth import berth_problem
 from expdesign.scenario.charts import Latitude, Longitude, load_area
-from expdesign.scenario.design_file import DesignTable, design_settings
+from expdesign.scenario.design_file import design_settings
+from expdesign.scenario.design_tables import DesignTable
 from expdesign.scenario.dictionaries import NAME, NAME_RULE, load_dictionary
 from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, check_table, read_toml, shown
 from expdesign.scenario.values import Scenario

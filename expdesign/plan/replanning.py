@@ -1,0 +1,137 @@
+"""Whether a plan that drawn trials leave is made anew, with which room, and why not any more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NoPlan
+from expdesign.plan.assembly import (
+    PlanRoom,
+    dispersions,
+    footprints,
+    search_space,
+)
+from expdesign.plan.monte_carlo import (
+    Trials,
+    failed_chance_constraint,
+    trials_needed,
+    violates_chance_constraint,
+    worst_leg,
+)
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.tuning import PLAN
+from expdesign.plan.values import Leg, RiskEstimate, SailedTrial
+from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refused:
+    """A plan that is too risky.
+
+    Attributes:
+        sailed: commands, motion and legs.
+        risk, trials: by drawn trials.
+        failed: why it is refused.
+    """
+
+    sailed: SailedTrial
+    risk: RiskEstimate
+    trials: Trials
+    failed: str
+
+    @property
+    def place(self) -> Array | None:
+        """(2,) where most trials left allowed water, or None where none did."""
+        places = self.trials.place[worst_leg(self.trials)]
+        left = ~np.isnan(places[:, 0])
+        return np.median(places[left], axis=0) if left.any() else None
+
+    @property
+    def worst(self) -> str:
+        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
+        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
+        return self.sailed.legs[int(failing.argmax())].name
+
+
+def worth_replanning(
+    problem: PlanProblem, risk: RiskEstimate, budget: WorkBudget, *, attempt: int, before_s: float
+) -> bool:
+    """Whether more room may help: once anyway, again where the budget is expected to be enough."""
+    leaving = violates_chance_constraint(risk, problem.settings.confidence)
+    expected_s = budget.spent_s + (budget.spent_s - before_s)
+    return leaving and attempt < PLAN.replans and (attempt == 0 or expected_s <= budget.most_s)
+
+
+def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: str = "") -> NoPlan:
+    """The refusal of plans of which too many drawn trials fail, with the confidence that accepts the first of them."""
+    last, best = made[-1], min(made, key=lambda plan: plan.risk.left)
+    again = f"; planned {len(made)} times, each with more room than before" if len(made) > 1 else ""
+    error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", place=best.place)
+    error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
+    error.poses = last.sailed.trajectory.pose
+    lower = _met(problem, made[0].risk)
+    if lower is not None and _accepts(problem, first, made[0], lower):
+        error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
+        return error
+    error.what, error.which = "risk", last.worst
+    if lower is not None:
+        words = "which the first plan would meet, but with which runs would get less room"
+        error.remedies = (f"not tried: plan.confidence = {lower:g}, {words}",)
+    return error
+
+
+def _met(problem: PlanProblem, risk: RiskEstimate) -> float | None:
+    """The lower confidence that a plan would meet; None where aborted trials are the reason, or far too many leave."""
+    lower = float(np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0)
+    return lower if PLAN.least_confidence <= lower < problem.settings.confidence else None
+
+
+def _accepts(problem: PlanProblem, first: PlanRoom, plan: Refused, confidence: float) -> bool:
+    """Whether the planner makes the first plan once more with a lower confidence, and accepts it."""
+    if trials_needed(confidence) != trials_needed(problem.settings.confidence):
+        return False
+    if failed_chance_constraint(plan.risk, plan.trials, plan.sailed.legs, problem.area, confidence=confidence):
+        return False
+    changed = replace(problem, settings=replace(problem.settings, confidence=confidence))
+    runs = footprints(changed, first.space.field, dispersions(changed))
+    return all(np.array_equal(a.room_m, b.room_m) for a, b in zip(runs, first.space.footprints, strict=True))
+
+
+def not_again(error: NoPlan, made: list[Refused]) -> NoPlan:
+    """Where a plan with more room fails: what was wrong with the one before comes first."""
+    if made:
+        error.obstacle = f"the plan found is too risky: {made[0].failed}; made anew with more room: {error.obstacle}"
+        error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
+        error.poses = made[-1].sailed.trajectory.pose if error.poses is None else error.poses
+    return error
+
+
+def with_more_room(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: tuple[Leg, ...]) -> PlanRoom:
+    """More room where most trials leave the water: for that run, or for all legs.
+
+    Raises:
+        NoPlan: with more room there is no path at all.
+    """
+    worst, space = legs[worst_leg(trials)], room.space
+    if worst.kind == "primitive":
+        widened = tuple(
+            replace(run, room_m=PLAN.widening * run.room_m) if run.name == worst.name else run
+            for run in space.footprints
+        )
+        return replace(room, space=replace(space, footprints=widened))
+    clearance_m = room.water.clearance_m + (PLAN.widening - 1.0) * problem.vessel.length_m
+    water = replace(room.water, clearance_m=clearance_m)
+    try:
+        found = search_space(problem, water, space.planner)
+    except NoPlan:
+        raise NoPlan("there is no path to the goal with more clearance") from None
+    return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
+
+
+def replanning_progress(progress: Progress) -> Progress:
+    """Progress of a replan: most of the work is done, however much of it is to be repeated."""
+    return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
