@@ -12,7 +12,7 @@ from expdesign.estimation.noise.parts import Slow, filtered
 from expdesign.estimation.noise.periodograms import expected_periodogram
 from expdesign.estimation.noise.score_covariance import score_covariance
 from expdesign.estimation.noise.timeline import stretches
-from expdesign.estimation.regression.predictors import build_layout, build_regression
+from expdesign.estimation.regression import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
 from expdesign.estimation.solve.sandwich import widening

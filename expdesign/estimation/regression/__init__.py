@@ -7,13 +7,10 @@ from expdesign.estimation.regression.predictors import (
     CURRENT,
     PREDICTORS,
     Layout,
-    Rows,
     build_layout,
-    build_regression,
-    headings_at,
-    room_for,
 )
 from expdesign.estimation.regression.regression import Integers, Mask, Regression, batch_slices, single_output
+from expdesign.estimation.regression.rows import Rows, build_regression, headings_at, room_for
 from expdesign.estimation.regression.tables import (
     AIR,
     VANE,
