@@ -130,7 +130,7 @@ class Waves:
 
 
 COMPONENTS, COURSES = 200, 36
-"""Of waves that are drawn, and over which encounter is averaged."""
+"""Number of drawn wave components, and of courses over which encounter is averaged."""
 
 
 POWERS = {

@@ -25,7 +25,7 @@ from expdesign.vessel import VesselModel
 NONE, PARAMETER_STD = "none", "parameter_std"
 PRIORS = (NONE, PARAMETER_STD)
 CONTRADICTED = 0.01
-"""Probability of a distance between prior and estimate from which a warning says that they contradict each other."""
+"""Probability of the distance between prior and estimate below which a warning says that they contradict each other."""
 
 
 def check_prior(model: VesselModel, name: str) -> None:

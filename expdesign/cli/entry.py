@@ -34,7 +34,7 @@ LISTS = (
 )
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data", "--reference")
-"""Those of them whose values are files."""
+"""Options of `LISTS` whose values are files."""
 DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
 
 

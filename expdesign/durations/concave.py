@@ -22,7 +22,7 @@ from expdesign.values import Array
 
 IDLE = "(unused time)"
 T = "T"
-"""Criterion that is about other parameters."""
+"""Name of the criterion that is about other parameters."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -50,7 +50,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 
 ENDLESS = 1e5
-"""Runs of every manoeuvre that stand for data without end."""
+"""Number of runs of every manoeuvre that stands for unlimited data."""
 
 
 def foresee(

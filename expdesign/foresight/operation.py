@@ -41,7 +41,7 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Vessel
 
 SIZES = (0.02, 0.05, 0.1, 0.2)
-"""Shares by which the ship changes."""
+"""Relative changes of the ship that are simulated."""
 REFERENCES, REFERENCE_S = 8, 7200.0
 """Voyages of the reference, and their length [s]."""
 LARGEST_ANGLE_RAD, LARGEST_TURN = 0.6, 0.3

@@ -23,7 +23,7 @@ from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
 from expdesign.vessel.sensors import NOISE
 
 KNOWN: Mapping[str, float] = {}
-"""Of what is known exactly."""
+"""No standard deviations: all times are known exactly."""
 
 
 def reduced(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:

@@ -37,7 +37,7 @@ from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
 
 Subset = tuple[int, ...]
-"""Numbers of pieces, rising."""
+"""Numbers of the chosen pieces, ascending."""
 Simulate = Callable[[Array], Array]
 """Parameters (p,) -> (m, n) mean square simulation error of every piece; raises Diverged."""
 

@@ -43,7 +43,7 @@ from expdesign.vessel import Vessel
 
 RANDOM = "random"
 GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
-"""From the heading of one run to that of the next."""
+"""Angle from the heading of one run to that of the next."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

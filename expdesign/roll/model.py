@@ -34,7 +34,7 @@ UNITS = {
 }  # fmt: skip
 """Parameter -> unit."""
 PARAMETERS = tuple(UNITS)
-"""In the order of all vectors of parameters, (9,)."""
+"""Names of the parameters, in the order of all their vectors (9,)."""
 MEANINGS = {
     "k": "restoring moment of hull and speed, without the weight's share g S1",
     "A_x": "roll inertia about the centre of mass, added inertia included",
@@ -52,7 +52,7 @@ FROUDE = {
 }  # fmt: skip
 """Parameter -> quantity of Froude's law that it scales as; kg m scales as a moment, as gravity does not change."""
 COEFFICIENTS = ("alpha1", "alpha2", "beta1", "kappa1", "gamma1")
-"""Of the continuous equation: d, k - K_vd g, -(K_vd + S1), K_r and K_delta, each over A2."""
+"""Coefficients of the continuous equation: d, k - K_vd g, -(K_vd + S1), K_r and K_delta, each over A2."""
 
 
 def parameters(**values: float) -> Array:

@@ -20,10 +20,10 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
 
 SHIPS = tuple(1 << power for power in reversed(range(8)))
-"""Ships in one function."""
+"""Number of ships in one function."""
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 LARGEST = 16_000
-"""Instructions in one function; in longer ones a step takes as much time."""
+"""Largest number of instructions in one function; in longer ones a step takes as much time."""
 
 
 class CompiledIntegrator:

@@ -21,7 +21,7 @@ from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
 STATES = 6
-"""Of a motion: pose and velocity."""
+"""Number of states of a motion: pose and velocity."""
 
 
 class RatesProgram:

@@ -15,7 +15,7 @@ from expdesign.step_trials.samples import Delays, StepSample, step_samples, with
 from expdesign.step_trials.tuning import TUNING
 
 SPEED_DEGREE = 3
-"""Of the polynomial in time that the speed follows during a response."""
+"""Degree of the polynomial in time that the speed follows during a response."""
 
 
 def samples_and_delays(

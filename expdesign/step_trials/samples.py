@@ -119,7 +119,7 @@ class StepSample:
 
 
 Delays = tuple[tuple[float, float], tuple[float, float]]
-"""Of throttle and rudder, two numbers each: bounds, or value and standard error [s]."""
+"""Dead times of throttle and rudder, two numbers each: bounds, or value and standard error [s]."""
 
 
 def step_samples(

@@ -28,7 +28,7 @@ from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 
 WAITING, TRANSIENT, STEADY = "waiting", "transient", "steady"
-"""Before the response is seen; while it lasts; after it."""
+"""States of a signal: before its response is seen, while it lasts, and after it."""
 
 
 @dataclass(frozen=True, kw_only=True)

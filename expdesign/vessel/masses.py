@@ -36,7 +36,7 @@ class Load:
 
 
 NOMINAL = Load(mass_kg=0.0, z_m=0.0)
-"""Nothing beside the ship."""
+"""No load besides the ship."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,7 @@ from expdesign.errors import NotInformative
 from expdesign.values import Array
 
 PER_SECOND_DIFFERENCE = np.sqrt(6.0)
-"""Standard deviation of second differences of white noise of one."""
+"""Standard deviation of second differences of white noise of unit variance."""
 
 
 def check_excitation(ship: ExtendedModel, windows: Windows) -> None:

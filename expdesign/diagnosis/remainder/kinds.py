@@ -21,9 +21,9 @@ from expdesign.vessel import stem
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 LAG_S = 4.0
 TIMES = 9
-"""Times at which something may begin, evenly over the data."""
+"""Number of times at which an effect may begin, evenly over the data."""
 SATURATED = (0.5, 0.75)
-"""Shares of an input's samples below the values from which on it may saturate."""
+"""Quantiles of an input at which it may saturate."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ ASIDE = (
     "v", "r", "u*v", "u*r", "v*abs(v)", "r*abs(r)", "abs(v)*r", "v*abs(r)", "v*v*v", "r*r*r", "v*v*r", "v*r*r",
     "u*u*v", "u*u*r", "u*v*abs(v)", "u*r*abs(r)",
 )  # fmt: skip
-"""Products of motion that port and starboard leave the same, and those that they turn round."""
+"""Products of motion that keep their sign when port and starboard are exchanged, and those that change it."""
 FACTORS = ("u", "abs(v)", "abs(r)", "u*u", "v*v", "r*r")
 """What may change the effect of an input."""
 SAME = 1e-9

@@ -19,7 +19,7 @@ from expdesign.values import Array
 WHITE, SENSOR = 0, 1
 """Places of the quick parts among the variances; slow ones follow."""
 MEMORIES = 2.0 ** np.arange(1, 11)
-"""Of the slow parts [samples]; as long as the longest stretch at most, and one that lasts for ever."""
+"""Memories of slow parts [samples], at most the longest stretch; one more part lasts for ever."""
 
 
 @dataclass(frozen=True)

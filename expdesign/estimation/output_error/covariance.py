@@ -36,7 +36,7 @@ from expdesign.signals import Record
 from expdesign.values import Array
 
 EVERY = -1
-"""In place of an output: all of them."""
+"""Key that stands for all outputs."""
 
 
 def with_covariance(

@@ -25,7 +25,7 @@ from expdesign.vessel import NUMPY, VesselModel
 STEADY_CURRENT = ("current to north", "current to east")
 """Names of the nuisance parameters [m/s]."""
 STEP_MPS = 1e-4
-"""Of the central difference, which is exact for terms of second order away from a modulus that changes its sign."""
+"""Step of the central difference, which is exact for terms of second order away from a change of sign of a modulus."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 
 HEADS = ("helm", "until the heading has changed by", "about, s")
-"""Of the columns of `heading_rows`."""
+"""Heads of the columns of `heading_rows`."""
 HELM_STEMS = ("rudder", "a")
 SIDES = ("starboard", "port")
 

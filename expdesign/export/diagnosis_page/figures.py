@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BINS, FEWEST = 16, 15
-"""Groups of samples, at most, and samples of each, at least."""
+"""Largest number of groups, and smallest number of samples in each."""
 ACCELERATION_AXES = {
     "u": ("u [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),
     "v": ("v [mm/s\N{SUPERSCRIPT TWO}]", 1000.0),

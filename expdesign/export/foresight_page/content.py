@@ -12,7 +12,7 @@ from expdesign.foresight import TOLD_APART, AddedRuns, Foreseen, Foresight
 
 NONE = "\N{EN DASH}"
 MOST_LISTED = 5
-"""Causes in a sentence."""
+"""Largest number of causes in a sentence."""
 HEADER = (
     "cause",
     "least visible as",

@@ -17,7 +17,7 @@ PRECISION_HEADER = ("parameter", "meaning", "value", "std before", "std after, a
 STEP_HEADER = ("load cases", "loads", "efficiency", "smallest relative sensitivity")
 
 HARDLY = 0.5
-"""Standard deviation over value, from which a parameter is said to be hardly told."""
+"""Relative standard deviation from which a parameter is said to be hardly determined."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,7 +10,7 @@ from expdesign.export.monitor_page.content import HOUR, MonitorContent
 from expdesign.export.pages.figures import BLUE, GREY, LINES, VERMILION, light_grid, new_figure, plain, svg
 
 SHOWN = 5
-"""Estimates drawn."""
+"""Largest number of estimates that are drawn."""
 
 
 def statistic_figure(content: MonitorContent) -> str:

@@ -12,7 +12,7 @@ from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
 Sides = tuple[float, float]
-"""To port and to starboard [m]."""
+"""Widths to port and to starboard [m]."""
 
 
 def sides_needed(points: Array, start: Array, end: Array) -> Sides:

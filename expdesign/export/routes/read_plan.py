@@ -30,7 +30,8 @@ EXPECTED = "a plan.json as expdesign plan and expdesign run write it"
 
 
 STATE_TOLERANCE = 1e-5
-"""Between plan.json, which has every digit, and track.csv, which has micrometres [m, rad, m/s, rad/s]."""
+"""Largest difference between plan.json, which has every digit, and track.csv, which has micrometres [m, rad, m/s,
+rad/s]."""
 
 
 DEGREE_TOLERANCE = 1e-7

@@ -15,7 +15,7 @@ from expdesign.export.tuning import TUNING
 from expdesign.rehearsal import Rehearsal, Validated
 
 CHANCE = 0.01
-"""By which a bias may be found where there is none."""
+"""Probability that a bias is reported where there is none."""
 ERROR_LIMIT = 1.5
 """Normalised error below which the thesis calls a trial good."""
 

@@ -12,7 +12,7 @@ from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
 DAY = ("day_s", "day_median_s", "day_95_s")
-"""Of a plan: everything between start and goal, as planned and in simulated trials."""
+"""Keys of a plan's length from start to goal, as planned and in simulated trials."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

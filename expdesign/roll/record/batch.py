@@ -15,7 +15,7 @@ from expdesign.values import Array
 from expdesign.vessel import IDEAL, Vessel
 
 NEEDED = ("roll_rate_radps", "imu_lateral_mps2")
-"""Columns beside r_radps and the rudder."""
+"""Columns needed besides r_radps and the rudder."""
 
 
 def missing_columns(batch: Batch) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ from expdesign.vessel.masses import G_MPS2, Load
 ALARM_P = 0.01
 """Chance that a change is reported where there is none."""
 ENOUGH_P = 0.01
-"""Of a rest beyond it where the cause is right."""
+"""Probability of a larger remainder where the cause is right, below which the cause is not accepted."""
 ALIKE = 6.0
 """Difference of sums of squares up to which two explanations cannot be distinguished."""
 MOST_CAUSES = 2

@@ -13,9 +13,9 @@ HALVINGS = 24
 DRIFT, MOST_DRIFT = 0.999, 0.99
 """Sine of the largest drift angle that is sought, and from which there counts as none."""
 NUDGE = 1e-4
-"""Of a velocity, for derivatives [m/s, rad/s]."""
+"""Step of a velocity, for derivatives [m/s, rad/s]."""
 LARGEST_ERROR = 1e3
-"""Of a steady state, in standard errors; more means that a model has none near by."""
+"""Largest error of a steady state, in standard errors; beyond it the model has none near by."""
 
 
 def compared(

@@ -15,15 +15,15 @@ from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
 MOST_STEPS = 60
-"""Of Gauss and Newton, between two enlargements of errors."""
+"""Largest number of Gauss-Newton steps between two enlargements of errors."""
 TIMES = 4
 """Errors of both dead times, and of both kinds of time constants by their definition."""
 FARTHEST = 5.0
-"""Of these at most, in standard deviations: steps far beyond lead where nothing changes any more."""
+"""Largest value of each of these errors, in standard deviations: steps far beyond have no effect."""
 CURRENT_STD_MPS = 0.2
-"""Of a steady current to north and to east, in each record a current of its own."""
+"""Standard deviation of a steady current to north and to east, a current of its own in each record."""
 ROUNDS = 4
-"""Of enlarging errors."""
+"""Largest number of enlargements of errors."""
 FORM_STD = 0.03
 """Relative error of what one time constant says about a response of another form; chosen from simulations."""
 

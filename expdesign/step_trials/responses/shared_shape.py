@@ -23,11 +23,11 @@ SHAPE_STD = (0.4, 0.5)
 """Logarithms of zeta and of T3/T0 of hulls, and their standard deviations; most hulls lie within two of these."""
 MOST_STEPS, TOLERANCE = 6, 1e-5
 WIDTH_S, POINTS, FINE = 0.8, 17, 801
-"""Of the grid of dead times, to both sides of those of first order responses, and of that between its points."""
+"""Width and points of the grid of dead times around those of first order responses, and points of the finer grid."""
 OWN = 3
 """Parameters of each step: logarithm of T0, errors of both plateaus in their standard errors."""
 MOST_LOG = 20.0
-"""Logarithm at most on the way: times beyond have no effect that a hold could show."""
+"""Largest logarithm during the search: longer times have no effect that a hold could show."""
 
 
 def shared_delay(steps: Sequence[Transient], *, most_s: float) -> tuple[float, float]:

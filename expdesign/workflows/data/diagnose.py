@@ -39,7 +39,7 @@ MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
 FEW_SAMPLES = 1000
-"""With up to so many, other processes take longer to start than they save."""
+"""Number of samples up to which other processes take longer to start than they save."""
 
 
 def diagnose(

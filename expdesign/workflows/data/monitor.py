@@ -50,7 +50,7 @@ from expdesign.workflows.steps.workers import workers
 
 STATE = "monitor-state.json"
 MOST_ROWS = 20_000
-"""Of a piece of a file."""
+"""Largest number of rows in a piece of a file."""
 WRITTEN_EVERY_S = 20.0
 """Time between writing files, from which a watch that is ended by force goes on [s]."""
 USUAL = {

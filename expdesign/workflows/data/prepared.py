@@ -18,9 +18,9 @@ from expdesign.workflows.data.watched_ship import VESSEL, ship_and_changes, ship
 from expdesign.workflows.steps.measured import measured
 
 FEWEST_LINES = 4
-"""Of a piece that is read."""
+"""Fewest lines of a piece that is read."""
 PIECE = "piece.csv"
-"""In notes; the name of a piece as a file."""
+"""Name of a piece as a file, in notes."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from expdesign.vessel import Vessel
 VESSEL = "vessel"
 YAW = {f"yaw-{name}": YAW_MODELS[name] for name in ("full", "simplified")}
 MODELS = (VESSEL, *YAW)
-"""Of --model."""
+"""Values of `--model`."""
 
 Ship = ExtendedModel | YawShip
 

@@ -36,11 +36,11 @@ from expdesign.vessel import Vessel
 from expdesign.workflows.data.prepared import PIECE, Asked, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
-"""From the end of a file to the beginning of the next, where that has times that begin again."""
+"""Time from the end of a file to the beginning of the next, where its times begin again [s]."""
 MOST_SAVED_ROWS = 7200
-"""Since a change, for a diagnosis."""
+"""Largest number of rows saved since a change, for a diagnosis."""
 MOST_MOMENTS = 1000
-"""Kept for the page."""
+"""Largest number of moments kept for the page."""
 HOUR, DAY = 3600.0, 86_400.0
 
 

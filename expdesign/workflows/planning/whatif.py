@@ -35,7 +35,7 @@ WHOLE_RUNS = "repeats"
 WORKED = 0.95
 """Share of the work that the cases are."""
 WORK = (0.5, 0.5, 10.0, 0.5)
-"""How long parts of a case take beside each other: scoring, sharing out time, planning, comparing criteria."""
+"""Relative times of the parts of a case: scoring, sharing out time, planning, comparing criteria."""
 
 
 def whatif(

@@ -32,9 +32,11 @@ from expdesign.workflows.steps.planned import plan_problem, planned
 from expdesign.workflows.steps.scored import scored
 
 FEW_CANDIDATES = 64
-"""Of every family at first, where [design.grow] does not say how many: the prices of each round lead to better ones."""
+"""Candidates of every family at first, where [design.grow] does not say how many; each round's prices lead to better
+ones."""
 LEG_SPEED = 0.95
-"""Of the top speed, where [plan] states none: what is saved against nine tenths is more than steering then loses."""
+"""Speed of legs as a share of the top speed, where [plan] states none: faster legs save more than steering then
+loses."""
 WORK = (0.2, 0.8)
 """Share of the work: the search for manoeuvres, and for the shortest day."""
 

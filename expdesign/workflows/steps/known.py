@@ -23,7 +23,7 @@ from expdesign.vessel import Vessel
 from expdesign.vessel.structures import SHOAL
 
 MATTERS = 1.05
-"""Runs are named for a parameter if its standard deviation without them is larger by this factor."""
+"""Factor of a parameter's standard deviation without some runs from which these are named for it."""
 
 
 def updated(

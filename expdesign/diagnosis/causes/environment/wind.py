@@ -13,7 +13,7 @@ from expdesign.diagnosis.causes.words import listed, rounded
 from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
 ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
-"""Of a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
+"""For a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
 AHEAD, ASIDE, TURNING = "term:W_abs_u_u", "term:W_abs_v_v", "term:W_uv"
 MOST_AHEAD = 2.0
 """Drag coefficient ahead over the one aside, at most: no ship shows the air more of her front than of her side, and her

@@ -20,7 +20,7 @@ from expdesign.vessel import Vessel
 
 STEP_FAMILIES = ("throttle_steps", "rudder_steps")
 USUAL_INTERVAL_S = 1.0
-"""Between rows of a list that has one row [s]."""
+"""Time between rows of a list that has one row [s]."""
 
 
 Listing = tuple[Array, Sequence[int | None] | None, float]
