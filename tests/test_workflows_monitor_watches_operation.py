@@ -90,7 +90,7 @@ def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_
     assert damping[1] > 3.0 * damping[0]
     thrust = steady["mean_accelerations"]
     assert thrust["gain"]["surge"] == pytest.approx(thrust["theta:X_mu"]["surge"])  # its one term of the actuators
-    assert "Which manoeuvres tell which change" in (watched / "monitor.html").read_text()
+    assert "Which manoeuvres reveal which change" in (watched / "monitor.html").read_text()
 
 
 @pytest.mark.usefixtures("no_page")

@@ -206,12 +206,12 @@ def roll_plan(
     most_loads: Annotated[
         int | None,
         typer.Option(
-            "--most-loads", metavar="N", min=1, help="At most N. Default: the fewest that tell nearly as much as all."
+            "--most-loads", metavar="N", min=1, help="At most N. Default: the fewest with nearly all information."
         ),
     ] = None,
     interest: Annotated[
         list[str] | None,
-        typer.Option("--interest", metavar="NAME ...", help="Parameters to be told best, e.g. m z_m. Default: all."),
+        typer.Option("--interest", metavar="NAME ...", help="Parameters to determine best, e.g. m z_m. Default: all."),
     ] = None,
     place: Annotated[
         bool,

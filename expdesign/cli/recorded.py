@@ -50,7 +50,7 @@ def estimate(
         str,
         typer.Option(
             metavar="HOW",
-            help="Instruments of all runs in one block, or batch: a block for each run, weighed by what it tells, "
+            help="Instruments of all runs in one block, or batch: a block for each run, weighted by its information, "
             "with --mean batch or none.",
         ),
     ] = "one",

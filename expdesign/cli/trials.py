@@ -228,9 +228,7 @@ def roll(
     ] = None,
     scale: Annotated[
         float | None,
-        typer.Option(
-            "--scale", metavar="S", help="Length of the ship by that of the model tried, to tell of the ship too."
-        ),
+        typer.Option("--scale", metavar="S", help="Ship length by model length, for results of the ship too."),
     ] = None,
     out: OutByData = None,
 ) -> Asked:

@@ -289,7 +289,7 @@ def foresee_operation(
     progress("learning from the reference", 0.16)
     calibration = calibrate(joined(parts))
     if not calibration.watched.any():
-        raise InputError("the voyages of the reference tell no change well enough to watch for it, with these sensors")
+        raise InputError("with these sensors the reference determines no change well enough to watch for it")
     limit = threshold(int(calibration.watched.sum()), false_alarm_days * DAY_S / stretch_s)
     kinds = [(item, size) for item in hidden for size in sizes]
     tasks: list[tuple[HiddenChange | None, float, int]] = [

@@ -134,7 +134,7 @@ def excitation_refusal(model: VesselModel, information: Sequence[PrimitiveInform
         if insides and failing:
             count = "all" if len(failing) == len(information) else f"{len(failing)} of {len(information)}"
             texts.append(f"d{output}/dt needs {' and '.join(insides)}, which {count} lack ({_listed(failing)})")
-    why = f": {'; '.join(texts)}" if texts else ", which all do; but they do not tell every parameter"
+    why = f": {'; '.join(texts)}" if texts else ", which all do; but they do not determine every parameter"
     whole = ", once clear, to the end of their excitation" if excitation == REQUIRED else ""
     return (
         f"design.excitation is {excitation!r} and needs manoeuvres that keep velocities inside absolute values clear "

@@ -185,8 +185,8 @@ def _check_rank(question: Question, options: Sequence[int]) -> None:
     helps = [one.what for one in better if one.rank == len(question.free)]
     advice = f"; what would: {'; or '.join(helps[:3])}" if helps else ""
     raise NotInformative(
-        f"no candidate load tells {len(left)} combination{'s' * (len(left) > 1)} of the parameters: the data would be "
-        f"the same if these changed together: {'; or: '.join(map(str, left))}{advice}",
+        f"no candidate load determines {len(left)} combination{'s' * (len(left) > 1)} of the parameters: the data "
+        f"would be the same if these changed together: {'; or: '.join(map(str, left))}{advice}",
         parameters=tuple(dict.fromkeys(name for one in left for name in one.change)),
     )
 

@@ -80,7 +80,7 @@ def inclining(
     if heel > MOST_HEEL_RAD:
         raise InputError(
             f"{mass_kg:g} kg shifted by {shift_m:g} m heel the ship by {math.degrees(heel):.0f} degrees, expected "
-            f"{math.degrees(MOST_HEEL_RAD):.0f} or less, where metacentric height tells the heel"
+            f"{math.degrees(MOST_HEEL_RAD):.0f} or less, up to which the heel follows from the metacentric height"
         )
     height_share = heel_std_rad / math.sqrt(shifts) / (math.sin(heel) * math.cos(heel))
     inertia = displacement_kg * G_MPS2 * metacentric_height_m * (period_s / (2.0 * math.pi)) ** 2

@@ -78,7 +78,7 @@ def _check(vessel: Vessel, pendulum: RollPendulum, option: LoadOption) -> None:
     if not (sensors.roll_rate_radps > 0 and sensors.acceleration_mps2 > 0):
         raise InputError(
             f"vessel {vessel.name!r} has sensors without noise, expected sensors.roll_rate_radps and "
-            "sensors.acceleration_mps2 above 0: they set what a run tells"
+            "sensors.acceleration_mps2 above 0: they set the information of a run"
         )
     if not pendulum.righting_nm > 0:
         raise NotInformative(

@@ -171,5 +171,6 @@ class DesignTable(Table):
     day_s: Positive | None = Field(
         default=None,
         description="plan the day of this length [s], everything between start and goal included, whose whole track "
-        "tells most by the criterion; total_s is then only what that is compared with; instead of [design.accuracy]",
+        "has the most information by the criterion; total_s then serves for comparison only; instead of "
+        "[design.accuracy]",
     )

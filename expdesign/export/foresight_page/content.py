@@ -106,12 +106,12 @@ def _sentences(found: Foresight) -> Iterator[str]:
     within = list(dict.fromkeys(item.cause for item in found.effects if item.needs_runs and item.within_std))
     if within:
         yield (
-            f"No data would show {', '.join(within)} at that size in every case: the standard deviations in the vessel "
-            "file allow as much."
+            f"No data would show {', '.join(within)} at that size in every case: it is within the standard "
+            "deviations in the vessel file."
         )
     pairs = list(dict.fromkeys((item.cause, other.cause) for item, other in found.not_told_apart))
     if pairs:
-        yield "It would find, but not tell apart: " + ", ".join(f"{one} from {other}" for one, other in pairs) + "."
+        yield "It would find, but not distinguish: " + ", ".join(f"{one} from {other}" for one, other in pairs) + "."
     if found.together is not None:
         more = runs_text(found.together)
         yield f"With {more} more, its tests would also accept what runs of this dictionary can show."

@@ -84,7 +84,7 @@ def _sentences(found: OperationForesight) -> Iterator[str]:
                 f"{item.likely} of them the alarm says that the right one explains the data as well."
             )
     if found.not_watched:
-        yield f"These sensors and voyages tell nothing of {', '.join(found.not_watched)}."
+        yield f"These sensors and voyages give no information about {', '.join(found.not_watched)}."
 
 
 def _named(item: Detectability) -> str:

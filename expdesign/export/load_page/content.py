@@ -117,13 +117,13 @@ def _sentences(content: LoadContent) -> Iterator[str]:
     )
     if plan.faintest.size > 0:
         yield (
-            f"Told worst is a change of all of these together: {plan.faintest}. The relative standard deviation along "
-            f"it is {1.0 / plan.faintest.size:.2g}."
+            f"Least determined is a change of all of these together: {plan.faintest}. The relative standard "
+            f"deviation along it is {1.0 / plan.faintest.size:.2g}."
         )
     values = np.abs(plan.question.theta[plan.question.places])
     hardly = [name for name, far in zip(plan.question.free, plan.std_after > HARDLY * values, strict=True) if far]
     if hardly:
-        yield f"Hardly told, with a standard deviation of half the value or more: {', '.join(hardly)}."
+        yield f"Hardly determined, with a standard deviation of half the value or more: {', '.join(hardly)}."
     if content.known:
         yield f"Not sought, as [known] gives them: {', '.join(content.known)}."
     if plan.design.note:

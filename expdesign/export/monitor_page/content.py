@@ -142,7 +142,7 @@ def _call(content: MonitorContent, call: Call) -> str:
     clear = np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE)
     text = f"A port call until {hours(call.time_s)} took {hours(call.stay_s)}. "
     if not clear.any():
-        return text + "The ship carries the same load afterwards, as far as the data tell."
+        return text + "The ship carries the same load afterwards, as far as the data show."
     parts = [
         f"{change.words} {change.in_words(value * change.size, std * change.size)}"
         for change, value, std, known in zip(content.changes, call.value, call.std, clear, strict=True)
@@ -210,7 +210,7 @@ def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
             (
                 change.words,
                 change.in_words(change.size).lstrip("+-"),
-                hours(delay_s(content, number)) if watched else "not watched: the reference tells too little",
+                hours(delay_s(content, number)) if watched else "not watched: the reference has too little information",
                 since,
                 ", ".join(alike(content, number)) if watched else "",
             )

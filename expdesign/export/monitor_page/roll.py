@@ -30,7 +30,7 @@ def _sentences(watch: RollWatch, days: float) -> Iterator[str]:
         )
     yield from (_event(event) for event in watch.events[-SHOWN:])
     if watch.left_out_s > watch.judged_s:
-        yield f"{watch.left_out_s / HOUR:.2g} h tell nothing of roll, the last for this: {watch.reason}."
+        yield f"{watch.left_out_s / HOUR:.2g} h give no information about roll; the last reason: {watch.reason}."
 
 
 def _event(event: RollEvent) -> str:

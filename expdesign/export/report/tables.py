@@ -252,9 +252,9 @@ def found_sentence(day: ShortestDay) -> str:
     tried = words.counted(len(day.tried), "day")
     if day.most_s is not None:
         return (
-            f"It tells most of {tried} planned to take at most {words.duration(day.most_s)}: its track, legs included, "
-            f"holds {words.percent(day.information)} of the information that the optimal durations would in "
-            f"{words.duration(day.design.problem.total_s)}."
+            f"It has the most information of {tried} planned to take at most {words.duration(day.most_s)}: its track, "
+            f"legs included, holds {words.percent(day.information)} of the information that the optimal durations "
+            f"would in {words.duration(day.design.problem.total_s)}."
         )
     return (
         f"It is the shortest of {tried} planned that is as accurate as asked for: its track, legs included, holds "

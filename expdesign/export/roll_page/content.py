@@ -128,7 +128,7 @@ def _sentences(content: RollContent) -> Iterator[str]:
     if estimate.weak:
         yield (
             "Waves and sensors hide what the rudder does, so that estimates lean towards those of least squares: the "
-            f"rudder tells {estimate.strength:.2g} times what noise alone would seem to tell, expected "
+            f"information from the rudder is {estimate.strength:.2g} times what noise alone would give, expected "
             f"{TUNING.least_strength:g} times or more by larger rudder angles, longer runs or calmer water."
         )
     if estimate.answering:

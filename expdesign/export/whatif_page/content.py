@@ -196,7 +196,7 @@ def _plan(first: Case, case: Case, against: Against) -> Iterator[str]:
             f"{'more' if difference > 0 else 'less'}."
         )
     if against.track is not None:
-        yield f"Legs included, the day tells {against.track:.2f} times what the scenario's day tells."
+        yield f"Legs included, the day has {against.track:.2f} times the information of the scenario's day."
 
 
 def whatif_json(content: WhatIfContent) -> str:

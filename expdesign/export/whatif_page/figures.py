@@ -47,7 +47,7 @@ def day_figure(content: WhatIfContent) -> str | None:
     axes.set_ylim(0.0, 1.08 * max(share for _, share in known))
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
     light_grid(axes)
-    return svg(figure, key="days", label="Length of the day against what its whole track tells, for each case")
+    return svg(figure, key="days", label="Length of the day against the information of its whole track, for each case")
 
 
 def ratio_figure(content: WhatIfContent) -> str | None:

@@ -96,12 +96,12 @@ def _determined_in_words(model: YawModel, data: YawData, found: YawEstimate) -> 
     _, size, directions = np.linalg.svd(columns / max(noise, 1e-12), full_matrices=False)
     determined = size > 1.0
     if determined.all():
-        return f"The reference tells all {len(values)} parameters apart, each combination better than to its own size."
+        return f"The reference determines all {len(values)} parameters, each combination better than to its own size."
     weak = np.abs(directions[~determined]).max(axis=0) > MAIN
     names = ", ".join(name for name, here in zip(model.parameters, weak, strict=True) if here)
     return (
-        f"The reference tells {int(determined.sum())} of {len(values)} combinations of the parameters better than to "
-        f"their own size; it does not tell {names} apart."
+        f"The reference determines {int(determined.sum())} of {len(values)} combinations of the parameters better than "
+        f"to their own size; it does not determine {names}."
     )
 
 

@@ -166,7 +166,7 @@ def record_estimate(pendulum: RollPendulum, runs: Sequence[Run], *, beam_m: floa
     problem = build_problem(pendulum.body, ready, beam_m=beam_m, roll_hz=roll_hz, known=known, start=start)
     found = estimate_roll(problem)
     if not found.trusted:
-        raise NotInformative(f"the record does not tell how the ship rolls: {_why(found)}")
+        raise NotInformative(f"the roll of the ship cannot be estimated from the record: {_why(found)}")
     return found
 
 

@@ -256,9 +256,9 @@ def calibrated(now: Watch) -> Watch:
         best = int(np.argmax(calibration.rate))
         larger = TUNING.known_within / np.sqrt(max(float(calibration.rate[best]) * calibration.stretches, 1e-12))
         raise NotInformative(
-            f"the reference of {calibration.stretches} stretches of {calibration.stretch_s:g} s tells no change well "
-            f"enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger changes, "
-            f"{larger:.2g} times as large at least (--size), for {now.changes[best].words}"
+            f"the reference of {calibration.stretches} stretches of {calibration.stretch_s:g} s determines no change "
+            "well enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger "
+            f"changes, {larger:.2g} times as large at least (--size), for {now.changes[best].words}"
         )
     end_s = max((float(part.time_s[-1]) for part in learnt if len(part)), default=0.0) + calibration.stretch_s
     return replace(now, phase=Ready(calibration=calibration, reference_s=end_s))

@@ -56,7 +56,7 @@ def validate_design(
     ship = case.vessel if truth is None else load_vessel(truth)
     if case.vessel.model.roll is not None:
         raise InputError(
-            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate beside; "
+            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate; "
             "expected it in the vessel of --truth only"
         )
     information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
