@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -122,8 +121,3 @@ def random_matrices(rng: np.random.Generator, *, count: int, parameters: int, ou
 def one_line(error: object) -> bool:
     """Whether an error reads as one line of bearable length."""
     return "\n" not in str(error) and 0 < len(str(error)) < 400
-
-
-def closeness(value: float) -> float:
-    """Rounding allowed to a number of this size after a few hundred operations."""
-    return 1e3 * math.ulp(max(abs(value), 1.0))

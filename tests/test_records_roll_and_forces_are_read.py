@@ -19,8 +19,6 @@ from expdesign.simulation import CALM, measure, simulate
 from expdesign.vessel import Roll, Vessel
 from record_files import csv_text, motion, texts
 
-EXACT_S = 0.05
-
 
 def rolling(*, noise: float = 0.0) -> Vessel:
     """The tender with a roll mode that heels outwards."""

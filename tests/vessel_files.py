@@ -63,7 +63,6 @@ yaw_rate_radps = 0.002
 
 
 KVLCC2 = vessel_text("kvlcc2-7m", KVLCC2_TERMS)
-ESSO = vessel_text("esso-osaka-3m", ESSO_TERMS)
 ESSO_WIND = vessel_text("esso-osaka-3m", (*ESSO_TERMS, *WIND_TERMS))
 
 
