@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,10 @@ class Setting:
     def __post_init__(self) -> None:
         if self.searched not in SEARCHED:
             raise UnknownName(f"kind of searched setting {self.name}:", self.searched, known=SEARCHED[1:])
+
+
+DURATION = Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5)
+WHOLE_PERIODS = replace(DURATION, meaning="duration of one run, best a whole number of periods")
 
 
 Reference = Callable[[Mapping[str, float], Array], Array]

@@ -1,4 +1,4 @@
-"""Whether a plan that drawn trials leave is made anew, with which room, and why not any more."""
+"""Replanning: when a plan that drawn trials leave is made anew, with how much room, and the refusal otherwise."""
 
 from __future__ import annotations
 

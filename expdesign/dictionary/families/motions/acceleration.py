@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from expdesign.dictionary.families.motions.shapes import speed_change
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.families.motions.shapes import RAMP_FRACTION, speed_change
+from expdesign.dictionary.spec import DURATION, Family, Setting
 from expdesign.values import Array
 
 
@@ -18,19 +18,12 @@ ACCELERATION = Family(
     name="acceleration",
     summary="from a lower to a higher surge speed on a straight course",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
+        DURATION,
         Setting(name="speed_mps", meaning="surge speed reached", low=-50, high=50, searched="surge"),
         Setting(
             name="from_speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50, searched="surge"
         ),
-        Setting(
-            name="ramp_fraction",
-            meaning="share of the run that the change takes",
-            default=0.7,
-            low=0.01,
-            high=1,
-            searched="share",
-        ),
+        RAMP_FRACTION,
     ),
     reference=_reference,
 )

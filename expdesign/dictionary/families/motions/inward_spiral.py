@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import ramp
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import DURATION, Family, Setting
 from expdesign.values import Array
 
 
@@ -21,7 +21,7 @@ INWARD_SPIRAL = Family(
     name="inward_spiral",
     summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
+        DURATION,
         Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5, searched="yaw"

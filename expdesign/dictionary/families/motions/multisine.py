@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import envelope
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import WHOLE_PERIODS, Family, Setting
 from expdesign.dictionary.tuning import TUNING
 from expdesign.values import Array
 
@@ -37,7 +37,7 @@ MULTISINE = Family(
     name="multisine",
     summary="multisines in surge speed, sway speed and yaw rate, with four different frequencies each",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
+        WHOLE_PERIODS,
         Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
         Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
         Setting(

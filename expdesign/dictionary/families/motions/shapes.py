@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from expdesign.dictionary.spec import Setting
 from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.values import Array
+
+RAMP_FRACTION = Setting(
+    name="ramp_fraction",
+    meaning="share of the run that the change takes",
+    default=0.7,
+    low=0.01,
+    high=1,
+    searched="share",
+)
 
 
 def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:

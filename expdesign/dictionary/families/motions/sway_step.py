@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import ramp
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import DURATION, Family, Setting
 from expdesign.values import Array
 
 
@@ -21,7 +21,7 @@ SWAY_STEP = Family(
     name="sway_step",
     summary="a step of sway speed on a steady heading, and back",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
+        DURATION,
         Setting(name="sway_mps", meaning="sway speed, positive to starboard", low=-20, high=20, searched="sway"),
         Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
         Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import flat_wave
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import WHOLE_PERIODS, Family, Setting
 from expdesign.values import Array
 
 
@@ -21,7 +21,7 @@ SWAY_ZIGZAG = Family(
     name="sway_zigzag",
     summary="alternating sideways motion on a steady heading, with or without headway",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
+        WHOLE_PERIODS,
         Setting(
             name="sway_mps",
             meaning="largest sway speed; the first push is to starboard",

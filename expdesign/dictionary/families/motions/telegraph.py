@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import envelope
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import DURATION, Family, Setting
 from expdesign.values import Array
 
 
@@ -36,7 +36,7 @@ TELEGRAPH = Family(
     name="telegraph",
     summary="random switching of surge speed, sway speed and yaw rate between two levels each",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
+        DURATION,
         Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="speed_swing_mps",

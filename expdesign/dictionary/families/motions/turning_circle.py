@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import ramp
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import DURATION, Family, Setting
 from expdesign.values import Array
 
 
@@ -21,7 +21,7 @@ TURNING_CIRCLE = Family(
     name="turning_circle",
     summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5),
+        DURATION,
         Setting(name="speed_mps", meaning="approach speed", low=-50, high=50, searched="surge"),
         Setting(name="turn_speed_mps", meaning="surge speed in the turn", low=-50, high=50, searched="surge"),
         Setting(

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.families.motions.shapes import envelope, flat_wave
-from expdesign.dictionary.spec import Family, Setting
+from expdesign.dictionary.spec import WHOLE_PERIODS, Family, Setting
 from expdesign.values import Array
 
 
@@ -23,7 +23,7 @@ ZIGZAG = Family(
     name="zigzag",
     summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
     settings=(
-        Setting(name="duration_s", meaning="duration of one run, best a whole number of periods", low=1e-3, high=1e5),
+        WHOLE_PERIODS,
         Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
         Setting(
             name="yaw_rate_radps",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, ordered, run_times
-from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.families.orders.orders import APPROACH, ordered, run_times
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
 from expdesign.simulation.helm import steady_ahead
 from expdesign.vessel import Vessel
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_family, helm_setting
-from expdesign.dictionary.spec import Family, PrimitiveSpec, Setting
+from expdesign.dictionary.families.orders.orders import APPROACH, helm_family, helm_setting
+from expdesign.dictionary.spec import DURATION, Family, PrimitiveSpec, Setting
 from expdesign.values import Array
 
 

@@ -12,7 +12,6 @@ from expdesign.simulation.helm import Approach, steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-DURATION = Setting(name="duration_s", meaning="duration of one run", low=1e-3, high=1e5)
 APPROACH = Setting(name="speed_mps", meaning="approach speed, more than 0", low=1e-6, high=50, searched="surge")
 HALF_TURN = np.pi / 2
 

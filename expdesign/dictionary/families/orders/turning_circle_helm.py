@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_family, helm_setting
-from expdesign.dictionary.spec import Family, PrimitiveSpec
+from expdesign.dictionary.families.orders.orders import APPROACH, helm_family, helm_setting
+from expdesign.dictionary.spec import DURATION, Family, PrimitiveSpec
 from expdesign.values import Array
 
 

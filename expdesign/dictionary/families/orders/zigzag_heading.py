@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_setting
-from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.families.orders.orders import APPROACH, helm_setting
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
 from expdesign.simulation import Conduct, steady_ahead, zigzag
 from expdesign.vessel import Vessel
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.dictionary.families.orders.orders import APPROACH, DURATION, helm_setting, ordered, run_times, steered
-from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.families.orders.orders import APPROACH, helm_setting, ordered, run_times, steered
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
 from expdesign.errors import InputError
 from expdesign.simulation.helm import steady_ahead
 from expdesign.vessel import Vessel
