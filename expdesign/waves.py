@@ -1,4 +1,4 @@
-"""Waves as a ship meets them, filters that shape noise like them, and Froude's scaling between model and ship.
+"""Waves as a ship meets them, and Froude's scaling between model and ship.
 
 Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), chapter 8, for
 the JONSWAP spectrum, encounter and shaping filters; DNV-RP-C205 (2010), 3.5.5, for the spectrum's level at any gamma;

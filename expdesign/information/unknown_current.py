@@ -1,9 +1,9 @@
-"""What a steady current that nobody knows leaves of the information about a ship.
+"""Information about a ship that is left where a steady current is unknown.
 
 The current enters as two parameters more, c to north and to east, by the regressors of `estimation.regression.current`.
-What remains about the ship's parameters is the Schur complement of their block. Runs of which nobody knows the heading
-tell the same with and without it: over evenly spread headings the products of J(psi), which turns with the ship, and
-the regressors, which do not, are zero on average.
+What remains about the ship's parameters is the Schur complement of their block. For runs of unknown heading the current
+makes no difference: over evenly spread headings the products of J(psi), which turns with the ship, and the regressors,
+which do not, are zero on average.
 
 Source: F. Pukelsheim, Optimal Design of Experiments (2006), 3.10 for the information about a subsystem.
 """
