@@ -163,8 +163,7 @@ def _rows(
     unknown_current: bool,
     excitation: str,
 ) -> _Rows:
-    model, outputs = vessel.model, vessel.model.outputs
-
+    model, sensors = vessel.model, vessel.sensors
     own = simulate(
         vessel,
         part.commands,
@@ -183,17 +182,15 @@ def _rows(
         np.stack([share * by for share, by in zip(shares, pair, strict=True)]) for pair in zip(*slopes, strict=True)
     )
 
-    noise = vessel.sensors
-    chosen = [("u", "v", "r").index(name) for name in outputs]
-    blocks = []
+    chosen = [("u", "v", "r").index(name) for name in model.outputs]
+    regressors = np.zeros(())
     for share, begin in ends:
         moved = _from(own, begin)
         block = _blocks(model, moved, given, environment, parameters)
         if unknown_current:
             block = np.concatenate([block, _by_current(model, moved, given, environment)[..., chosen]], axis=1)
-        blocks.append(share * block)
-    regressors = np.asarray(sum(blocks[1:], start=blocks[0]))
-    sensor = np.array([noise.velocity_mps, noise.velocity_mps, noise.yaw_rate_radps])[chosen] ** 2
+        regressors = regressors + share * block
+    sensor = np.array([sensors.velocity_mps, sensors.velocity_mps, sensors.yaw_rate_radps])[chosen] ** 2
     return _Rows(
         regressors=regressors,
         instruments=regressors * (_weights(sensor) if unknown_current else 1.0),
@@ -201,7 +198,7 @@ def _rows(
         by_air=by_air[:, :, chosen],
         by_current=slopes[0][0][:, chosen, :2],
         sensor=sensor,
-        air=noise.wind_mps**2,
+        air=sensors.wind_mps**2,
         current=environment.current_variation.std_mps**2,
         strata=_strata(vessel, own, given, environment, excitation, begins=[begin for _, begin in ends]),
     )

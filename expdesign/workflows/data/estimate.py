@@ -84,38 +84,7 @@ def estimate(
         begun = 0.01 if now is ship else 0.4
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
-    command = command_text(
-        "estimate",
-        data,
-        {
-            "--vessel": vessel,
-            "--method": options.methods,
-            "--fixed": options.fixed,
-            "--test": tuple(tests),
-            "--velocity": velocity,
-            "--mean": options.mean,
-            "--blocks": options.blocks,
-            "--start": options.start,
-            "--motion": options.motion,
-            "--horizon": options.horizon_s,
-            "--constant": options.constant,
-            "--steered": options.steered,
-            "--samples": options.samples,
-            "--offset": options.offset_mps,
-            "--prior": options.prior,
-        },
-        usual={
-            "--velocity": "auto",
-            "--mean": "complete",
-            "--blocks": "one",
-            "--start": "auto",
-            "--motion": "continuous",
-            "--steered": "auto",
-            "--samples": "all",
-            "--offset": 0.0,
-            "--prior": "none",
-        },
-    )
+    command = _command(data, vessel, tests, velocity, options)
     files = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
@@ -129,6 +98,30 @@ def estimate(
     return Outcome(
         files=written, summary={**_estimate_summary(found), **note_on_roll(ship)}, tables=_estimate_tables(found)
     )
+
+
+def _command(data: Sequence[Path], vessel: Path, tests: Sequence[Path], velocity: str, options: EstimateOptions) -> str:
+    """What to type for the same estimates."""
+    stated = {"--vessel": vessel, "--test": tuple(tests), "--velocity": velocity, **_words(options)}
+    return command_text("estimate", data, stated, usual={"--velocity": "auto", **_words(EstimateOptions())})
+
+
+def _words(options: EstimateOptions) -> dict[str, object]:
+    """Values by their names on the command line."""
+    return {
+        "--method": options.methods,
+        "--fixed": options.fixed,
+        "--mean": options.mean,
+        "--blocks": options.blocks,
+        "--start": options.start,
+        "--motion": options.motion,
+        "--horizon": options.horizon_s,
+        "--constant": options.constant,
+        "--steered": options.steered,
+        "--samples": options.samples,
+        "--offset": options.offset_mps,
+        "--prior": options.prior,
+    }
 
 
 def _estimate_summary(found: Assessment) -> dict[str, object]:
