@@ -159,7 +159,7 @@ def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, mode
     assert alarm["value"] / NOMINAL["I_r"] == pytest.approx(0.108, abs=0.05)
     notes = " ".join(told["same"]["notes"])
     assert "learnt by output error" in notes
-    assert "parameters apart" in notes
+    assert "The reference determines" in notes
     assert "By instruments" in notes
     assert "Both halves of the reference" in notes or "Not informative enough" in notes
 

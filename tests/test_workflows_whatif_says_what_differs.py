@@ -136,7 +136,7 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
     assert content.against(unknown).track is None
     page = whatif_html(content)
     assert 'id="days-' in page
-    assert page.count("Legs included, the day has 0.50 times what the scenario") == 1
+    assert page.count("Legs included, the day has 0.50 times the information of the scenario") == 1
     for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
         assert f">{minutes}<" in page
 
