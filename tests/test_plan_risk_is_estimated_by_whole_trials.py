@@ -137,6 +137,41 @@ def test_a_ship_whose_return_to_a_long_leg_is_blocked_by_an_island_goes_around_i
     assert np.isnan(CollisionCheck(area=water.area, vessel=water.vessel).exits(found.poses)).all()
 
 
+def test_a_leg_too_short_to_return_to_is_sailed_beside_its_place_as_far_as_the_run_may_begin_there():
+    water = leg_water(shapely.box(-200, -200, 200, 200), clearance_m=5.0)
+    task = LegTask(
+        start=at_rest(0, 0, 0.0), end=at_rest(80, 0, 0.0), start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1
+    )
+    track = water.sail(task.start, find_leg(task, water))
+    helm = Helmsman(vessel=water.vessel, environment=CALM, ship=water.ship)
+    certain = Truths(
+        parameters=np.tile(water.vessel.model.parameters, (4, 1)), current_to=np.zeros((4, 2)), wind_to=np.zeros((4, 2))
+    )
+    beside = {}
+    for position_m in (40.0, 160.0):
+        fleet = Fleet(water.vessel, CALM, certain, state=task.start, standing=np.zeros(4), rng=np.random.default_rng(0))
+        fleet.states[:, 1] = [0.0, 10.0, -35.0, 35.0]
+        guidance = Guidance(
+            helm,
+            water,
+            np.hstack([track.pose, track.velocity]),
+            within=replace(tolerances(water), position_m=position_m),
+            sailing=np.ones(4, dtype=bool),
+            inputs=np.zeros(4),
+            last=False,
+        )
+        found = guidance.sail(fleet, np.zeros((4, 3)))
+        assert found.begun.all()
+        assert not found.go_arounds.any()
+        beside[position_m] = found.poses[-1, :, 1], found.samples
+    (narrow, late), (wide, soon) = beside[40.0], beside[160.0]
+    most_m = MONTE_CARLO.standstill_share * MONTE_CARLO.parallel_share * 40.0
+    assert (np.abs(wide[:2]) < 2.0).all()  # a leg long enough is returned to
+    assert (np.abs(narrow[2:]) < most_m + 2.0).all()
+    assert (wide[2:] * [-1, 1] > np.abs(narrow[2:])).all()
+    assert (soon[2:] <= late[2:]).all()
+
+
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
     legs = planned().legs
     reach = float(planned().trajectory.pose[legs[0].last, 0])

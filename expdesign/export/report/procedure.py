@@ -16,8 +16,9 @@ def procedure_sentences(plan: Plan) -> list[str]:
     within = _tolerances(risk, [leg.kind == "primitive" for leg in plan.legs])
     return [
         "Run: give the orders on the card without correcting for the motion of the ship.",
-        "After the run: return to the planned leg and follow it under control. If the return path is not in safe "
-        "water, or the leg is too short to correct the deviation, make a go-around at once.",
+        "After the run: return to the planned leg and follow it under control. If the leg is too short to correct the "
+        "deviation, a ship that keeps station sails parallel to it, up to half of the start gate's distance beside it. "
+        "If that is not enough, or the path is not in safe water, make a go-around at once.",
         f"Start gate: begin the next run if {within}.",
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
         f"on the planned heading at the planned speed. After {words.counted(risk.go_arounds, 'go-around')}, abort the "

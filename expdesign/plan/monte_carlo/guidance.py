@@ -79,6 +79,9 @@ class Guidance:
         reach_m = np.clip(length_m / 5, self._within.position_m / 2, helm.vessel.length_m)
         self._followers = PathFollowers(helm, runs_up.states[0], n, reach_m=float(reach_m))
         self.doing = np.where(sailing, TRACKING, OUT)
+        self._shift: Array = np.zeros((n, 2))
+        leg_s = planned.arrival * helm.vessel.sample_time_s
+        self._caught_up_m = MONTE_CARLO.rejoin_share * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
         self._at, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
@@ -89,6 +92,8 @@ class Guidance:
         poses, unexplained = [fleet.states[:, :3]], unexplained.copy()
         ships = np.arange(len(self.doing))
         part, estimate = fleet, unexplained
+        if self._helm.ship.keeps_station and not self._last:
+            self._shift = self._parallel(fleet.states)
         self._rejoin(ships, fleet.states)
         while True:
             self._decide(ships, part)
@@ -176,26 +181,50 @@ class Guidance:
         return np.asarray(off_m <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m)
 
     def _run_up(self, ships: np.ndarray) -> None:
-        self.doing[ships] = TRACKING
+        self.doing[ships], self._shift[ships] = TRACKING, 0.0
         self._at[ships], self._end[ships] = self._first, self._arrival
         self._most[ships] = len(self._reference.states) - 1
         self._deadline[ships] = self._sample + self._allowed(self._arrival - self._first)
 
+    def _parallel(self, states: Array) -> Array:
+        """(n, 2) by how much the leg is moved towards ships (n, 6) that would not return to it within its time.
+
+        The run may begin beside its planned place. A leg that would leave safe water stays where it is planned.
+        """
+        off, result = states[:, :2] - self._reference.states[0, :2], np.zeros((len(states), 2))
+        off_m = lengths(off)
+        most_m = MONTE_CARLO.parallel_share * self._within.position_m
+        if not self._moves:
+            most_m *= MONTE_CARLO.standstill_share
+        ships = np.flatnonzero((self.doing == TRACKING) & (off_m > self._caught_up_m))
+        needed_m = np.minimum(off_m[ships] - self._caught_up_m, most_m)
+        shift = off[ships] * (needed_m / off_m[ships])[:, None]
+        points = (self._leg + shift[:, None]).reshape(-1, 2)
+        clear = self._tree.hold(points, np.repeat(np.arange(len(ships)), len(self._leg)))
+        result[ships[clear]] = shift[clear]
+        return result
+
+    @cached_property
+    def _leg(self) -> Array:
+        """(k, 2) places of the planned leg, thinned."""
+        return self._reference.states[self._thinned, :2]
+
+    @cached_property
+    def _thinned(self) -> np.ndarray:
+        return np.unique([*range(0, self._first, MONTE_CARLO.rejoin_samples), self._first - 1])
+
     def _rejoin(self, ships: np.ndarray, states: Array) -> None:
         """Ships too far off to return within the leg's time, or without a clear return to it, go around at once."""
-        first, helm = self._reference.states[0, :2], self._helm
+        first, helm = self._reference.states[0, :2] + self._shift, self._helm
         off_m = np.hypot(*(states[:, :2] - first).T)
-        leg_s = self._end[0] * helm.vessel.sample_time_s
-        good_m = (
-            self._within.position_m + MONTE_CARLO.rejoin_share * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
-        )
+        good_m = self._within.position_m + self._caught_up_m
         off = (self.doing == TRACKING) & (off_m > self._within.position_m)
         if self._last and helm.ship.keeps_station:
             self._straight_to_goal(np.flatnonzero(off & (off_m > good_m)), states)
             off &= self.doing == TRACKING
         some = np.flatnonzero(off)
         if len(some):
-            clear = self._tree.hold(*self._returns_to_leg(states[some, :2]))
+            clear = self._tree.hold(*self._returns_to_leg(some, states[some, :2]))
             off[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
             self._go_around(ships[off], states[off])
 
@@ -215,20 +244,19 @@ class Guidance:
         sample_m = self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
         self._deadline[ships] = self._sample + self._allowed(self._followers.length_m[ships] / sample_m)
 
-    def _returns_to_leg(self, places: Array) -> tuple[Array, np.ndarray]:
-        """Approximate tracks of ships from places (k, 2) back to the leg, while the reference stays abeam.
+    def _returns_to_leg(self, ships: np.ndarray, places: Array) -> tuple[Array, np.ndarray]:
+        """Approximate tracks of ships (k,) from places (k, 2) back to their legs, while the reference stays abeam.
 
         Returns:
             (j, 2) points of all tracks, one track after the other, and (j,) the ship of each.
         """
-        track, helm = self._reference.states[: self._first, :2], self._helm
-        off = places - track[0]
+        track, helm, thinned = self._leg + self._shift[ships, None], self._helm, self._thinned
+        off = places - track[:, 0]
         return_s = lengths(off) / (CONTROL.catch_up * helm.ship.transit_speed_mps)
-        thinned = np.unique([*range(0, self._first, MONTE_CARLO.rejoin_samples), self._first - 1])
         left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / return_s[:, None])  # (k, samples)
-        points = track[thinned] + left[..., None] * off[:, None]
-        ships, samples = np.nonzero(np.arange(len(thinned)) <= (left > 0.0).sum(axis=1)[:, None])
-        return points[ships, samples], ships
+        points = track + left[..., None] * off[:, None]
+        which, samples = np.nonzero(np.arange(len(thinned)) <= (left > 0.0).sum(axis=1)[:, None])
+        return points[which, samples], which
 
     def _go_around(self, ships: np.ndarray, states: Array) -> None:
         """Start ships (k,) on return paths to the run-up; those without a path, or go-arounds left, abort."""
@@ -282,11 +310,13 @@ class Guidance:
 
     def _tracked(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) states that ships on the reference desire; it advances."""
-        most = self._most[ships]
-        pace = self._reference.abreast(self._at[ships], states, step_m=self._least_step_m)
+        most, shift = self._most[ships], self._shift[ships]
+        beside = np.column_stack([states[:, :2] - shift, states[:, 2:]])
+        pace = self._reference.abreast(self._at[ships], beside, step_m=self._least_step_m)
         self._at[ships] = at = np.minimum(self._at[ships] + pace, most)
         soon = np.minimum(at + self._helm.answer_s / self._helm.vessel.sample_time_s, most)
         now = self._reference.at(at)
+        now[:, :2] += shift
         now[:, 3:] = self._reference.velocity_at(soon)  # velocities respond with a lag: they are demanded ahead of time
         if self._steadies:
             now[:, :2] = np.where(self._steadying(ships)[:, None], states[:, :2], now[:, :2])

@@ -30,6 +30,7 @@ class Tuning:
         patience, waiting_time_constants: a ship may take so many times as long as planned for a reference or a path,
             and so many time constants of the return to a reference besides.
         least_step: movement of a slow reference per sample, in that at transit speed.
+        parallel_share: of the tolerance of a run's start position, by which a ship may sail beside the leg before it.
         rejoin_samples: samples between the points at which a return to the leg is checked against the shore.
         rejoin_share: of a leg's time within which a ship must be able to return to it.
         arrived_hulls: distance from the goal at which a trial has reached it.
@@ -72,6 +73,7 @@ class Tuning:
     patience: float = 3.0
     waiting_time_constants: float = 10.0
     least_step: float = 0.2
+    parallel_share: float = 0.5
     rejoin_samples: int = 5
     rejoin_share: float = 0.5
     arrived_hulls: float = 1.5
