@@ -32,11 +32,11 @@ def test_a_circle_is_sailed_through_all_headings():
     ship, like = case("barge")
     circle = next(one for one in standard_proposals(like, ship.model.inputs, 1.0) if one.name == "turning_circle")
     wind = np.array([3.0, -4.0])
-    windows = _turning(ship, _windows(circle, like, wind), circle, wind)
+    windows = _turning(ship, _windows([circle], like, wind), [circle], wind)
     heading_change = windows.heading - windows.heading[:, :1]
     assert np.abs(heading_change).max() > 2 * np.pi
     np.testing.assert_allclose(np.hypot(*np.moveaxis(windows.wind, -1, 0)), 5.0)
-    again = _turning(ship, windows, circle, wind)
+    again = _turning(ship, windows, [circle], wind)
     assert np.abs(again.heading - windows.heading).max() < np.radians(1.0)
 
 

@@ -7,9 +7,16 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
 from expdesign.diagnosis.motion.integration import propagated
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
-from expdesign.diagnosis.motion.simulation import initial_states, simulate_nearby, simulate_windows
+from expdesign.diagnosis.motion.simulation import (
+    _newton_from_measured,
+    _step_by_step,
+    initial_states,
+    simulate_nearby,
+    simulate_windows,
+)
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 
@@ -52,6 +59,22 @@ def test_a_warm_start_changes_no_result():
         little = extended.with_effects({"gain": 1e-3})
         assert simulate_nearby(little, windows, start, warm_start) is not None
         assert simulate_nearby(little, windows, start + 1e6, warm_start) is None
+
+
+def test_fast_roll_is_simulated_at_once_as_step_by_step():
+    """A roll of 2 s at steps of 1 s, from measured velocities alone, and its response to a push."""
+    extended, windows = case("barge")
+    ship = extended.with_effects({"roll:period": 2.0, "roll:damping": 0.1, "roll:sway": 0.2, "roll:yaw": 0.01})
+    start = initial_states(windows, ship.states)
+    exogenous = exogenous_inputs(ship, windows)
+    at_once = _newton_from_measured(ship, windows, exogenous, start)
+    assert at_once is not None
+    np.testing.assert_allclose(at_once, _step_by_step(ship, windows, exogenous, start), atol=1e-7)
+    motion = simulate_windows(ship, windows, start)
+    changed = ship.with_effects({"current:north": 1e-4})
+    answer = responses(linearise(motion), [disturbance_of(linearise(motion), changed, 1.0)])[0]
+    difference = simulate_windows(changed, windows, start).predicted - motion.predicted
+    assert np.abs(answer - difference).max() < 0.02 * np.abs(difference).max()
 
 
 def test_gaps_between_steps_are_propagated_as_step_by_step():

@@ -245,7 +245,7 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
         return None
     base, leads = chosen.held[len(chosen.kept.steps)], []
     for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
-        held = chosen.validation.without(item.fit, item.fit.ship).like(base)
+        held = chosen.validation.measured_like(base, item.fit)
         leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
     return Unexplained(
         outputs=after.outputs,

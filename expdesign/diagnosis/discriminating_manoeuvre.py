@@ -41,21 +41,30 @@ class Proposal:
 def most_discriminating(
     one: ExtendedModel, others: Sequence[ExtendedModel], proposals: Sequence[Proposal], std: Array, like: Windows
 ) -> str | None:
-    """Name of the proposal for which `one` and the nearest of the others disagree most per minute."""
+    """Name of the proposal for which `one` and the nearest of the others disagree most per minute.
+
+    Proposals of the same length and sample time are simulated together.
+    """
     best: tuple[float, str] | None = None
     wind = mean_measured_wind(like)
-    for proposal in proposals:
-        windows = _turning(one, _windows(proposal, like, wind), proposal, wind)
-        predicted = [_shown(ship, windows, proposal) for ship in (one, *others)]
-        if any(values is None for values in predicted):
-            continue
-        first, *rest = predicted
-        minutes = len(proposal.inputs) * proposal.sample_time_s / 60
-        assert first is not None
-        apart = min(float(np.nansum(((first - other) / std) ** 2)) for other in rest if other is not None) / minutes
-        if best is None or apart > best[0]:
-            best = apart, proposal.name
-    return best[1] if best and best[0] > 0 else None
+    lengths = [(len(proposal.inputs), proposal.sample_time_s) for proposal in proposals]
+    for length in dict.fromkeys(lengths):
+        alike = [proposal for proposal, own in zip(proposals, lengths, strict=True) if own == length]
+        windows = _turning(one, _windows(alike, like, wind), alike, wind)
+        first, *rest = (_by_proposal(_sailed(ship, windows, alike)) for ship in (one, *others))
+        apart = np.min([np.sum(((first - other) / std) ** 2, axis=(1, 2, 3)) for other in rest], axis=0)
+        for proposal, distance in zip(alike, apart / (length[0] * length[1] / 60), strict=True):
+            if distance > (best[0] if best else 0.0):
+                best = float(distance), proposal.name
+    return best[1] if best else None
+
+
+def _by_proposal(motion: Motion) -> Array:
+    """(p, headings, s, 4) what sensors show of every proposal; nan where the simulation diverges."""
+    of_each = (-1, len(HEADINGS))
+    shown = motion.predicted.reshape(*of_each, *motion.predicted.shape[1:]).copy()
+    shown[motion.diverged_windows.reshape(of_each).any(axis=1)] = np.nan
+    return shown
 
 
 def mean_measured_wind(like: Windows) -> Array | None:
@@ -67,24 +76,23 @@ def mean_measured_wind(like: Windows) -> Array | None:
     return np.array([np.mean(u * c - v * s), np.mean(u * s + v * c)])
 
 
-def _sailed(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Motion:
-    start = np.zeros((len(HEADINGS), ship.states))
-    start[:, :3] = proposal.velocity
+def _sailed(ship: ExtendedModel, windows: Windows, proposals: Sequence[Proposal]) -> Motion:
+    start = np.zeros((len(windows.batch), ship.states))
+    start[:, :3] = np.repeat([proposal.velocity for proposal in proposals], len(HEADINGS), axis=0)
     return simulate_windows(ship, windows, start)
 
 
-def _shown(ship: ExtendedModel, windows: Windows, proposal: Proposal) -> Array | None:
-    motion = _sailed(ship, windows, proposal)
-    return None if motion.diverged else motion.predicted
-
-
-def _turning(ship: ExtendedModel, windows: Windows, proposal: Proposal, wind: Array | None) -> Windows:
+def _turning(ship: ExtendedModel, windows: Windows, proposals: Sequence[Proposal], wind: Array | None) -> Windows:
     """The windows with the simulated heading, so that current and wind act from the right side."""
     for _ in range(ROUNDS):
-        heading_change = _sailed(ship, windows, proposal).heading_change
-        heading = np.array(HEADINGS)[:, None] + heading_change
+        heading = _headings(proposals)[:, None] + _sailed(ship, windows, proposals).heading_change
         windows = replace(windows, heading=heading, wind=_air(wind, heading))
     return windows
+
+
+def _headings(proposals: Sequence[Proposal]) -> Array:
+    """(w,) every initial heading of every proposal."""
+    return np.tile(HEADINGS, len(proposals))
 
 
 def _air(wind: Array | None, heading: Array) -> Array:
@@ -92,17 +100,18 @@ def _air(wind: Array | None, heading: Array) -> Array:
     return np.zeros((*heading.shape, 2)) if wind is None else np.stack(to_body(wind, heading, NUMPY), axis=-1)
 
 
-def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
-    """A window per initial heading, held constant, in the mean wind."""
-    substeps = max(1, int(np.ceil(proposal.sample_time_s / like.step_s - 1e-9)))
-    inputs = np.repeat(proposal.inputs, substeps, axis=0)
-    count, w = len(inputs), len(HEADINGS)
-    heading = np.repeat(np.array(HEADINGS)[:, None], count, axis=1)
+def _windows(proposals: Sequence[Proposal], like: Windows, wind: Array | None) -> Windows:
+    """A window per proposal and initial heading, held constant, in the mean wind; proposals are alike in length."""
+    sample_s = proposals[0].sample_time_s
+    substeps = max(1, int(np.ceil(sample_s / like.step_s - 1e-9)))
+    inputs = tuple(np.repeat(proposal.inputs, substeps, axis=0) for proposal in proposals)
+    heading = np.repeat(_headings(proposals)[:, None], len(inputs[0]), axis=1)
+    w, count = heading.shape
     return Windows(
-        step_s=proposal.sample_time_s / substeps,
+        step_s=sample_s / substeps,
         steps_per_sample=substeps,
-        batch=np.zeros(w),
-        batch_inputs=(inputs,),
+        batch=np.repeat(np.arange(float(len(proposals))), len(HEADINGS)),
+        batch_inputs=inputs,
         first=np.zeros(w),
         measured=np.zeros((w, -(-count // substeps), 4)),
         heading=heading,
@@ -113,7 +122,7 @@ def _windows(proposal: Proposal, like: Windows, wind: Array | None) -> Windows:
         has_wind=wind is not None,
         has_depth=False,
         derived=like.derived,
-        names=(proposal.name,),
+        names=tuple(proposal.name for proposal in proposals),
     )
 
 

@@ -108,6 +108,12 @@ class CrossValidation:
         """The same, not kept; None for a model that is not fitted."""
         return cross_validate(found, ship, self._windows, progress, self._record)
 
+    def measured_like(self, other: HeldOut, found: Fit) -> HeldOut:
+        """The same, measured only as those of another are: of whole units or of short stretches."""
+        if not other.in_stretches:
+            return self.without(found, found.ship)
+        return replace(_of_folds(_stretch_folds(found, found.ship, self._windows, self._record)), in_stretches=True)
+
 
 def cross_validate(
     found: Fit | None, ship: ExtendedModel, windows: Windows, progress: Progress, record: Record | None = None
@@ -125,19 +131,27 @@ def cross_validate(
     whole = _of_folds(
         _Folds(found=found, ship=ship, windows=windows, unit=unit, part=unit, fitted=_fitted, near=True), progress
     )
+
+    def ahead() -> HeldOut:
+        found_ahead = _of_folds(_stretch_folds(found, ship, windows, record))
+        return replace(found_ahead, in_stretches=True, models=whole.models)
+
+    return replace(whole, ahead=cache(ahead))
+
+
+def _stretch_folds(found: Fit | None, ship: ExtendedModel, windows: Windows, record: Record | None) -> _Folds:
+    """Short stretches, one part of every run held out at a time."""
+    unit = validation_units(windows)
     short, of_short = _stretches(windows, unit, ship, record)
-    fitted = partial(_fitted_ahead, unit, of_short)
-    ahead = _Folds(
+    return _Folds(
         found=found,
         ship=ship,
         windows=short,
         unit=_parts_of_runs(short),
         part=np.arange(float(len(of_short))),
-        fitted=fitted,
+        fitted=partial(_fitted_ahead, unit, of_short),
         near=False,
     )
-    in_stretches = cache(lambda: replace(_of_folds(ahead, silent), in_stretches=True, models=whole.models))
-    return replace(whole, ahead=in_stretches)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,7 +177,7 @@ class _Folds:
     near: bool
 
 
-def _of_folds(given: _Folds, progress: Progress) -> HeldOut:
+def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
     found, windows = given.found, given.windows
     names, parts = np.unique(given.unit), np.unique(given.part)
     most = TUNING.folds if given.near else TUNING.parts

@@ -6,6 +6,7 @@ These small matrices suffice for steps, covariances, score tests and likelihoods
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -126,24 +127,36 @@ def window_information(grams: GramMatrices, found: Sensitivities, noise: Noise) 
 
 def marginalised(grams: GramMatrices, found: Sensitivities, noise: Noise) -> MarginalInformation:
     """Integrate the random current out."""
-    c = found.numbers
-    A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
     if noise.current_std_mps == 0.0 or found.knot_count == 0:
+        c = found.numbers
+        A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
         return MarginalInformation(
             A=A.sum(axis=0), s=s.sum(axis=0), each=s, quadratic=float(grams.ee.sum()), log_det=0.0
         )
-    prior = current_prior(found, noise)
-    ZZ, ZX, Ze = grams.XX[:, c:, c:] + np.linalg.inv(prior), grams.XX[:, c:, :c], grams.Xe[:, c:]
+    return marginalised_under(grams, found, [noise])[0]
+
+
+def marginalised_under(grams: GramMatrices, found: Sensitivities, noises: Sequence[Noise]) -> list[MarginalInformation]:
+    """The same under several random currents, none of them zero, with the same whitening."""
+    c = found.numbers
+    A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
+    priors = np.stack([current_prior(found, noise) for noise in noises])
+    ZX, Ze = grams.XX[:, c:, :c], grams.Xe[:, c:]
+    ZZ = grams.XX[:, c:, c:] + np.linalg.inv(priors)[:, None]
     solved = np.linalg.solve(ZZ, np.concatenate([ZX, Ze[..., None]], axis=2))
-    each = s - np.einsum("wzc,wz->wc", ZX, solved[..., -1])
-    log_det = np.linalg.slogdet(ZZ)[1].sum() + len(ZZ) * np.linalg.slogdet(prior)[1]
-    return MarginalInformation(
-        A=(A - np.swapaxes(ZX, 1, 2) @ solved[..., :-1]).sum(axis=0),
-        s=each.sum(axis=0),
-        each=each,
-        quadratic=float(grams.ee.sum() - np.einsum("wz,wz->", Ze, solved[..., -1])),
-        log_det=float(log_det),
-    )
+    log_dets = np.linalg.slogdet(ZZ)[1].sum(axis=1) + len(A) * np.linalg.slogdet(priors)[1]
+    each = s - np.einsum("wzc,twz->twc", ZX, solved[..., -1])
+    known = np.swapaxes(ZX, 1, 2) @ solved[..., :-1]
+    return [
+        MarginalInformation(
+            A=(A - known[place]).sum(axis=0),
+            s=each[place].sum(axis=0),
+            each=each[place],
+            quadratic=float(grams.ee.sum() - np.einsum("wz,wz->", Ze, solved[place, ..., -1])),
+            log_det=float(log_det),
+        )
+        for place, log_det in enumerate(log_dets)
+    ]
 
 
 def current_prior(found: Sensitivities, noise: Noise) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,9 +11,11 @@ from expdesign.diagnosis.data import Noise, channel_std, fit_ar_noise, white_noi
 from expdesign.diagnosis.fit.fit import best_step
 from expdesign.diagnosis.fit.gram_matrices import (
     GramMatrices,
+    MarginalInformation,
     current_prior,
     gram_matrices,
     marginalised,
+    marginalised_under,
 )
 from expdesign.diagnosis.fit.linear_model import Sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
@@ -63,16 +66,29 @@ def _estimate_random_current(grams: GramMatrices, found: Sensitivities, noise: N
     if grams.XX.shape[1] == found.numbers:
         return noise
     best: tuple[float, Noise] = (np.inf, noise)
-    for std_mps in TUNING.current_stds_mps:
-        for time_s in TUNING.current_times_s if std_mps else TUNING.current_times_s[:1]:
-            trial = replace(noise, current_std_mps=std_mps, current_time_s=time_s)
-            m = marginalised(grams, found, trial)
-            A = m.A + prior.precision
-            cost = m.log_det + m.quadratic - best_step(A, m.s - prior.precision @ prior.now, prior.bounds)[1]
-            cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
-            if cost < best[0] - 1e-9:
-                best = (cost, trial)
+    for trial, m in _under_random_currents(grams, found, noise):
+        A = m.A + prior.precision
+        cost = m.log_det + m.quadratic - best_step(A, m.s - prior.precision @ prior.now, prior.bounds)[1]
+        cost += float(np.linalg.slogdet(A + 1e-12 * np.diag(np.diag(A) + 1e-30))[1])
+        if cost < best[0] - 1e-9:
+            best = (cost, trial)
     return best[1]
+
+
+def _under_random_currents(
+    grams: GramMatrices, found: Sensitivities, noise: Noise
+) -> Iterator[tuple[Noise, MarginalInformation]]:
+    """The noise with every random current that is tried, first none, and the information under it."""
+    still, *others = [
+        replace(noise, current_std_mps=std_mps, current_time_s=time_s)
+        for std_mps in TUNING.current_stds_mps
+        for time_s in (TUNING.current_times_s if std_mps else TUNING.current_times_s[:1])
+    ]
+    yield still, marginalised(grams, found, still)
+    at_once = max(1, TUNING.numbers_at_once // (len(grams.XX) * (2 * found.knot_count) ** 2))
+    for low in range(0, len(others), at_once):
+        part = others[low : low + at_once]
+        yield from zip(part, marginalised_under(grams, found, part), strict=True)
 
 
 def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: Prior) -> Array:

@@ -19,14 +19,20 @@ def runge_kutta_step(
     ship: ExtendedModel, x: tuple[Array, ...], exogenous: ExogenousInputs, h: float
 ) -> tuple[tuple[Array, ...], Array]:
     """The state after one step, and the change of heading; fast roll is integrated in parts of the step."""
-    turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
-    parts = min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
+    parts = parts_of_step(ship, h)
     heading_gain: Array | float = 0.0
+    end = exogenous.at_fraction(-0.5)
     for part in range(parts):
-        stages = [exogenous.at_fraction((part + share) / parts - 0.5) for share in (0.0, 0.5, 1.0)]
-        x, more = _rk4_part(ship, x, stages, h / parts)
+        begin, middle, end = end, *(exogenous.at_fraction((part + share) / parts - 0.5) for share in (0.5, 1.0))
+        x, more = _rk4_part(ship, x, (begin, middle, end), h / parts)
         heading_gain = heading_gain + more
     return x, np.asarray(heading_gain)
+
+
+def parts_of_step(ship: ExtendedModel, h: float) -> int:
+    """How many parts a step has, so that roll turns little in each."""
+    turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
+    return min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
 
 
 def _rk4_part(
@@ -47,25 +53,36 @@ def _rk4_part(
 
 
 def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
-    """(w, k, n, n) derivatives of the rates, by central differences."""
+    """(w, k, n, n) derivatives of the rates, by central differences; as many at once as keep memory small."""
     n = ship.states
-    jacobian = np.empty((*states.shape, n))
-    for axis in range(n):
-        step = np.zeros(n)
-        step[axis] = TUNING.difference
-        jacobian[..., axis] = (
-            stacked_rates(ship, states + step, exogenous) - stacked_rates(ship, states - step, exogenous)
-        ) / (2 * TUNING.difference)
-    return jacobian
+    columns = np.moveaxis(states, -1, 0)[:, None]
+    moves = TUNING.difference * np.concatenate([np.eye(n), -np.eye(n)])[:, :, None, None]
+    at_once = max(1, TUNING.samples_at_once // max(1, states[..., 0].size))
+    rates = np.empty((2 * n, n, *states.shape[:-1]))
+    for low in range(0, 2 * n, at_once):
+        part = moves[low : low + at_once]
+        moved = tuple(column + part[:, axis] for axis, column in enumerate(columns))
+        for column, rate in enumerate(state_rates(ship, moved, exogenous)):
+            rates[low : low + at_once, column] = rate
+    jacobian = (rates[:n] - rates[n:]) / (2 * TUNING.difference)
+    return np.ascontiguousarray(jacobian.transpose(2, 3, 1, 0))
 
 
-def transition_matrices(jacobian: Array, h: float) -> tuple[Array, Array]:
-    """Transition over a step, and the effect of a constant acceleration over it, to fourth order."""
-    A = jacobian * h
+def transition_matrices(jacobian: Array, h: float, parts: int = 1) -> tuple[Array, Array]:
+    """Transition over a step, and the effect of a constant acceleration over it, to fourth order.
+
+    Of a step with parts they are put together from those of equal parts, at least as many, by doubling.
+    """
+    doublings = math.ceil(math.log2(parts))
+    part_s = h / 2**doublings
+    A = jacobian * part_s
     eye = np.eye(A.shape[-1])
     A2 = A @ A
     A3 = A2 @ A
-    return eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, h * (eye + A / 2 + A2 / 6 + A3 / 24)
+    transition, forcing = eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, part_s * (eye + A / 2 + A2 / 6 + A3 / 24)
+    for _ in range(doublings):
+        transition, forcing = transition @ transition, forcing + transition @ forcing
+    return transition, forcing
 
 
 def propagated(transition: Array, first: Array, missed: Array) -> Array:

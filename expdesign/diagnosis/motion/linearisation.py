@@ -14,7 +14,13 @@ import numpy as np
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import rates_by_term
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
-from expdesign.diagnosis.motion.integration import propagated, stacked_rates, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.integration import (
+    parts_of_step,
+    propagated,
+    stacked_rates,
+    state_jacobian,
+    transition_matrices,
+)
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
 from expdesign.diagnosis.motion.tuning import TUNING
@@ -30,7 +36,8 @@ def linearise(motion: Motion) -> LinearisedMotion:
     exogenous = motion.exogenous.without_last_step()
     path_rates = np.stack([stacked_rates(motion.ship, end, exogenous) for end in ends])
     jacobian = (state_jacobian(motion.ship, ends[0], exogenous) + state_jacobian(motion.ship, ends[1], exogenous)) / 2
-    transition, forcing = transition_matrices(jacobian, motion.windows.step_s)
+    step_s = motion.windows.step_s
+    transition, forcing = transition_matrices(jacobian, step_s, parts_of_step(motion.ship, step_s))
     return LinearisedMotion(motion=motion, transition=transition, forcing=forcing, path_rates=path_rates)
 
 

@@ -42,7 +42,12 @@ class Motion:
     @property
     def diverged(self) -> bool:
         """Whether a speed exceeds `Tuning.largest_speed`."""
-        return not bool(np.abs(self.states).max() < TUNING.largest_speed)
+        return bool(self.diverged_windows.any())
+
+    @property
+    def diverged_windows(self) -> NDArray[np.bool_]:
+        """(w,) in which windows it does."""
+        return np.asarray(~(np.abs(self.states).max(axis=(1, 2)) < TUNING.largest_speed))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,13 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
-from expdesign.diagnosis.motion.integration import propagated, runge_kutta_step, state_jacobian, transition_matrices
+from expdesign.diagnosis.motion.integration import (
+    parts_of_step,
+    propagated,
+    runge_kutta_step,
+    state_jacobian,
+    transition_matrices,
+)
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, ship_velocities
 from expdesign.diagnosis.motion.tuning import TUNING
@@ -99,8 +105,7 @@ def _newton_from_measured(
     """(w, k, n) states by Newton's method from the measured velocities, without roll; None without convergence."""
     states = np.zeros((len(start), windows.steps, ship.states))
     states[..., :3] = _measured_states(windows)
-    jacobian = state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, exogenous.without_last_step())
-    transition, _ = transition_matrices(jacobian, windows.step_s)
+    transition = _transition(ship, windows, exogenous.without_last_step(), states)
     return _newton_over_all_steps(ship, windows, exogenous, start, states, transition)
 
 
@@ -120,9 +125,10 @@ def _newton_over_all_steps(
 
     Each iteration computes all steps from the last states and propagates the gaps between them by transition matrices
     of a similar motion (multiple shooting). At convergence the gaps vanish, and the result is the stepwise
-    one.
+    one. Corrections shrink by about the same factor each time, so the next one is known before it is made.
 
-    Source: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350.
+    Sources: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350; E. Hairer
+    and G. Wanner, Solving Ordinary Differential Equations II (1996), IV.8, for when to end.
     """
     middle, last = exogenous.without_last_step(), np.inf
     for number in range(TUNING.newton_rounds):
@@ -133,14 +139,19 @@ def _newton_over_all_steps(
         size = float(np.abs(change).max())
         if not size < min(TUNING.newton_divergence * last, TUNING.largest_speed):
             return None
-        states, last = states + change, size
-        if size < TUNING.newton_tolerance:
+        states, next_size = states + change, size * size / last if number else size
+        if min(size, next_size / TUNING.newton_safety) < TUNING.newton_tolerance:
             return states
+        last = size
         if size > TUNING.newton_refresh and number < TUNING.newton_rounds / 2:
-            transition, _ = transition_matrices(
-                state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, middle), windows.step_s
-            )
+            transition = _transition(ship, windows, middle, states)
     return None
+
+
+def _transition(ship: ExtendedModel, windows: Windows, middle: ExogenousInputs, states: Array) -> Array:
+    """(w, k - 1, n, n) over each step, from the rates in its middle."""
+    jacobian = state_jacobian(ship, (states[:, :-1] + states[:, 1:]) / 2, middle)
+    return transition_matrices(jacobian, windows.step_s, parts_of_step(ship, windows.step_s))[0]
 
 
 def initial_states(windows: Windows, states: int = 3) -> Array:

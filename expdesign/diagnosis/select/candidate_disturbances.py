@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import difference_step, effect_disturbances
@@ -54,16 +55,22 @@ def _roll_disturbance(linear: LinearisedMotion, candidate: Candidate, key: str) 
 
 def _oscillator_response(drive: Array, w0: float, damping: float, step_s: float) -> Array:
     """(w, k) mean over each step of x in x'' + 2 damping w0 x' + w0^2 x = w0^2 drive, the drive (w, k) held."""
-    from scipy.signal import lfilter  # slow to import
-
     step = np.array([[0.0, 1.0, 0.0], [-(w0**2), -2 * damping * w0, w0**2], [0.0, 0.0, 0.0]]) * step_s
     transition, power = np.eye(3), np.eye(3)
     for order in range(1, 16):
         power = power @ step / order
         transition = transition + power
     (keep, of_rate), (of_roll, keep_rate) = transition[:2, :2]
-    ahead = np.array([0.0, transition[0, 2], of_rate * transition[1, 2] - keep_rate * transition[0, 2]])
+    near, far = transition[0, 2], of_rate * transition[1, 2] - keep_rate * transition[0, 2]
     behind = np.array([1.0, -keep - keep_rate, keep * keep_rate - of_rate * of_roll])
     first = drive[:, :1]  # where the angle begins, at rest
-    angle = lfilter(ahead, behind, np.concatenate([drive - first, np.zeros_like(first)], axis=1), axis=1) + first
+    forced = np.pad(near * (drive - first), ((0, 0), (1, 0)))
+    forced[:, 2:] += far * (drive - first)[:, :-1]
+    angle = _recursion(behind, forced) + first
     return np.asarray((angle[:, :-1] + angle[:, 1:]) / 2)
+
+
+def _recursion(coefficients: Array, forced: Array) -> Array:
+    """(w, k) x with coefficients . (x_k, x_k-1, ...) = forced_k, the first coefficient one, zero before the first."""
+    band = np.repeat(coefficients[:, None], forced.shape[1], axis=1)
+    return np.asarray(dtbtrs(band, forced.T, uplo="L", diag="U")[0].T)
