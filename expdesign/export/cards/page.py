@@ -6,7 +6,7 @@ from functools import partial
 
 from expdesign.export import words
 from expdesign.export.cards.card import BLANKS, build_card, card_groups
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import drawn
 from expdesign.export.report import tables
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -25,7 +25,7 @@ def cards_html(content: ReportContent) -> str:
     runs = primitive_runs(content.plan)
     cards = drawn([partial(build_card, content, group) for group in card_groups(content, runs)])
     overview = drawn([partial(chart, content)])[0]
-    page = page_templates("expdesign.export.cards").get_template("cards.html")
+    page = page_template("expdesign.export.cards", "cards.html")
     return page.render(
         content=content,
         cards=cards,

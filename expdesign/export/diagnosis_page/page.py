@@ -31,7 +31,7 @@ from expdesign.export.diagnosis_page.roll import RollVerdict, roll_sentences
 from expdesign.export.diagnosis_page.suspects import has_sign, is_force
 from expdesign.export.diagnosis_page.wording import cause_title, estimate_words
 from expdesign.export.files import plus_minus
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
 from expdesign.progress import Progress, silent
@@ -44,7 +44,7 @@ def diagnosis_html(
 ) -> str:
     """One HTML page without any outside reference."""
     figures = _figures(found, progress)
-    page = page_templates("expdesign.export.diagnosis_page").get_template("diagnosis.html")
+    page = page_template("expdesign.export.diagnosis_page", "diagnosis.html")
     return page.render(
         found=found,
         alarm=f"{SELECTION_TUNING.accepted_p_value:g}",

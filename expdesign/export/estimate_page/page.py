@@ -12,7 +12,7 @@ from expdesign.export.estimate_page.advice import advice, conditions, summary
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
 from expdesign.export.files import disturbance_table, fit_table, motion_words, plus_minus
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
 from expdesign.progress import Progress, in_phases, silent
@@ -49,7 +49,7 @@ def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> s
     """One HTML page without any outside reference."""
     found = content.found
     methods = [_notes(content, item) for item in found.methods]
-    page = page_templates("expdesign.export.estimate_page").get_template("estimate.html")
+    page = page_template("expdesign.export.estimate_page", "estimate.html")
     return page.render(
         content=content,
         found=found,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from expdesign.export import words
 from expdesign.export.files import strict_json
 from expdesign.export.foresight_page.content import NONE
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.foresight import Detectability, OperationForesight, interval
 
 OPERATION_HEADER = ("change", "by", "found", "95 %", "median delay", "named rightly", "or as likely", "else taken for")
@@ -117,15 +117,11 @@ def operation_json(content: OperationContent) -> str:
 
 def operation_html(content: OperationContent) -> str:
     """One HTML page without any outside reference."""
-    return (
-        page_templates("expdesign.export.foresight_page")
-        .get_template("operation.html")
-        .render(
-            content=content,
-            sentences=operation_sentences(content.found),
-            header=OPERATION_HEADER,
-            rows=operation_rows(content.found),
-            lasts=words.duration(content.found.voyage_s),
-            learns=words.duration(content.found.reference_s),
-        )
+    return page_template("expdesign.export.foresight_page", "operation.html").render(
+        content=content,
+        sentences=operation_sentences(content.found),
+        header=OPERATION_HEADER,
+        rows=operation_rows(content.found),
+        lasts=words.duration(content.found.voyage_s),
+        learns=words.duration(content.found.reference_s),
     )

@@ -13,7 +13,7 @@ from expdesign.export.foresight_page.content import (
     runs_text,
 )
 from expdesign.export.foresight_page.figures import power_figure
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.foresight import Foreseen, Foresight
 
@@ -23,21 +23,17 @@ def foresight_html(content: ForesightContent) -> str:
     found = content.found
     with report_style():
         figure = power_figure(found)
-    return (
-        page_templates("expdesign.export.foresight_page")
-        .get_template("foresee.html")
-        .render(
-            content=content,
-            found=found,
-            figure=figure,
-            lasts=words.duration(found.duration_s),
-            conclusions=conclusions(found),
-            header=HEADER[:-1],
-            rows=[row[:-1] for row in foresight_rows(found)],
-            pairs=_pairs(found),
-            together=None if found.together is None else runs_text(found.together),
-            every=[_every(item) for item in found.effects],
-        )
+    return page_template("expdesign.export.foresight_page", "foresee.html").render(
+        content=content,
+        found=found,
+        figure=figure,
+        lasts=words.duration(found.duration_s),
+        conclusions=conclusions(found),
+        header=HEADER[:-1],
+        rows=[row[:-1] for row in foresight_rows(found)],
+        pairs=_pairs(found),
+        together=None if found.together is None else runs_text(found.together),
+        every=[_every(item) for item in found.effects],
     )
 
 

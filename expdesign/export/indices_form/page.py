@@ -7,7 +7,7 @@ import math
 from expdesign.export import words
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
 from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag
 
 
@@ -15,7 +15,7 @@ def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
     sources = tuple(dict.fromkeys(source for source, _ in content.trials))
     unmet = sum(verdict.met is False for _, verdict in content.verdicts)
-    page = page_templates("expdesign.export.indices_form").get_template("indices.html")
+    page = page_template("expdesign.export.indices_form", "indices.html")
     return page.render(
         content=content,
         rows=verdict_rows(content),

@@ -12,22 +12,18 @@ from expdesign.export.load_page.content import (
     precision_rows,
     step_rows,
 )
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 
 
 def load_plan_html(content: LoadContent) -> str:
     """One HTML page without any outside reference."""
-    return (
-        page_templates("expdesign.export.load_page")
-        .get_template("load_plan.html")
-        .render(
-            content=content,
-            sentences=load_sentences(content),
-            case_header=[name.capitalize() for name in CASE_HEADER],
-            case_rows=case_rows(content),
-            precision_header=[name.capitalize() for name in PRECISION_HEADER],
-            precision_rows=precision_rows(content),
-            step_header=[name.capitalize() for name in STEP_HEADER],
-            step_rows=step_rows(content),
-        )
+    return page_template("expdesign.export.load_page", "load_plan.html").render(
+        content=content,
+        sentences=load_sentences(content),
+        case_header=[name.capitalize() for name in CASE_HEADER],
+        case_rows=case_rows(content),
+        precision_header=[name.capitalize() for name in PRECISION_HEADER],
+        precision_rows=precision_rows(content),
+        step_header=[name.capitalize() for name in STEP_HEADER],
+        step_rows=step_rows(content),
     )

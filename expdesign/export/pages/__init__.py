@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 from expdesign.export.formats.format import xml_text
 
 
-def page_templates(package: str) -> Environment:
-    """Templates of a package, and those that all pages share: `base.html`, `parts.html` and the style sheet.
+def page_template(package: str, name: str) -> Template:
+    """A template of a package, which may use what all pages share: `base.html`, `parts.html` and the style sheet.
 
     A name that a template uses and nobody gives is an error; text is escaped, and characters that no page may hold are
     replaced.
     """
-    return Environment(
+    environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in (package, "expdesign.export.pages")]),
         autoescape=True,
         undefined=StrictUndefined,
@@ -21,6 +21,7 @@ def page_templates(package: str) -> Environment:
         lstrip_blocks=True,
         finalize=_shown,
     )
+    return environment.get_template(name)
 
 
 def _shown(value: object) -> object:

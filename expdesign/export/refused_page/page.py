@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from expdesign.errors import NoPlan
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import BLACK, GREEN, GREY, PURPLE, VERMILION, new_figure, report_style, svg
 from expdesign.export.report.figures.chart import draw_sea
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
@@ -98,10 +98,8 @@ def refused_html(refusal: Refusal) -> str:
     """One HTML page without any outside reference."""
     with report_style():
         figure = _chart(refusal)
-    return (
-        page_templates("expdesign.export.refused_page")
-        .get_template("refused.html")
-        .render(content=refusal, error=refusal.error, chart=figure, legend=_legend(refusal))
+    return page_template("expdesign.export.refused_page", "refused.html").render(
+        content=refusal, error=refusal.error, chart=figure, legend=_legend(refusal)
     )
 
 

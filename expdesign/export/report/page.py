@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from expdesign.export import words
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import drawn
 from expdesign.export.report import criteria, tables
 from expdesign.export.report.checks import checks, conditions
@@ -63,7 +63,7 @@ def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = expected(content)
     rows = parameter_rows(content, after)
-    page = page_templates("expdesign.export.report").get_template("report.html")
+    page = page_template("expdesign.export.report", "report.html")
     return page.render(
         content=content,
         plan=content.plan,

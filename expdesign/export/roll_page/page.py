@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.roll_page.content import (
     CURE_HEADER,
     PARAMETER_HEADER,
@@ -17,17 +17,13 @@ from expdesign.export.roll_page.content import (
 
 def roll_html(content: RollContent) -> str:
     """One HTML page without any outside reference."""
-    return (
-        page_templates("expdesign.export.roll_page")
-        .get_template("roll.html")
-        .render(
-            content=content,
-            sentences=roll_sentences(content),
-            parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
-            parameter_rows=parameter_rows(content),
-            scaled_header=[name.capitalize() for name in SCALED_HEADER],
-            scaled_rows=scaled_rows(content),
-            cure_header=[name.capitalize() for name in CURE_HEADER],
-            cure_rows=cure_rows(content),
-        )
+    return page_template("expdesign.export.roll_page", "roll.html").render(
+        content=content,
+        sentences=roll_sentences(content),
+        parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
+        parameter_rows=parameter_rows(content),
+        scaled_header=[name.capitalize() for name in SCALED_HEADER],
+        scaled_rows=scaled_rows(content),
+        cure_header=[name.capitalize() for name in CURE_HEADER],
+        cure_rows=cure_rows(content),
     )

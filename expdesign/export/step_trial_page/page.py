@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.step_trial_page.content import (
     REPEAT_HEADER,
@@ -24,18 +24,14 @@ def step_trial_html(content: StepTrialContent) -> str:
     with report_style():
         figures = {"coverage": coverage_figure(content), "surfaces": surface_figure(content)}
         simulations = [(part, simulation_figure(part, f"simulation{place}")) for place, part in enumerate(parts)]
-    return (
-        page_templates("expdesign.export.step_trial_page")
-        .get_template("step_trial.html")
-        .render(
-            content=content,
-            sentences=sentences(content),
-            repeat_header=[name.capitalize() for name in REPEAT_HEADER],
-            repeat_rows=repeat_rows(content),
-            step_header=[name if name[1] == " " else name.capitalize() for name in STEP_HEADER],
-            step_rows=step_rows(content),
-            nominal_rows=nominal_rows(content),
-            figures=figures,
-            simulations=simulations,
-        )
+    return page_template("expdesign.export.step_trial_page", "step_trial.html").render(
+        content=content,
+        sentences=sentences(content),
+        repeat_header=[name.capitalize() for name in REPEAT_HEADER],
+        repeat_rows=repeat_rows(content),
+        step_header=[name if name[1] == " " else name.capitalize() for name in STEP_HEADER],
+        step_rows=step_rows(content),
+        nominal_rows=nominal_rows(content),
+        figures=figures,
+        simulations=simulations,
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.estimation.methods import method_named
 from expdesign.export import words
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationContent, judgements
 from expdesign.export.validation_page.figures import error_figure, spread_figure
@@ -21,18 +21,14 @@ def validation_html(content: ValidationContent) -> str:
             "errors": error_figure(content.results),
             "spread": None if predicted is None else spread_figure(predicted),
         }
-    return (
-        page_templates("expdesign.export.validation_page")
-        .get_template("validation.html")
-        .render(
-            content=content,
-            judgements=judgements(content),
-            designs=[_design_row(content, item) for item in content.results],
-            tables=[(item.design, _parameter_rows(item)) for item in content.results],
-            predicted=predicted,
-            estimator=method_named(content.rehearsal.method).title,
-            figures=figures,
-        )
+    return page_template("expdesign.export.validation_page", "validation.html").render(
+        content=content,
+        judgements=judgements(content),
+        designs=[_design_row(content, item) for item in content.results],
+        tables=[(item.design, _parameter_rows(item)) for item in content.results],
+        predicted=predicted,
+        estimator=method_named(content.rehearsal.method).title,
+        figures=figures,
     )
 
 

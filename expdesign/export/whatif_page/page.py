@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
 from expdesign.export.whatif_page.figures import day_figure, ratio_figure, runs_figure, time_figure
@@ -21,16 +21,12 @@ def whatif_html(content: WhatIfContent) -> str:
             "ratios": ratio_figure(content),
             "runs": runs_figure(content),
         }
-    return (
-        page_templates("expdesign.export.whatif_page")
-        .get_template("whatif.html")
-        .render(
-            content=content,
-            header=table_header(content),
-            rows=[_row(content, case) for case in content.cases],
-            explanations=explanations(content),
-            figures=figures,
-        )
+    return page_template("expdesign.export.whatif_page", "whatif.html").render(
+        content=content,
+        header=table_header(content),
+        rows=[_row(content, case) for case in content.cases],
+        explanations=explanations(content),
+        figures=figures,
     )
 
 

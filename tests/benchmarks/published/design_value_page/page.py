@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 
-from expdesign.export.pages import page_templates
+from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import (
     BLUE,
     LINES,
@@ -89,16 +89,12 @@ def design_value_html(
             "outputs": _shares(designs),
             "norm": _stems(designs, [item.norm for item in designs], CUT_NORM, limits[1], "norm"),
         }
-    return (
-        page_templates("design_value_page")
-        .get_template("design_value.html")
-        .render(
-            trials=len(designs[0].parameters),
-            tables=tables,
-            figures=figures,
-            cuts=(CUT_PARAMETER, CUT_NORM, CUT_DOF),
-            command=command,
-        )
+    return page_template("design_value_page", "design_value.html").render(
+        trials=len(designs[0].parameters),
+        tables=tables,
+        figures=figures,
+        cuts=(CUT_PARAMETER, CUT_NORM, CUT_DOF),
+        command=command,
     )
 
 
