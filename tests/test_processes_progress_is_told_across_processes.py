@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.processes import as_finished, local_processes, reported_together
-from expdesign.processes.telling import _elapsed
+from expdesign.processes.reporting import _elapsed
 
 STEPS = 4
 
@@ -22,7 +22,7 @@ def told_work(name, progress):
 def test_shares_of_all_tasks_are_told_together_and_never_fall(jobs):
     told = []
     with local_processes(jobs), reported_together(lambda *what: told.append(what), 2) as together:
-        for number in as_finished(told_work, (), zip("ab", together.tellers, strict=True)):
+        for number in as_finished(told_work, (), zip("ab", together.reporters, strict=True)):
             assert number == STEPS - 1
     activities, shares = zip(*told, strict=True)
     assert set(activities) == {"a at work", "b at work"}
@@ -47,6 +47,6 @@ def test_a_finished_task_is_told_at_once():
 
 def test_tasks_without_a_way_back_work_in_silence(tmp_path):
     with reported_together(lambda *_: None, 1) as together:
-        (teller,) = together.tellers
-    teller("at work", 0.5)  # as on another machine: the file is not there
-    assert not teller.path.exists()
+        (reporter,) = together.reporters
+    reporter("at work", 0.5)  # as on another machine: the file is not there
+    assert not reporter.path.exists()

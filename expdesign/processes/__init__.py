@@ -1,5 +1,6 @@
 """Independent work, shared among processes of this machine or the workers of a Dask scheduler."""
 
+from expdesign.processes.reporting import reported_together
 from expdesign.processes.sharing import (
     ahead,
     as_finished,
@@ -11,7 +12,6 @@ from expdesign.processes.sharing import (
     processors,
     shared_among,
 )
-from expdesign.processes.telling import reported_together
 
 __all__ = [
     "ahead",

@@ -26,14 +26,14 @@ CLUSTER = Tuning()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Telling:
+class Reporting:
     """How closely tasks in other processes are followed.
 
     Attributes:
-        look_s: between two looks at what they tell.
+        look_s: between two looks at their reports.
     """
 
     look_s: float = 0.2
 
 
-TELLING = Telling()
+REPORTING = Reporting()

@@ -81,7 +81,7 @@ def whatif(
         workers(jobs, scheduler=scheduler, load=load_plans),
         reported_together(within(progress, 0.0, WORKED), len(cases)) as together,
     ):
-        tasks = [(*case, teller) for case, teller in zip(cases, together.tellers, strict=True)]
+        tasks = [(*case, reporter) for case, reporter in zip(cases, together.reporters, strict=True)]
         for found in as_finished(_case, (with_plan, seed, memory), tasks):
             done[found.name] = found
             together.finished(names.index(found.name), f"{found.name} is done")

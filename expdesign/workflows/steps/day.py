@@ -111,7 +111,7 @@ def _shortest_of(
     """
     begin()
     with reported_together(progress, starts) as together:
-        tasks = list(enumerate(together.tellers))
+        tasks = list(enumerate(together.reporters))
         found = list(in_order(_answered, (memory_in_use(), *shared), tasks))
     days = [item for item in found if isinstance(item, Day)]
     if not days:

@@ -11,16 +11,16 @@ from threading import Event, Lock, Thread
 
 from joblib import effective_n_jobs
 
-from expdesign.processes.tuning import TELLING
+from expdesign.processes.tuning import REPORTING
 from expdesign.progress import Progress
 
 
 @dataclass(frozen=True)
-class Teller:
+class Reporter:
     """Progress of one task, in whatever process.
 
     Attributes:
-        path: of its file; elsewhere than on this machine there is none, and nothing is told.
+        path: of its file; elsewhere than on this machine there is none, and nothing is reported.
     """
 
     path: Path
@@ -32,7 +32,7 @@ class Teller:
             file.write(f"{float(share)!r} {activity}\n")
 
     def last(self) -> tuple[float, str]:
-        """What was told last; nothing at first."""
+        """The last report; nothing at first."""
         *_, line = "", *self.path.read_text("utf-8").splitlines()
         share, _, activity = line.partition(" ")
         return (float(share), activity) if activity else (0.0, "")
@@ -42,37 +42,37 @@ class Together:
     """Progress of tasks begun in this order, of about the same length.
 
     Attributes:
-        tellers: one for each task.
+        reporters: one for each task.
     """
 
-    def __init__(self, progress: Progress, tellers: tuple[Teller, ...], at_once: int) -> None:
-        """Nothing is told yet; so many tasks are worked on at once."""
-        self.tellers, self._progress, self._at_once = tellers, progress, at_once
-        self._known, self._looking = [teller.last() for teller in tellers], Lock()
+    def __init__(self, progress: Progress, reporters: tuple[Reporter, ...], at_once: int) -> None:
+        """Nothing is reported yet; so many tasks are worked on at once."""
+        self.reporters, self._progress, self._at_once = reporters, progress, at_once
+        self._known, self._looking = [reporter.last() for reporter in reporters], Lock()
 
     def look(self) -> None:
-        """Tell what is new."""
+        """Report what is new."""
         with self._looking:
-            for number, teller in enumerate(self.tellers):
-                if (new := teller.last()) != self._known[number]:
+            for number, reporter in enumerate(self.reporters):
+                if (new := reporter.last()) != self._known[number]:
                     self._known[number] = new
                     done = sum(share for share, _ in self._known)
                     self._progress(new[1], _elapsed(done, len(self._known), self._at_once))
 
     def finished(self, number: int, activity: str) -> None:
-        """Tell at once that a task is finished."""
-        self.tellers[number](activity, 1.0)
+        """Report at once that a task is finished."""
+        self.reporters[number](activity, 1.0)
         self.look()
 
 
 @contextmanager
 def reported_together(progress: Progress, count: int) -> Iterator[Together]:
-    """Progress of so many tasks, begun in this order, of about the same length: told while this block lasts."""
+    """Progress of so many tasks, begun in this order, of about the same length: reported while this block lasts."""
     with TemporaryDirectory(prefix="expdesign-") as folder:
-        tellers = tuple(Teller(Path(folder) / str(number)) for number in range(count))
-        for teller in tellers:
-            teller.path.touch()
-        together, ended = Together(progress, tellers, effective_n_jobs(None)), Event()
+        reporters = tuple(Reporter(Path(folder) / str(number)) for number in range(count))
+        for reporter in reporters:
+            reporter.path.touch()
+        together, ended = Together(progress, reporters, effective_n_jobs(None)), Event()
         listener = Thread(target=_listen, args=(together, ended), daemon=True)
         listener.start()
         try:
@@ -86,7 +86,7 @@ def _listen(together: Together, ended: Event) -> None:
     """Look for what is new until the end, and once after it."""
     listening = True
     while listening:
-        listening = not ended.wait(TELLING.look_s)
+        listening = not ended.wait(REPORTING.look_s)
         together.look()
 
 
