@@ -1,4 +1,4 @@
-"""Frozen values that hold arrays: shapes checked against shared letters, arrays that nobody can write to.
+"""Frozen values that hold arrays: shapes checked against shared letters, arrays read-only.
 
 A value with arrays is declared `@dataclass(frozen=True, kw_only=True, eq=False)` and calls `seal` once, at birth.
 """
@@ -34,7 +34,7 @@ def closed(array: Array) -> Array:
 
 
 def _sealed(values: object) -> bool:
-    """Whether nobody can write to an array of floats, nor to what it is a view of."""
+    """Whether an array of floats is read-only, and so is what it is a view of."""
     while type(values) is np.ndarray and values.dtype == float and not values.flags.writeable:
         if values.base is None:
             return True

@@ -96,7 +96,7 @@ class Unexplained:
 
     Attributes:
         fit: (n,) of the simulation [%].
-        force_share: (n,) share of its error that a slowly varying force which nobody measured would take away.
+        force_share: (n,) share of its error that an unmeasured, slowly varying force would take away.
         leads: the best candidates, by gain.
     """
 

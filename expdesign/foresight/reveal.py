@@ -73,7 +73,7 @@ class Wanted:
 
     @property
     def within_std(self) -> bool:
-        """No data would do, because the vessel file's standard deviations allow as much."""
+        """No data suffice, as the effect is within the vessel file's standard deviations."""
         c = len(self.prior) - self.columns
         return allowed_by_prior(ENDLESS * self.each.sum(axis=0), self.prior[:c, :c], self.least)
 

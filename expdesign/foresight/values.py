@@ -60,7 +60,7 @@ class Foreseen:
         added: the manoeuvre whose added runs bring it to the wanted power soonest; None where none does, or none is
             needed.
         best_power: largest power with added runs of one manoeuvre.
-        within_std: no data would do, because the vessel file's standard deviations allow as much.
+        within_std: no data suffice, as the effect is within the vessel file's standard deviations.
     """
 
     effect: HiddenEffect

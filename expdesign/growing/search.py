@@ -84,7 +84,7 @@ class Measure:
     Attributes:
         vessel, names, environment, mean_subtraction: as in `information.many.bordered_runs`.
         limits: (3, 2) low and high of u, v, r.
-        courses: (c,) that runs make good; None where nobody knows them.
+        courses: (c,) that runs make good; None where they are unknown.
     """
 
     vessel: Vessel

@@ -40,7 +40,7 @@ def bordered_runs(
         environment: mean current and wind; information is averaged over headings in them, or over the courses.
         mean_subtraction: "none", "batch" or "complete".
         standing: (n, m) commands before the first sample; None for those of the first sample.
-        courses: (c,) that runs make good through calm water [rad]; None where nobody knows them.
+        courses: (c,) that runs make good through calm water [rad]; None where they are unknown.
     """
     start = (velocity, commands[:, 0] if standing is None else standing)
     given = deliver(

@@ -15,8 +15,8 @@ class Tuning:
         fewest_samples: measured samples of a stretch that is judged.
         iterations: of the expectation-maximisation of noise and force.
         fewest_stretches: of a reference.
-        block_counts: blocks into which the reference is cut to measure how scores of neighbouring stretches hang
-            together; the largest inflation counts.
+        block_counts: blocks into which the reference is cut to measure how scores of neighbouring stretches correlate;
+            the largest inflation counts.
         misfit_deviations: standard deviations of the reference's misfit beyond which a stretch is not judged.
         weather_stretches: over which the surprise of the force is averaged.
         weather_limit: surprise of a stretch, in that of the reference, beyond which the weather is unlike it.

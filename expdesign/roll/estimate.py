@@ -175,7 +175,7 @@ class RollEstimate:
 
     @property
     def trusted(self) -> bool:
-        """Whether intervals may be believed: instruments are strong, the rudder answers nothing, and the model fits."""
+        """Whether intervals are valid: instruments are strong, the rudder does not follow roll, and the model fits."""
         fits = self.settled and not self.reached and not self.surprise > TUNING.most_surprise
         return self.method == "iv" and fits and not self.weak and not self.answering
 

@@ -35,7 +35,7 @@ def chance_of_answers(
     sensed: Array,
     periods: Sequence[float],
 ) -> float:
-    """How often a rudder that answers nothing goes with the noise as much as this one, 0 to 1.
+    """Chance that a rudder without feedback correlates with the noise as much as this one, 0 to 1.
 
     Args:
         cases, weighted: as the estimate has them.

@@ -33,7 +33,7 @@ class Run:
 
     @property
     def source(self) -> Array:
-        """(k,) what moves the rudder and nothing of the ship moves: instruments come from it."""
+        """(k,) signal that moves the rudder and does not depend on the ship's motion: instruments come from it."""
         return self.signals[:, 3] if self.planned is None else self.planned
 
 

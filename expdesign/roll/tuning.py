@@ -38,7 +38,7 @@ class Tuning:
         least_strength: of instruments, below which noise alone would give as much information, and no interval is
             trusted.
         leads: to which the rudder is looked at, up to a period of roll later, to see whether it answers.
-        least_unanswered: chance of an estimate whose rudder answers nothing, below which it is said to answer.
+        least_unanswered: chance without feedback, below which the rudder is said to answer roll.
         unseen: relative sensitivity below which the equations themselves leave a direction open.
         open_sizes: change along an open direction that is counted with, in sizes of the parameter that it moves most.
         faint_std: relative standard deviation along a direction from which data are said not to determine it.

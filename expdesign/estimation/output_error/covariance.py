@@ -1,6 +1,6 @@
 """The covariance of output error: from the noise that one step of the linearised ship leaves.
 
-Errors r of the simulation last, as forces that nobody measured are integrated by the ship. Their one-step residuals
+Errors r of the simulation last, as the ship integrates unmeasured forces. Their one-step residuals
 
     eps(k) = r(k + 1) - A(k) r(k)
 

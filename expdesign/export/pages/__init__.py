@@ -10,7 +10,7 @@ from expdesign.export.formats.format import xml_text
 def page_template(package: str, name: str) -> Template:
     """A template of a package, which may use what all pages share: `base.html`, `parts.html` and the style sheet.
 
-    A name that a template uses and nobody gives is an error; text is escaped, and characters that no page may hold are
+    A name that a template uses without a value is an error; text is escaped, and characters that no page may hold are
     replaced.
     """
     environment = Environment(

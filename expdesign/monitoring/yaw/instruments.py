@@ -82,13 +82,13 @@ def estimate_yaw_by_instruments(
     Args:
         model: the structure.
         data: of n voyages.
-        start: value of every parameter [SI], from which output error begins, where this begins in turn.
+        start: value of every parameter [SI] from which output error begins; instruments begin from its estimate.
         groups: as in `estimate_yaw`.
         smoothing_s: as in `split`.
 
     Returns:
-        Of each group; nan where the steps do not settle, as where the data tell too little. Standard errors are robust
-        to errors that hang together over `BLOCK_S`.
+        The estimate of each group; nan where the steps do not settle, for instance for lack of information. Standard
+        errors are robust to errors that are correlated over `BLOCK_S`.
     """
     owner = np.arange(len(data.r)) if groups is None else groups
     pool = np.eye(owner.max() + 1)[:, owner]

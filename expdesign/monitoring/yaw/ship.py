@@ -1,7 +1,7 @@
 """A yaw model as the ship that is watched: its changes, and their information in stretches of data.
 
 The drives' moment is an input. Of the measured velocities only the yaw rate is an output; an error of its first value
-and a steady moment that nobody measured are free in every stretch.
+and an unmeasured steady moment are free in every stretch.
 """
 
 from __future__ import annotations

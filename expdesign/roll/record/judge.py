@@ -113,7 +113,7 @@ def judge_roll(
         alarm_p: chance that a change is reported where there is none.
 
     Raises:
-        InputError, NotInformative: the record tells nothing that may be believed, and why.
+        InputError, NotInformative: the record gives no valid estimate, and why.
     """
     estimate = record_estimate(pendulum, runs, beam_m=beam_m)
     problem, load = estimate.problem, pendulum.load
