@@ -42,15 +42,12 @@ class NotStandard:
 Found = Circle | ZigZag | Stop | NotStandard
 
 
-def measured_trial(
-    vessel: Vessel, batch: Batch, *, thrusters: str = "stern", reference_forward_m: float = 0.0
-) -> Found:
+def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float = 0.0) -> Found:
     """The indices of one measured run: a zig-zag, a turning circle or a stop.
 
     Args:
         vessel: for length and actuators.
         batch: with pose and velocity.
-        thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
         reference_forward_m: how far forward of amidships the recorded positions and velocities are [m].
 
     Raises:
@@ -58,7 +55,7 @@ def measured_trial(
     """
     if batch.pose is None or not np.isfinite(batch.pose).all():
         raise InputError(f"{batch.name}: has no complete positions and headings, which the indices need")
-    helm = Helm(vessel=vessel, thrusters=thrusters)
+    helm = Helm(vessel=vessel)
     run = _steered_run(vessel, batch, helm, reference_forward_m)
     turned = _orders(run)
     if turned:

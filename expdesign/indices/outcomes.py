@@ -56,29 +56,25 @@ def standard_results(
     vessel: Vessel,
     *,
     speed_mps: float | None = None,
-    helm_rad: float | None = None,
     sides: tuple[str, ...] = ("starboard", "port"),
-    thrusters: str = "stern",
 ) -> StandardResults:
     """Turning circles, 10/10 and 20/20 zig-zags and the stop of a vessel in calm water.
 
     Args:
         vessel: with its nominal model.
         speed_mps: approach speed, or None for the speed at 85 % of the engines' power.
-        helm_rad: of the turning circles, or None for 35 degrees, or the actuators' limit where that is less.
         sides: of the first turn.
-        thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
 
     Raises:
         InputError: the vessel cannot hold a steady course at that speed.
     """
-    approach = steady_ahead(vessel, speed_mps, thrusters=thrusters)
+    approach = steady_ahead(vessel, speed_mps)
     speed = float(approach.velocity[0])
-    conduct = Conduct(speed_mps=speed, thrusters=thrusters)
+    conduct = Conduct(speed_mps=speed)
     circles, zigzags, stops, not_run = [], [], [], []
     for side in sides:
         try:
-            circles.append(simulated_circle(vessel, side=side, helm_rad=helm_rad, conduct=conduct))
+            circles.append(simulated_circle(vessel, side=side, conduct=conduct))
         except (InputError, NoAnswer) as error:
             not_run.append(f"turning circle to {side}: {error}")
         for angle in ZIGZAGS:
@@ -100,11 +96,11 @@ def standard_results(
     )
 
 
-def simulated_circle(vessel: Vessel, *, side: str, helm_rad: float | None, conduct: Conduct) -> Circle:
+def simulated_circle(vessel: Vessel, *, side: str, conduct: Conduct) -> Circle:
     """A simulated turning circle."""
-    commands, motion = turning_circle(vessel, side=side, helm_rad=helm_rad, conduct=conduct)
-    run = steered_run(vessel, commands, motion, name=f"circle to {side}", thrusters=conduct.thrusters)
-    approach = steady_ahead(vessel, conduct.speed_mps, thrusters=conduct.thrusters)
+    commands, motion = turning_circle(vessel, side=side, conduct=conduct)
+    run = steered_run(vessel, commands, motion, name=f"circle to {side}")
+    approach = steady_ahead(vessel, conduct.speed_mps)
     return read_circle(
         run,
         order_s=0.0,
@@ -120,9 +116,7 @@ def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Co
     """A simulated zig-zag with equal angles of heading and helm."""
     commands, motion = zigzag(vessel, heading_rad=angle_rad, helm_rad=angle_rad, side=side, conduct=conduct)
     degrees = f"{math.degrees(angle_rad):.0f}"
-    run = steered_run(
-        vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}", thrusters=conduct.thrusters
-    )
+    run = steered_run(vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}")
     way = 1 if side == "starboard" else -1
     first = run.first_turned(way * angle_rad, since_s=0.0, course_rad=0.0)
     second = None if first is None else run.first_turned(-way * angle_rad, since_s=first, course_rad=0.0)
@@ -140,7 +134,7 @@ def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Co
 def simulated_stop(vessel: Vessel, *, conduct: Conduct) -> Stop:
     """A simulated stop at full astern."""
     commands, motion = stopping(vessel, conduct=conduct)
-    run = steered_run(vessel, commands, motion, name="full astern", thrusters=conduct.thrusters)
+    run = steered_run(vessel, commands, motion, name="full astern")
     found = read_stop(run, order_s=0.0, course_rad=0.0, speed_mps=float(math.hypot(*motion.velocity[0, :2])))
     if found is None:
         raise NoAnswer(f"stopping: vessel {vessel.name!r} keeps its headway")
@@ -153,12 +147,11 @@ def outcomes(
     speed_mps: float | None = None,
     parameters: Array | None = None,
     names: tuple[str, ...] = tuple(OUTCOMES),
-    side: str = "starboard",
-    thrusters: str = "stern",
 ) -> dict[str, float]:
     """Named outcomes of the standard trials, for criterion V.
 
-    They vary continuously with the parameters: orders fall between samples and crossings are interpolated.
+    First turns are to starboard. Outcomes vary continuously with the parameters: orders fall between samples, and
+    crossings are interpolated.
 
     Args:
         vessel: structure, actuators and nominal parameters.
@@ -166,8 +159,6 @@ def outcomes(
             when parameters vary, so that the trial stays the same.
         parameters: (p,) other parameter values, or None for the vessel's.
         names: keys of `OUTCOMES`, in the desired order; only the trials they need are run.
-        side: of the first turn.
-        thrusters: "stern" or "all".
 
     Raises:
         InputError: the vessel cannot run a trial, or a name is not an outcome.
@@ -177,20 +168,18 @@ def outcomes(
     unknown = [name for name in names if name not in OUTCOMES]
     if unknown:
         raise InputError(f"outcome {unknown[0]!r} is not known, expected some of {', '.join(OUTCOMES)}")
-    conduct = Conduct(
-        speed_mps=float(steady_ahead(ship, speed_mps, thrusters=thrusters).velocity[0]), thrusters=thrusters
-    )
+    conduct = Conduct(speed_mps=float(steady_ahead(ship, speed_mps).velocity[0]))
     values: dict[str, float | None] = {}
     if {"advance_m", "transfer_m", "tactical_diameter_m"} & set(names):
-        circle = simulated_circle(ship, side=side, helm_rad=None, conduct=conduct)
+        circle = simulated_circle(ship, side="starboard", conduct=conduct)
         values |= {key: getattr(circle, key) for key in ("advance_m", "transfer_m", "tactical_diameter_m")}
     if {"initial_turning_m", "overshoot_10_10_rad", "second_overshoot_10_10_rad"} & set(names):
-        ten = simulated_zigzag(ship, angle_rad=ZIGZAGS[0], side=side, conduct=conduct)
+        ten = simulated_zigzag(ship, angle_rad=ZIGZAGS[0], side="starboard", conduct=conduct)
         first, second = (*ten.overshoots_rad, None, None)[:2]
         values["initial_turning_m"] = ten.initial_turning_m
         values |= {"overshoot_10_10_rad": first, "second_overshoot_10_10_rad": second}
     if "overshoot_20_20_rad" in names:
-        twenty = simulated_zigzag(ship, angle_rad=ZIGZAGS[1], side=side, conduct=conduct)
+        twenty = simulated_zigzag(ship, angle_rad=ZIGZAGS[1], side="starboard", conduct=conduct)
         values["overshoot_20_20_rad"] = (*twenty.overshoots_rad, None)[0]
     if "stopping_distance_m" in names:
         values["stopping_distance_m"] = simulated_stop(ship, conduct=conduct).track_reach_m

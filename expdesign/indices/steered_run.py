@@ -98,11 +98,9 @@ def crossing(curve: Curve, low: float, high: float) -> float:
     return float(scipy.optimize.brentq(curve, low, high, xtol=1e-9))
 
 
-def steered_run(
-    vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str, thrusters: str = "stern"
-) -> SteeredRun:
+def steered_run(vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str) -> SteeredRun:
     """A simulated trial; the mean command of a sample belongs to its middle."""
-    helm = Helm(vessel=vessel, thrusters=thrusters)
+    helm = Helm(vessel=vessel)
     return SteeredRun(
         name=name,
         length_m=vessel.length_m,

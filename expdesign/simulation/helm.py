@@ -1,9 +1,9 @@
 """One helm and one engine order for any vessel, and the steady run ahead that standard trials begin with.
 
 The helm turns all rudders together. A vessel without rudders steers with the common angle of its azimuth thrusters:
-those abaft amidships ("stern", or all where none is abaft), or every one ("all"). A vessel known only by generalised
-forces steers as if one thruster at its stern, half a length abaft amidships, gave all of its thrust. One with fixed
-propellers on both sides and nothing else to steer with lets them turn at different speeds.
+those abaft amidships, or all where none is. A vessel known only by generalised forces steers as if one thruster at its
+stern, half a length abaft amidships, gave all of its thrust. One with fixed propellers on both sides and nothing else
+to steer with lets them turn at different speeds.
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 import scipy
 
-from expdesign.errors import InputError, SpeedOutOfReach, UnknownName
+from expdesign.errors import InputError, SpeedOutOfReach
 from expdesign.simulation.actuation import past_deadband
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, SCALAR, Actuator, Limit, Operators, Vessel
 
-THRUSTERS = ("stern", "all")
 SERVICE_SHARE = 0.85 ** (1 / 3)
 """Propeller speed at 85 % of the largest power, as a share of the largest, as power goes with its cube."""
 FASTEST_MPS = 60.0
@@ -37,15 +36,11 @@ class Helm:
 
     Attributes:
         vessel: the one that is steered.
-        thrusters: "stern" or "all": which azimuth thrusters turn with the helm where there are no rudders.
     """
 
     vessel: Vessel
-    thrusters: str = "stern"
 
     def __post_init__(self) -> None:
-        if self.thrusters not in THRUSTERS:
-            raise UnknownName("choice of steering thrusters", self.thrusters, known=THRUSTERS)
         kinds = {actuator.kind for actuator in self.vessel.actuators}
         if not kinds & {"propeller", "azimuth", "force"}:
             raise InputError(f"vessel {self.vessel.name!r} has no propeller, azimuth thruster or force to drive it")
@@ -66,7 +61,7 @@ class Helm:
         """The actuators that turn with the helm."""
         able = tuple(actuator for actuator in self.vessel.actuators if actuator.kind == self.means)
         abaft = tuple(actuator for actuator in able if actuator.forward_m < 0)
-        return abaft if self.means == "azimuth" and self.thrusters == "stern" and abaft else able
+        return abaft if self.means == "azimuth" and abaft else able
 
     @property
     def description(self) -> str:
@@ -74,7 +69,7 @@ class Helm:
         names = ", ".join(a.signals[-1] for a in self.steering)
         return {
             "rudder": f"rudder angle ({names})",
-            "azimuth": f"common angle of the {'stern ' if self.thrusters == 'stern' else ''}thrusters ({names})",
+            "azimuth": f"common angle of the stern thrusters ({names})",
             "force": "angle of all thrust, as if it were given at the stern",
             "propeller": f"sine of the angle: difference of engine orders between the sides and their mean ({names})",
         }.get(self.means, "none")
@@ -191,19 +186,18 @@ class Approach:
         return float(np.hypot(*self.velocity[:2]))
 
 
-def steady_ahead(vessel: Vessel, speed_mps: float | None = None, *, thrusters: str = "stern") -> Approach:
+def steady_ahead(vessel: Vessel, speed_mps: float | None = None) -> Approach:
     """Trim for a straight course: engine order, drift and helm at which nothing accelerates.
 
     Args:
         vessel: nominal model, in calm water.
         speed_mps: surge speed through water, or None for `service_speed`.
-        thrusters: "stern" or "all", which azimuth thrusters steer.
 
     Raises:
         InputError: the engines cannot hold the speed, or the helm cannot hold the course.
     """
-    helm = Helm(vessel=vessel, thrusters=thrusters)
-    speed = service_speed(vessel, thrusters=thrusters) if speed_mps is None else float(speed_mps)
+    helm = Helm(vessel=vessel)
+    speed = service_speed(vessel) if speed_mps is None else float(speed_mps)
     if not 0 < speed < FASTEST_MPS:
         raise InputError(f"approach speed is {speed:g} m/s, expected more than 0 and less than {FASTEST_MPS:g}")
     drive, sway, angle = _balance(helm, speed, _engine_order(helm, speed))
@@ -220,13 +214,13 @@ def steady_ahead(vessel: Vessel, speed_mps: float | None = None, *, thrusters: s
     )
 
 
-def service_speed(vessel: Vessel, *, thrusters: str = "stern") -> float:
+def service_speed(vessel: Vessel) -> float:
     """Steady surge speed ahead [m/s] in calm water at 85 % of the engines' power (`SERVICE_SHARE` of their speed).
 
     Raises:
         InputError: the model has no steady speed there.
     """
-    helm = Helm(vessel=vessel, thrusters=thrusters)
+    helm = Helm(vessel=vessel)
 
     def gain(speed: float) -> float:
         return helm.acceleration((speed, 0.0, 0.0), SERVICE_SHARE, 0.0)[0]

@@ -38,14 +38,12 @@ class Conduct:
         approach_s: steady run before the first order.
         duration_s: length of the whole trial, or None to end it where the trial is complete.
         sample_time_s: time between commands, or None for the vessel's.
-        thrusters: "stern" or "all", which azimuth thrusters steer a vessel without rudders.
     """
 
     speed_mps: float | None = None
     approach_s: float = 0.0
     duration_s: float | None = None
     sample_time_s: float | None = None
-    thrusters: str = "stern"
 
 
 @dataclass(frozen=True, kw_only=True)

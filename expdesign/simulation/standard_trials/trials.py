@@ -137,7 +137,7 @@ def stopping(vessel: Vessel, *, astern: float = 1.0, conduct: Conduct = AT_SERVI
     """
     if not 0 <= astern <= 1:
         raise InputError(f"stopping: astern is {astern:g}, expected 0 to 1")
-    approach = steady_ahead(vessel, conduct.speed_mps, thrusters=conduct.thrusters)
+    approach = steady_ahead(vessel, conduct.speed_mps)
     for actuator in vessel.actuators:
         if astern and actuator.kind in ("propeller", "azimuth", "force") and not actuator.limits[0].low < 0:
             raise InputError(
@@ -152,7 +152,7 @@ def _steered(vessel: Vessel, helm_rad: float | None, side: str, conduct: Conduct
     """The approach, +1 or -1 for the side, and the helm angle that turns the ship there."""
     if side not in SIDES:
         raise UnknownName("side", side, known=SIDES)
-    approach = steady_ahead(vessel, conduct.speed_mps, thrusters=conduct.thrusters)
+    approach = steady_ahead(vessel, conduct.speed_mps)
     if not approach.starboard:
         raise InputError(f"vessel {vessel.name!r}: its helm, {approach.helm.description}, does not turn it")
     size = approach.helm.hardest(approach.drive) if helm_rad is None else helm_rad
