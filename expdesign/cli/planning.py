@@ -146,7 +146,7 @@ def export(
     ] = False,
     out: OutBesidePlan = None,
 ) -> Asked:
-    """Write a plan as route files for chart systems and autopilots: a leg for each run, and the ways between them.
+    """Write a plan as route files for chart systems and autopilots: one leg for each run, and those between them.
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """

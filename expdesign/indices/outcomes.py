@@ -117,14 +117,14 @@ def simulated_zigzag(vessel: Vessel, *, angle_rad: float, side: str, conduct: Co
     commands, motion = zigzag(vessel, heading_rad=angle_rad, helm_rad=angle_rad, side=side, conduct=conduct)
     degrees = f"{math.degrees(angle_rad):.0f}"
     run = steered_run(vessel, commands, motion, name=f"zig-zag {degrees}/{degrees} to {side}")
-    way = 1 if side == "starboard" else -1
-    first = run.first_turned(way * angle_rad, since_s=0.0, course_rad=0.0)
-    second = None if first is None else run.first_turned(-way * angle_rad, since_s=first, course_rad=0.0)
+    sign = 1 if side == "starboard" else -1
+    first = run.first_turned(sign * angle_rad, since_s=0.0, course_rad=0.0)
+    second = None if first is None else run.first_turned(-sign * angle_rad, since_s=first, course_rad=0.0)
     return read_zigzag(
         run,
         orders_s=tuple(time for time in (0.0, first, second) if time is not None),
         course_rad=0.0,
-        side=way,
+        side=sign,
         helm_rad=angle_rad,
         speed_mps=float(math.hypot(*motion.velocity[0, :2])),
         heading_rad=angle_rad,

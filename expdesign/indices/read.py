@@ -34,7 +34,7 @@ def read_circle(
     ahead = np.array([math.cos(course_rad), math.sin(course_rad)])
     across = side * np.array([-math.sin(course_rad), math.cos(course_rad)])
 
-    def way(degrees: float, direction: Array) -> float | None:
+    def distance(degrees: float, direction: Array) -> float | None:
         time = run.first_turned(side * math.radians(degrees), since_s=order_s, course_rad=course_rad)
         return None if time is None else float((run.at(time)[:2] - start[:2] - flow * (time - order_s)) @ direction)
 
@@ -43,9 +43,9 @@ def read_circle(
         side=SIDE_NAMES[side],
         helm_rad=helm_rad,
         speed_mps=speed_mps,
-        advance_m=way(90, ahead),
-        transfer_m=way(90, across),
-        tactical_diameter_m=way(180, across),
+        advance_m=distance(90, ahead),
+        transfer_m=distance(90, across),
+        tactical_diameter_m=distance(180, across),
         initial_turning_m=sailed_to(run, order_s=order_s, course_rad=course_rad, change_rad=side * TEN),
         steady_diameter_m=_steady_diameter(run, order_s=order_s, course_rad=course_rad, side=side, flow=flow),
         current_north_mps=None if drift is None else float(drift[0]),
@@ -116,12 +116,12 @@ def read_zigzag(
     overshoots = []
     for number, execute in enumerate(executes[1:], start=1):
         until = orders_s[number + 1] if number + 1 < len(orders_s) else float(run.time_s[-1])
-        way = swings[number - 1]
-        top = run.turning_point(execute.time_s, until, side=side * way)
+        sign = swings[number - 1]
+        top = run.turning_point(execute.time_s, until, side=side * sign)
         if top is None:
             break
-        reached = way * side * (top[1] - course_rad)
-        overshoots.append(reached - (way * execute.heading_rad if heading_rad is None else heading_rad))
+        reached = sign * side * (top[1] - course_rad)
+        overshoots.append(reached - (sign * execute.heading_rad if heading_rad is None else heading_rad))
     return ZigZag(
         name=run.name,
         side=SIDE_NAMES[side],

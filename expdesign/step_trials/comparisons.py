@@ -1,4 +1,4 @@
-"""Whether port differs from starboard, and the way up from the way down: nested regressions and their F test."""
+"""Whether port differs from starboard, and steps up from steps down: nested regressions and their F test."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ class Comparison:
 
 
 def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
-    """Asymmetry where both sides were sailed, hysteresis where both ways were, for both commands."""
+    """Asymmetry where both sides were sailed, hysteresis where both directions were, for both commands."""
     steady = [(one, one.plateau) for one in samples if one.plateau is not None]
     found = []
     for channel, command in enumerate(CHANNELS):
         sides = np.array([np.sign(part.state[1]) * (abs(one.hold.commands[1]) > 0) for one, part in steady])
-        ways = np.array([_way(one, channel) for one, _ in steady])
-        for kind, signs in (("asymmetry", sides), ("hysteresis", ways)):
+        directions = np.array([_direction(one, channel) for one, _ in steady])
+        for kind, signs in (("asymmetry", sides), ("hysteresis", directions)):
             found += [_compared(kind, command, channel, steady, signs)]
     return tuple(one for one in found if one is not None)
 
 
-def _way(one: StepSample, channel: int) -> float:
+def _direction(one: StepSample, channel: int) -> float:
     """+1 after a step up of this command, -1 after a step down, 0 after others."""
     return 0.0 if one.hold.channel != channel else (1.0 if one.upward else -1.0)
 

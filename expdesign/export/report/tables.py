@@ -237,7 +237,7 @@ def minutes_sentence(day: ShortestDay) -> str:
     more = f"; slower ships and go-arounds add {words.duration(extra_s)} in the middle of simulated trials"
     return (
         f"Of the {words.duration(length.planned_s)} the way to the goal takes {words.duration(parts.way_s)} at transit "
-        f"speed, runs {words.duration(parts.runs_s)} beyond the way that they make good, and the legs between them "
+        f"speed, runs {words.duration(parts.runs_s)} beyond their distance made good, and the legs between them "
         f"{_signed(parts.legs_s)}{more if extra_s > 0 else ''}."
     )
 

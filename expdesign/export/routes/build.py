@@ -60,7 +60,7 @@ def build_route(
 def build_bridge_route(
     track: PlannedTrack, *, safe_water: shapely.MultiPolygon | None = None, departure: datetime | None = None
 ) -> Route:
-    """Few legs: one for each run, or a stop where runs stay in one place, and the ways between them.
+    """Few legs: one for each run, or a stop where runs stay in one place, and the legs between them.
 
     Neighbouring waypoints are at least `Tuning.waypoint_spacing` ship lengths apart, unless the corridor would leave
     the water. The track stays within the cross-track distances of each leg, to port and to starboard. Where the water

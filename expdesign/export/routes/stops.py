@@ -58,14 +58,14 @@ class Passage:
         runs = [leg for leg in self.legs if leg.kind == "primitive" and leg.first < two[0] and leg.last > one[1]]
         if len(runs) > TUNING.most_mixed_runs:
             return np.inf
-        way = self.sailed_m[two[0]] - self.sailed_m[one[1]]
+        transit_m = self.sailed_m[two[0]] - self.sailed_m[one[1]]
         for run in runs:
-            way -= self.sailed_m[min(run.last, two[0])] - self.sailed_m[max(run.first, one[1])]
+            transit_m -= self.sailed_m[min(run.last, two[0])] - self.sailed_m[max(run.first, one[1])]
         cost = 1.0 + TUNING.stop_cost * self.radius_m(one) / self.length_m + TUNING.mixed_cost * max(len(runs) - 1, 0)
         cost += TUNING.divided_cost * sum(run.first < two[0] < run.last for run in runs)
         wide = TUNING.wide_run_cost if runs else TUNING.wide_way_cost
         cost += wide * max(self.sides(one, two)) / self.length_m
-        cost += TUNING.way_in_run_cost * way / self.length_m if runs else 0.0
+        cost += TUNING.way_in_run_cost * transit_m / self.length_m if runs else 0.0
         near = float(np.hypot(*(self.points[two[0]] - self.points[one[0]]))) < self.spacing_m
         return float(cost + TUNING.near_cost * near)
 
