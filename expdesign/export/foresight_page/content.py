@@ -106,7 +106,7 @@ def _sentences(found: Foresight) -> Iterator[str]:
     within = list(dict.fromkeys(item.cause for item in found.effects if item.needs_runs and item.within_std))
     if within:
         yield (
-            f"No data would show {', '.join(within)} at that size in every case: it is within the standard "
+            f"No data would show {', '.join(within)} at that size in every case: that is within the standard "
             "deviations in the vessel file."
         )
     pairs = list(dict.fromkeys((item.cause, other.cause) for item, other in found.not_told_apart))
