@@ -25,6 +25,11 @@ class Tuning:
         prior_share: spread of a parameter without a stated standard deviation, relative to its size.
         first_horizon_samples: of output error.
         horizon_growth: ratio of successive horizons of output error.
+        shortest_horizon_samples, least_horizon_growth: where the model diverges at a horizon, others are tried down to
+            the one, and up to a ratio of it of the other.
+        diverged_times: a simulation so many times as fast as the largest measurement has diverged.
+        most_partial_searches: without stretches in which the model diverges, of one horizon.
+        most_left_out: share of these, at most.
         most_steps: of Gauss and Newton at one horizon.
         most_damping: of such a step, relative to the diagonal; with more, nothing is left to find.
         remembered_steps: that the next one is mixed with.
@@ -77,6 +82,11 @@ class Tuning:
     prior_share: float = 1.0
     first_horizon_samples: int = 8
     horizon_growth: int = 4
+    shortest_horizon_samples: int = 3
+    least_horizon_growth: float = 1.2
+    diverged_times: float = 10.0
+    most_partial_searches: int = 3
+    most_left_out: float = 0.5
     most_steps: int = 40
     most_damping: float = 1e10
     remembered_steps: int = 5

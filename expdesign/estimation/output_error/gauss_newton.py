@@ -67,9 +67,11 @@ def _check_bounded(problem: Problem, *parts: Array) -> None:
         raise runs_away(problem)
 
 
-def runs_away(problem: Problem) -> NoAnswer:
-    """That the best model found diverges within a stretch."""
-    return NoAnswer(_RUNS_AWAY.format(seconds=len(problem.measured) * problem.compiled.stretches.sample_time_s))
+def runs_away(problem: Problem, answered_s: float = 0.0) -> NoAnswer:
+    """That the best model found diverges within a stretch, and up to which horizon there is an answer."""
+    seconds = len(problem.measured) * problem.compiled.stretches.sample_time_s
+    shorter = f"--horizon {answered_s:.3g}, up to which it does not" if answered_s > 0.0 else "--horizon"
+    return NoAnswer(_RUNS_AWAY.format(seconds=seconds, shorter=shorter))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ def unit(problem: Problem, states: Array) -> float:
 
 _RUNS_AWAY = (
     "output error: the best model found diverges within {seconds:.0f} s, as it does where a current turns the model's "
-    "terms into its own; try a shorter horizon (--horizon), or method iv-augmented, which estimates a mean current"
+    "terms into its own; try a shorter horizon ({shorter}), or method iv-augmented, which estimates a mean current"
 )
 
 

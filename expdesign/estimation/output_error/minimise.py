@@ -15,8 +15,10 @@ beforehand counts as one more measurement, and their errors are in the covarianc
 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
-samples. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
-output is the inverse residual variance of the stage before.
+samples. Where it still diverges, stretches in which it does are
+left out at first, or a horizon between the last two is taken. Of long data only some stretches are
+compared until then, and of fast ones only some samples. The weight of an output is the inverse residual variance of the
+stage before.
 
 Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
 Systems (1981), 102-125, for the stretches.
@@ -24,13 +26,15 @@ Systems (1981), 102-125, for the stretches.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
+from expdesign.errors import NoAnswer
 from expdesign.estimation.output_error.covariance import with_covariance
-from expdesign.estimation.output_error.gauss_newton import minimised, unit
+from expdesign.estimation.output_error.gauss_newton import minimised, runs_away, unit
 from expdesign.estimation.output_error.problem import (
     Excerpt,
     Fitting,
@@ -78,14 +82,28 @@ def minimise_output_error(
     stages = _stages(record, fitting)
     steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
     found: dict[Place, Array] = {}
-    for stage in stages:
+    answered = 0
+    while stages:
+        stage, *later = stages
         problem = build_problem(layout, record, fitting, stage.excerpt, weights)
         steps.begin()
         starts = first_states(problem, found)
         problem = _weighed(problem, values, starts)
-        values, starts = minimised(problem, values, starts, settled=stage.settled, report=steps.report)
+        try:
+            values, starts = minimised(problem, values, starts, settled=stage.settled, report=steps.report)
+        except NoAnswer:
+            if stage.excerpt.without:  # nothing is gained so
+                stages = [replace(later[0], attempts=TUNING.most_partial_searches), *later[1:]]
+                continue
+            easier = _without_diverging(stage, problem, values, starts) or _between(answered, stage)
+            if easier is None:
+                raise runs_away(problem, (answered - 1) * sample_time(record)) from None
+            steps.insert(easier.work(record), easier.steps)
+            stages = [easier, replace(stage, attempts=stage.attempts + 1), *later]
+            continue
         found = dict(zip(problem.places, starts, strict=True))
         weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
+        answered, stages = answered if stage.excerpt.without else stage.excerpt.length, later
     steps.end()
     return with_covariance(problem, layout, record, values, starts)
 
@@ -107,11 +125,13 @@ class Stage:
         excerpt: what is compared.
         settled: ends the search, see `minimised`.
         steps: expected number.
+        attempts: that had no answer.
     """
 
     excerpt: Excerpt
     settled: float
     steps: int
+    attempts: int = 0
 
     def work(self, record: Record) -> float:
         """Samples simulated in a step."""
@@ -137,6 +157,30 @@ def _stages(record: Record, fitting: Fitting) -> list[Stage]:
         Stage(excerpt=whole, settled=TUNING.rough_cost, steps=TUNING.expected_steps),
         Stage(excerpt=whole, settled=TUNING.settled_cost, steps=TUNING.expected_steps),
     ]
+
+
+def _without_diverging(stage: Stage, problem: Problem, values: Array, starts: Array) -> Stage | None:
+    """A search without the stretches in which the model diverges; None where these are many, or were left out before.
+
+    Data that the model follows often mend what makes it diverge in a few stretches.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = np.abs(problem.states(values, starts)).max(axis=(0, 2))
+    diverges = ~(largest < TUNING.diverged_times * np.nanmax(np.abs(problem.measured)))
+    if stage.attempts >= TUNING.most_partial_searches or not 0 < diverges.sum() < TUNING.most_left_out * len(diverges):
+        return None
+    places = zip(problem.batch[diverges].tolist(), problem.first[diverges].tolist(), strict=True)
+    excerpt = replace(stage.excerpt, without=frozenset(places))
+    return Stage(excerpt=excerpt, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps)
+
+
+def _between(answered: int, stage: Stage) -> Stage | None:
+    """A search of a horizon between that of the last answer and one that has none; None where these are near."""
+    samples = round(math.sqrt(max(answered, TUNING.shortest_horizon_samples) * stage.excerpt.length))
+    if samples > stage.excerpt.length / TUNING.least_horizon_growth:
+        return None
+    excerpt = Excerpt(samples=samples, most=TUNING.rough_samples)
+    return Stage(excerpt=excerpt, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps)
 
 
 def _horizons(full: int) -> list[int]:

@@ -143,11 +143,18 @@ class Excerpt:
         samples: of a stretch, as they are compared.
         every: compares every so manieth sample, with the mean inputs until the next.
         most: samples in all, or some more; the stretches between are left out.
+        without: stretches that are left out too, by number of the run and first compared sample.
     """
 
     samples: int
     every: int = 1
     most: float = np.inf
+    without: frozenset[tuple[int, int]] = frozenset()
+
+    @property
+    def length(self) -> int:
+        """Samples of the data from end to end of a stretch."""
+        return self.samples * self.every
 
 
 def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Excerpt, weights: Array) -> Problem:
@@ -157,7 +164,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
     read = [_read(batch)[:: excerpt.every, states] for batch in record.batches]
     drives = [_means(_drive(layout, batch, fitting), excerpt.every) for batch in record.batches]
     cuts = [(number, first) for number, rows in enumerate(read) for first in _firsts(len(rows), samples)]
-    cuts = cuts[:: max(1, int(sum(map(len, read)) / excerpt.most))]
+    cuts = [cut for cut in cuts[:: max(1, int(sum(map(len, read)) / excerpt.most))] if cut not in excerpt.without]
     ends = [_end(first, samples, len(read[number])) for number, first in cuts]
     length = max(end - first for (_, first), end in zip(cuts, ends, strict=True))
     unknown = [0.0] * (len(layout.parameters) + fitting.unexpected)

@@ -34,6 +34,11 @@ class Steps:
         self._estimated.done += TUNING.compiling_samples
         self._tell(expected * work)
 
+    def insert(self, work: float, expected: int) -> None:
+        """Another stage comes before the present one, which is begun again after it."""
+        here = self._place + 1
+        self._stages[here:here] = [(work, expected), self._stages[self._place]]
+
     def report(self, excess: float) -> None:
         """A step is to be taken whose expected decrease is so many times the one that ends the stage."""
         work, expected = self._stages[self._place]
