@@ -18,6 +18,7 @@ from expdesign.dictionary.batch import excite_many
 from expdesign.growing.space import FamilySpace
 from expdesign.growing.tuning import TUNING
 from expdesign.information.many import bordered_runs
+from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
@@ -104,10 +105,12 @@ class Measure:
             for rows in np.split(order, ends)
             for first in range(0, len(rows), TUNING.batch)
         ]
-        found = Runs.joined([self._some([specs[index] for index in rows]) for rows in batches])
+        tasks = ([specs[index] for index in rows] for rows in batches)
+        found = Runs.joined(list(in_order(Measure.of_one_duration, (self,), ((some,) for some in tasks))))
         return found[np.argsort(order, kind="stable")]
 
-    def _some(self, specs: Sequence[PrimitiveSpec]) -> Runs:
+    def of_one_duration(self, specs: Sequence[PrimitiveSpec]) -> Runs:
+        """The same of specifications of one duration, in one batch."""
         runs = excite_many(self.vessel, specs)
         matrices, motion = bordered_runs(
             self.vessel,
