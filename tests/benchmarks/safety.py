@@ -55,18 +55,6 @@ def wandering(forecast: Environment) -> Environment:
 
 
 @contextmanager
-def unbroken() -> Iterator[None]:
-    """Tolerances so wide that no ship ever goes around."""
-    kept = trials.tolerances
-    wide = Tolerances(position_m=AT_ALL, heading_rad=AT_ALL, speed_mps=AT_ALL, yaw_rate_radps=AT_ALL)
-    trials.tolerances = lambda water, spare_m: wide
-    try:
-        yield
-    finally:
-        trials.tolerances = kept
-
-
-@contextmanager
 def as_planned() -> Iterator[None]:
     """No ship sails parallel to a leg."""
     kept = guidance.MONTE_CARLO
@@ -75,6 +63,19 @@ def as_planned() -> Iterator[None]:
         yield
     finally:
         guidance.MONTE_CARLO = kept
+
+
+@contextmanager
+def unbroken() -> Iterator[None]:
+    """Tolerances so wide that no ship ever goes around; legs as planned."""
+    kept = trials.tolerances
+    wide = Tolerances(position_m=AT_ALL, heading_rad=AT_ALL, speed_mps=AT_ALL, yaw_rate_radps=AT_ALL)
+    trials.tolerances = lambda water, spare_m: wide
+    try:
+        with as_planned():
+            yield
+    finally:
+        trials.tolerances = kept
 
 
 def water_of(case: Scenario, plan: Plan) -> LegWater:
