@@ -14,18 +14,20 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """The information of shares of the time, the optimal ones or others.
+    """Shares of the time, the optimal ones or others, and their information.
 
     Attributes:
+        fractions: (q,) time fractions.
         log_det: in physical scale.
         inverse: (d, d) B^-1 in physical scale.
     """
 
+    fractions: Array
     log_det: float
     inverse: Array
 
     def __post_init__(self) -> None:
-        seal(self, inverse="d d")
+        seal(self, fractions="q", inverse="d d")
 
     @property
     def dimension(self) -> int:
@@ -50,7 +52,7 @@ def shared(
     total = np.tensordot(fractions, matrices, axes=1)
     scale = np.sqrt(np.diag(total))
     inverse = np.linalg.inv(total / np.outer(scale, scale)) / np.outer(scale, scale)
-    return Optimum(log_det=log_det(white, fractions) + offset, inverse=inverse)
+    return Optimum(fractions=fractions, log_det=log_det(white, fractions) + offset, inverse=inverse)
 
 
 def sensitivity(best: Optimum, item: PrimitiveInformation, mean_subtraction: str) -> float:
