@@ -187,15 +187,11 @@ def _is_about_as_likely(rival: FittedCandidate, first: FittedCandidate) -> bool:
 
 
 def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_number: bool) -> list[FittedCandidate]:
-    """The best candidate of each other cause with fewer numbers, or as many if it is about as likely.
-
-    And one of the same cause with fewer numbers that is about as likely, such as one parameter of a block.
-    """
+    """The best candidate of each other cause with fewer numbers, or as many if it is about as likely."""
     found: dict[str, FittedCandidate] = {}
     for item in accepted:
-        likely, other = _is_about_as_likely(item, first), item.candidate.cause != first.candidate.cause
-        most = first.numbers if likely and other else first.numbers - 1
-        if ((any_number and other) or item.numbers <= most) and (likely or other):
+        most = first.numbers if _is_about_as_likely(item, first) else first.numbers - 1
+        if (any_number or item.numbers <= most) and item.candidate.cause != first.candidate.cause:
             found.setdefault(item.candidate.cause, item)
     return [*found.values()][: TUNING.shortlist if any_number else TUNING.rivals]
 
