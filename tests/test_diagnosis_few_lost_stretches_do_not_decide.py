@@ -8,16 +8,17 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis import judgement
 from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.conclusions.notes import note_beside_the_same_fit
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import CrossValidation
 from expdesign.diagnosis.fit.cross_validation import error_of_constants
-from expdesign.diagnosis.fit.tuning import TUNING as FIT_TUNING
+from expdesign.diagnosis.fit.tuning import TUNING
+from expdesign.diagnosis.judgement import losses_without
 from expdesign.diagnosis.motion import simulate_from_measured
-from expdesign.diagnosis.select import backward_elimination, selection
+from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
-from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from held_out_cases import errors, steps_of
 
@@ -40,7 +41,7 @@ def test_a_model_that_runs_away_loses_stretches_and_no_more():
     turned = np.where([term.equation == "r" for term in ship.model.terms], -4.0, 1.0) * ship.model.parameters
     wild = replace(ship, model=replace(ship.model, parameters=turned))
     good, bad = (CrossValidation(windows, record).without(None, one) for one in (ship, wild))
-    short = cut_windows(ship.model, record, longest_s=FIT_TUNING.ahead_s)
+    short = cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
     columns = [OUTPUTS.index(name) for name in ship.model.outputs]
     measured = short.measured[..., columns]
     most = error_of_constants(measured, short.batch)
@@ -86,29 +87,14 @@ def test_a_first_cause_that_one_of_many_runs_shows_is_certain_in_stretches(monke
     assert improves_held_out(found, held, 0, object()) == [kept]  # type: ignore[arg-type]
 
 
-def test_causes_are_ordered_by_what_the_likelihood_loses_without_each(monkeypatch):
-    """Both found one after the other; the later one, of two numbers, costs more to leave out, less than its price."""
-    steps = [
-        SimpleNamespace(chosen=SimpleNamespace(fit=name, numbers=numbers)) for name, numbers in (("a", 1), ("all", 2))
-    ]
-    costs = {"all": 100.0, "without a": 140.0, "without all": 170.0}
-    monkeypatch.setattr(selection, "_fit_without", lambda _whole, step, _windows: f"without {step.chosen.fit}")
-    monkeypatch.setattr(selection, "likeliest", lambda fits: SimpleNamespace(noise=fits))
-    monkeypatch.setattr(selection, "profile_cost", lambda fit, _noise: costs[fit])
-    found = selection.evidence_of_each(steps, None)  # type: ignore[arg-type]
-    np.testing.assert_allclose(found, [40.0 - TUNING.price, 70.0 - 2 * TUNING.price])
-    monkeypatch.setattr(selection, "_fit_without", lambda _whole, step, _windows: None)
-    assert np.isinf(selection.evidence_of_each(steps, None)).all()  # type: ignore[arg-type]
-    assert selection.evidence_of_each(steps[:1], None).tolist() == [0.0]  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(("runs", "ahead", "kept"), [(6, 70.0, True), (5, 70.0, False), (5, 75.0, True)])
-def test_that_all_of_a_few_runs_gain_makes_no_later_cause_certain(runs, ahead, kept):
-    """Five may all gain by chance in one of 16 trials, six in one of 32; stretches tell then."""
-    whole = [replace(errors(fit), squared_error=errors(fit).squared_error[:runs],
-                     squared_deviation=errors(fit).squared_deviation[:runs]) for fit in (50.0, 70.0, 74.0)]  # fmt: skip
-    held = [
-        replace(item, ahead=lambda short=short: replace(errors(short), in_stretches=True))
-        for item, short in zip(whole, (50.0, 70.0, ahead), strict=True)
-    ]
-    assert improves_held_out(steps_of("first", "later"), held, 0) == [True, kept]
+def test_causes_are_ordered_by_what_the_model_loses_without_each(monkeypatch):
+    """The first cause gains 20 points and the second 10 after it, but without the second 10 are lost, else 5."""
+    found = steps_of("first", "second")
+    held = [errors(value) for value in (50.0, 70.0, 80.0, 90.0)]  # a third cause was taken out
+    only_second = SimpleNamespace(chosen=SimpleNamespace(fit="second alone"))
+    monkeypatch.setattr(judgement, "without_step", lambda *_: [only_second])
+    validation = SimpleNamespace(of={"second alone": errors(75.0)}.get)
+    np.testing.assert_allclose(losses_without(found, held, validation, None), [5.0, 10.0])  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "without_step", lambda *_: None)
+    np.testing.assert_allclose(losses_without(found, held, validation, None), [np.inf, 10.0])  # type: ignore[arg-type]
+    assert losses_without(steps_of(), held, validation, None).size == 0  # type: ignore[arg-type]

@@ -46,7 +46,7 @@ from expdesign.diagnosis.fit import (
     with_longer_windows,
     within_stated_std,
 )
-from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, without_harm
+from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, losses_without, without_harm
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
@@ -55,7 +55,6 @@ from expdesign.diagnosis.select import (
     Selection,
     Step,
     eliminate_backward,
-    evidence_of_each,
     leading_candidates,
     select_forward,
 )
@@ -120,7 +119,7 @@ def diagnose(
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
     findings = _findings(chosen, windows, proposals, seed)
-    order = np.argsort(-evidence_of_each(chosen.kept.steps, windows), kind="stable").tolist()
+    order = np.argsort(-losses_without(chosen.kept, chosen.held, chosen.validation, windows), kind="stable").tolist()
     steps = [chosen.kept.steps[index] for index in order]
     ranked = tuple(findings[index] for index in order)
     harmless = bool(findings) or not harms(ship, chosen.kept.last.ship, record)
@@ -216,7 +215,8 @@ def _select(
         progress = reported.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
         return errors_as_judged(found, as_stated, validation, windows, progress, seed)
 
-    re_estimated = validation.of(found.first) if found.first.keys and found.steps else None
+    comparable = found.steps and found.first.keys and within_stated_std(found.first)
+    re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     rest = with_unlisted_terms(kept, held, windows, validation, seed)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])

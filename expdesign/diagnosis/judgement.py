@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import WHOLE_S, pooled_fit
 from expdesign.diagnosis.data import Windows, cut_windows
@@ -26,6 +28,7 @@ from expdesign.diagnosis.select import (
     fitted_ahead,
     improves_held_out,
     only_nuisance,
+    without_step,
 )
 from expdesign.progress import Progress, within
 from expdesign.signals import Record
@@ -110,6 +113,32 @@ def _cross_validated(
     if fitted:
         results[:2] = [max(results[:2], key=lambda held: held.mean_fit)]
     return results
+
+
+def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows) -> Array:
+    """(causes,) [points] mean fit to held-out data that the model of all causes loses without each, others fitted anew.
+
+    Infinite where there is no fit without it. What each gains on the model before it depends on the order in which
+    they were found; this does not.
+
+    Args:
+        found: the selection.
+        held: errors on held-out units of the model before any cause, then after every step, and perhaps of more.
+        validation: of other fits.
+        windows: all data.
+
+    Source: J. Lei, M. G'Sell, A. Rinaldo, R. J. Tibshirani and L. Wasserman, Journal of the American Statistical
+    Association 113 (2018), 1094-1111, section 6: leave one covariate out.
+    """
+    if not found.steps:
+        return np.zeros(0)
+    *_, last, whole = held[: len(found.steps) + 1]
+    losses = []
+    for index in range(len(found.steps) - 1):
+        others = without_step(list(found.steps), index, windows)
+        one = None if others is None else validation.of(others[-1].chosen.fit).like(whole)
+        losses.append(np.inf if one is None else whole.mean_fit - one.mean_fit)
+    return np.array([*losses, whole.mean_fit - last.mean_fit])
 
 
 def without_harm(

@@ -117,8 +117,8 @@ class Diagnosis:
         windows: the data as compared.
         unit: what gains are measured on, in words.
         before, after: accuracy of both on all batches, in sample.
-        findings: by their evidence in the model of all; each gain is relative to the model with the causes that were
-            found before.
+        findings: by what the model of all loses on held-out data without each; each gain is relative to the model with
+            the causes that were found before.
         verdict: one sentence.
         unexplained: what remains; None where the simulation explains much, or all but the noise.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.

@@ -113,7 +113,7 @@ def verdict(
     """The whole diagnosis in one sentence.
 
     Args:
-        findings: by their evidence.
+        findings: by what the model loses without each.
         before: accuracy of the model in use.
         unit: what gains are measured on.
         unexplained: what remains, if that is much.

@@ -11,14 +11,7 @@ from expdesign.diagnosis.select.candidate_disturbances import candidate_disturba
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection import (
-    Selection,
-    Step,
-    evidence_of_each,
-    fitted_ahead,
-    redundant_step,
-    without_step,
-)
+from expdesign.diagnosis.select.selection import Selection, Step, fitted_ahead, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
 
@@ -30,7 +23,6 @@ __all__ = [
     "Step",
     "candidate_disturbances",
     "eliminate_backward",
-    "evidence_of_each",
     "fit_nuisance",
     "fitted_ahead",
     "gain_beside_the_same_fit",

@@ -172,16 +172,14 @@ def _is_certain_ahead(
     """Whether the gain of a step is certain, or else that in short stretches is.
 
     Stretches of one run share its slow errors, so their interval is too narrow: a cause after the first needs a clear
-    gain there too. Of fewer than `Tuning.fewest_units` runs all may gain by chance (the sign test: W. J. Dixon and
-    A. M. Mood, Journal of the American Statistical Association 41 (1946), 557-566), whatever their bootstrap says.
+    gain there too.
     """
     gain, (low, _) = gained
     least = TUNING.clear_gain_points if index else 0.0
     if held[0].in_stretches:
         return low > 0.0 and gain > least
     before, after = (held[place].ahead for place in (index, index + 1))
-    enough = len(held[index].squared_error) >= TUNING.fewest_units
-    if (low > 0.0 and enough) or before is None or after is None:
+    if low > 0.0 or before is None or after is None:
         return True
     gain, (low, _) = held_out_gain(before(), after(), seed)
     return low > 0.0 and gain > least

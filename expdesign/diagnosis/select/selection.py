@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +9,10 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, continuing, fit, fit_ahead, likeliest, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.fit import Fit, continuing, fit, fit_ahead, log_likelihood_gain
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.values import Array
 
 SHAPE = ("roll:period", "roll:damping")
 """Effects that describe the kind of an oscillation, not its size."""
@@ -102,22 +100,6 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
         if p_value > TUNING.level or lost < TUNING.price * count:
             return index
     return None
-
-
-def evidence_of_each(steps: Sequence[Step], windows: Windows) -> Array:
-    """(steps,) likelihood ratio statistic of the model of all against that without each, less the price of its effects.
-
-    All other effects are fitted anew, so this does not depend on the order in which the steps were found: what only
-    approximated a cause that was found later has lost its evidence. Infinite where there is no fit without a step.
-    """
-    if len(steps) < 2:
-        return np.zeros(len(steps))
-    whole = steps[-1].chosen.fit
-    reduced = [_fit_without(whole, step, windows) for step in steps]
-    noise = likeliest([whole, *(item for item in reduced if item is not None)]).noise
-    costs = [np.inf if item is None else profile_cost(item, noise) for item in reduced]
-    prices = [TUNING.price * step.chosen.numbers for step in steps]
-    return np.array(costs) - profile_cost(whole, noise) - prices
 
 
 def without_step(steps: list[Step], index: int, windows: Windows) -> list[Step] | None:
