@@ -227,6 +227,7 @@ def open_table(found: Mapping[str, Sequence[DesignErrors]]) -> StudyTable:
             for name, designs in found.items()
             for item in designs
         ),
+        text_columns=2,
     )
 
 

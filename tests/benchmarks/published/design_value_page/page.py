@@ -62,12 +62,14 @@ class StudyTable:
         header: names of the columns.
         rows: as many cells each.
         note: what to know about it.
+        text_columns: how many columns to the left hold words; the others hold numbers.
     """
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    text_columns: int = 1
 
 
 def design_value_html(
