@@ -15,10 +15,9 @@ beforehand counts as one more measurement, and their errors are in the covarianc
 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
 grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
-samples. Where it still diverges, stretches in which it does are
-left out at first, or a horizon between the last two is taken. Of long data only some stretches are
-compared until then, and of fast ones only some samples. The weight of an output is the inverse residual variance of the
-stage before.
+samples. Where it still diverges, stretches in which it does are left out at first, or a horizon between the last two is
+taken. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
+output is the inverse residual variance of the stage before.
 
 Source: L. Ljung, System Identification, 2nd ed. (1999), 4.2 and 9.3; H. G. Bock, in Modelling of Chemical Reaction
 Systems (1981), 102-125, for the stretches.
