@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from expdesign.monitoring.yaw import YawData
-from expdesign.simulation.naval import NOMINAL, Hull, Voyage, sail, sail_many
+from naval_ship import NOMINAL, Hull, Voyage, sail, sail_many
 
 NOISE = {"r": 0.0025, "sway_acceleration": 0.015, "u": 0.15, "v": 0.15, "phi": 0.025, "moment": 5e4}
 STEP_S = 0.1

@@ -13,12 +13,9 @@ from expdesign import workflows
 from expdesign.errors import FileError, InputError
 from expdesign.monitoring import calibrate
 from expdesign.monitoring.yaw import (
-    NOMINAL,
     YAW_MODELS,
-    Detector,
     YawData,
     YawShip,
-    alarm_samples,
     estimate_yaw,
     estimate_yaw_by_instruments,
     halves_in_words,
@@ -26,11 +23,9 @@ from expdesign.monitoring.yaw import (
     start_values,
     yaw_changes,
     yaw_grams,
-    yaw_rates,
 )
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
-from expdesign.simulation.naval import NOMINAL as NOMINAL_HULL
 from naval_case import (
     BRISK,
     CALM,
@@ -45,6 +40,8 @@ from naval_case import (
     naval_csvs,
     turn,
 )
+from naval_ship import NOMINAL, YAW_TRUE
+from yaw_detector import Detector, alarm_samples
 
 FULL, SIMPLE = YAW_MODELS["full"], YAW_MODELS["simplified"]
 REFERENCES = 4
@@ -81,7 +78,7 @@ def test_the_model_is_integrated_exactly_where_it_has_a_solution() -> None:
 def test_from_data_alone_the_search_ends_where_it_does_from_the_truth(departure: YawData) -> None:
     for model in (FULL, SIMPLE):
         blind = estimate_yaw(model, departure, start_values(model, departure))
-        known = estimate_yaw(model, departure, NOMINAL)
+        known = estimate_yaw(model, departure, YAW_TRUE)
         assert blind.parameters == pytest.approx(known.parameters, rel=1e-3)
 
 
@@ -94,17 +91,17 @@ def test_voyages_of_one_ship_share_its_parameters(departure: YawData) -> None:
             for name in ("r", "sway_acceleration", "u", "v", "phi", "moment")
         },
     )
-    shared = estimate_yaw(FULL, both, NOMINAL, groups=np.zeros(2, dtype=int))
+    shared = estimate_yaw(FULL, both, YAW_TRUE, groups=np.zeros(2, dtype=int))
     assert shared.parameters.shape == (1, len(FULL.parameters))
-    alone = estimate_yaw(FULL, halves[0], NOMINAL)
-    apart = estimate_yaw(FULL, both, NOMINAL, groups=np.arange(2))
+    alone = estimate_yaw(FULL, halves[0], YAW_TRUE)
+    apart = estimate_yaw(FULL, both, YAW_TRUE, groups=np.arange(2))
     np.testing.assert_allclose(apart.parameters[0], alone.parameters[0], rtol=1e-6)
     for name in ("I_r", "N_rr", "N_rv"):
-        assert shared.of(name)[0] == pytest.approx(NOMINAL[name], rel=0.02)
+        assert shared.of(name)[0] == pytest.approx(YAW_TRUE[name], rel=0.02)
 
 
 def test_without_noise_instruments_and_output_error_agree(departure: YawData) -> None:
-    crossed, plain = (f(FULL, departure, NOMINAL) for f in (estimate_yaw_by_instruments, estimate_yaw))
+    crossed, plain = (f(FULL, departure, YAW_TRUE) for f in (estimate_yaw_by_instruments, estimate_yaw))
     for name in ("I_r", "A", "N_rr", "N_rv", "N_uv"):
         assert crossed.of(name)[0] == pytest.approx(plain.of(name)[0], rel=0.05)
 
@@ -114,10 +111,10 @@ def test_instruments_take_away_the_bias_that_noisy_inputs_leave() -> None:
     voyage = harbour(seconds=500.0, seed=1, step_s=0.5)
     data = measured(voyage, count=40, seed=3, noise=5.0**-0.5, averaged=1)
     names = ("I_r", "M_v", "A")
-    plain, crossed = estimate_yaw(FULL, data, NOMINAL), estimate_yaw_by_instruments(FULL, data, NOMINAL)
+    plain, crossed = estimate_yaw(FULL, data, YAW_TRUE), estimate_yaw_by_instruments(FULL, data, YAW_TRUE)
     found = np.isfinite(crossed.fit)
     assert found.mean() > 0.9
-    unbiased = estimate_yaw_by_instruments(FULL, exact(voyage), NOMINAL)
+    unbiased = estimate_yaw_by_instruments(FULL, exact(voyage), YAW_TRUE)
 
     def bias(estimates: np.ndarray, truth: float) -> float:
         """In standard errors of the mean."""
@@ -134,7 +131,7 @@ def test_instruments_take_away_the_bias_that_noisy_inputs_leave() -> None:
 
 def test_stretches_show_the_changes_of_the_ship_that_sailed_them(folder: Path) -> None:
     vessel = load_vessel(folder / "ship.toml")
-    ship = YawShip(model=FULL, vessel=vessel.model, parameters=NOMINAL)
+    ship = YawShip(model=FULL, vessel=vessel.model, parameters=YAW_TRUE)
     changes = yaw_changes(ship)
     record = load_records(folder / "heavier.csv", vessel_inputs=vessel.model.inputs)
     nominal = load_records(folder / "same.csv", vessel_inputs=vessel.model.inputs)
@@ -156,7 +153,7 @@ def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, mode
     assert told["same"]["alarms"] == []
     alarm = told["heavier"]["alarms"][-1]
     assert alarm["effect"] == "yaw:I_r"
-    assert alarm["value"] / NOMINAL["I_r"] == pytest.approx(0.108, abs=0.05)
+    assert alarm["value"] / YAW_TRUE["I_r"] == pytest.approx(0.108, abs=0.05)
     notes = " ".join(told["same"]["notes"])
     assert "learnt by output error" in notes
     assert "The reference determines" in notes
@@ -192,9 +189,9 @@ def test_halves_that_disagree_at_equal_fit_raise_the_alarm_of_poor_data() -> Non
             for name in ("r", "sway_acceleration", "u", "v", "phi", "moment")
         },
     )
-    poor = halves_in_words(estimate_yaw(FULL, both, NOMINAL, groups=np.arange(2)))
+    poor = halves_in_words(estimate_yaw(FULL, both, YAW_TRUE, groups=np.arange(2)))
     assert "differ" in poor
-    same = estimate_yaw(FULL, data, NOMINAL)
+    same = estimate_yaw(FULL, data, YAW_TRUE)
     twice = replace(same, parameters=np.tile(same.parameters, (2, 1)), std=np.tile(same.std, (2, 1)), fit=[90.0, 91.0])
     assert "within a factor of three, with fits of 90.0 and 91.0 %" in halves_in_words(twice)
     apart = replace(twice, parameters=same.parameters * np.array([[1.0], [4.0]]))
@@ -204,8 +201,7 @@ def test_halves_that_disagree_at_equal_fit_raise_the_alarm_of_poor_data() -> Non
 def inertial_difference(how: Orders, *, count: int) -> float:
     """Yaw rate of a ship with 10 % more moment of inertia less that of the nominal one, root mean square [rad/s]."""
     nominal, heavy = (
-        fleet(hull, how, count=count, seed=0, seconds=150.0, step_s=0.5)
-        for hull in (NOMINAL_HULL, heavier(inertia=1.1))
+        fleet(hull, how, count=count, seed=0, seconds=150.0, step_s=0.5) for hull in (NOMINAL, heavier(inertia=1.1))
     )
     apart = [one.column("r") - other.column("r") for one, other in zip(nominal, heavy, strict=True)]
     return float(np.sqrt(np.mean(np.square(apart))))
@@ -224,12 +220,12 @@ def test_the_sum_of_the_thesis_finds_more_inertia_where_orders_change_often() ->
     constants = Detector(d=0.0025, l=3.5e-5, h=0.018)
     runs, missed = 20, {}
     for name, how in (("calm", CALM), ("brisk", BRISK)):
-        learnt = measured_fleet(fleet(NOMINAL_HULL, how, count=2, seed=9000), seed=5000, averaged=7, every=4)
-        priors = estimate_yaw(FULL, learnt, NOMINAL).parameters
+        learnt = measured_fleet(fleet(NOMINAL, how, count=2, seed=9000), seed=5000, averaged=7, every=4)
+        priors = estimate_yaw(FULL, learnt, YAW_TRUE).parameters
         residuals = []
-        for hull, seed in ((NOMINAL_HULL, 3000), (heavier(inertia=1.1), 4000)):
+        for hull, seed in ((NOMINAL, 3000), (heavier(inertia=1.1), 4000)):
             data = measured_fleet(fleet(hull, how, count=runs, seed=0), seed=seed, averaged=7)
-            residuals.append(np.concatenate([data.r - yaw_rates(FULL, data, theta) for theta in priors]))
+            residuals.append(np.concatenate([data.r - simulate_yaw(FULL, data, theta)[0] for theta in priors]))
         false, found = (np.isfinite(alarm_samples(constants, residual)).mean() for residual in residuals)
         assert false < 0.3
         missed[name] = 1.0 - found
@@ -238,12 +234,11 @@ def test_the_sum_of_the_thesis_finds_more_inertia_where_orders_change_often() ->
 
 
 def test_sensitivities_are_the_differences_of_yaw_rates(departure: YawData) -> None:
-    values = np.array([NOMINAL[name] for name in FULL.parameters])
-    rates, sensitivities = simulate_yaw(FULL, departure, values)
-    np.testing.assert_allclose(yaw_rates(FULL, departure, values), rates, atol=1e-12)
+    values = np.array([YAW_TRUE[name] for name in FULL.parameters])
+    _, sensitivities = simulate_yaw(FULL, departure, values)
     for index, step in enumerate(1e-5 * values):
         moved = np.zeros_like(values)
         moved[index] = step
-        higher, lower = (yaw_rates(FULL, departure, values + sign * moved) for sign in (1.0, -1.0))
+        higher, lower = (simulate_yaw(FULL, departure, values + sign * moved)[0] for sign in (1.0, -1.0))
         own = sensitivities[..., index]
         np.testing.assert_allclose((higher - lower) / (2.0 * step), own, atol=1e-5 * np.abs(own).max())

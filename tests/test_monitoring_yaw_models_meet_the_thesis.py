@@ -8,19 +8,16 @@ import numpy as np
 import pytest
 
 from expdesign.monitoring.yaw import (
-    NOMINAL,
     YAW_MODELS,
-    Detector,
     YawData,
-    alarm_samples,
     estimate_yaw,
-    excitation_rank,
     halves_differ,
     simulate_yaw,
     term_budget,
 )
-from expdesign.simulation.naval import Hull, Pods, Voyage, pod_force, sail
 from naval_case import exact, harbour, heavier, measured, rotation, turn
+from naval_ship import YAW_TRUE, Hull, Pods, Voyage, pod_force, sail
+from yaw_detector import Detector, alarm_samples, excitation_rank
 
 FULL, SIMPLE = YAW_MODELS["full"], YAW_MODELS["simplified"]
 
@@ -78,13 +75,13 @@ def test_without_drives_the_ship_loses_energy_and_mirrored_orders_give_the_mirro
 
 def test_the_full_model_with_true_parameters_is_the_yaw_row_of_the_ship(turned: Voyage) -> None:
     data = exact(turned)
-    values = np.array([NOMINAL[name] for name in FULL.parameters])
+    values = np.array([YAW_TRUE[name] for name in FULL.parameters])
     found = simulate_yaw(FULL, data, values)[0][0]
     assert np.abs(found - data.r[0]).max() < 2e-3 * np.abs(data.r[0]).max()
 
 
 def shares(data: YawData, low: int, high: int) -> dict[str, float]:
-    budget = {name: np.abs(moment[0, low:high]).mean() for name, moment in term_budget(FULL, data, NOMINAL).items()}
+    budget = {name: np.abs(moment[0, low:high]).mean() for name, moment in term_budget(FULL, data, YAW_TRUE).items()}
     whole = sum(budget.values())
     return {name: value / whole for name, value in budget.items()}
 
@@ -113,39 +110,41 @@ def test_inertia_shows_on_the_spot_and_hardly_in_a_turn(turned: Voyage, rotated:
 
 def test_exact_data_give_the_true_parameters_and_a_wrong_force_scales_them_all(departure: Voyage) -> None:
     data = exact(departure)
-    found = estimate_yaw(FULL, data, NOMINAL)
+    found = estimate_yaw(FULL, data, YAW_TRUE)
     assert found.fit[0] > 99.9
     for name in ("I_r", "A", "N_rr", "N_rv", "N_uv"):
-        assert found.of(name)[0] == pytest.approx(NOMINAL[name], rel=0.03)
+        assert found.of(name)[0] == pytest.approx(YAW_TRUE[name], rel=0.03)
     scaled = replace(data, moment=1.25 * data.moment)
-    again = estimate_yaw(FULL, scaled, {name: 1.25 * value for name, value in NOMINAL.items()})
+    again = estimate_yaw(FULL, scaled, {name: 1.25 * value for name, value in YAW_TRUE.items()})
     assert again.parameters == pytest.approx(1.25 * found.parameters, rel=1e-6)
     assert again.fit == pytest.approx(found.fit, abs=1e-6)
 
 
 def test_fewer_parameters_have_more_bias_and_less_spread(departure: Voyage) -> None:
     data = measured(departure, count=12, seed=2, every=4)
-    full, simple = (estimate_yaw(model, data, NOMINAL) for model in (FULL, SIMPLE))
+    full, simple = (estimate_yaw(model, data, YAW_TRUE) for model in (FULL, SIMPLE))
     for name in ("A", "N_uv"):
-        assert abs(simple.of(name).mean() - NOMINAL[name]) > abs(full.of(name).mean() - NOMINAL[name])
+        assert abs(simple.of(name).mean() - YAW_TRUE[name]) > abs(full.of(name).mean() - YAW_TRUE[name])
         assert simple.of(name).std() < full.of(name).std()
-    spread = full.parameters.std(axis=0) / np.abs([NOMINAL[name] for name in FULL.parameters])
+    spread = full.parameters.std(axis=0) / np.abs([YAW_TRUE[name] for name in FULL.parameters])
     assert FULL.parameters[int(spread.argmin())] == "I_r"
     assert FULL.parameters[int(spread.argmax())].startswith("N_phi")
-    without_noise = estimate_yaw(SIMPLE, exact(departure), NOMINAL)
-    assert abs(without_noise.of("N_uv")[0] / NOMINAL["N_uv"] - 1.0) > 0.2
+    without_noise = estimate_yaw(SIMPLE, exact(departure), YAW_TRUE)
+    assert abs(without_noise.of("N_uv")[0] / YAW_TRUE["N_uv"] - 1.0) > 0.2
 
 
 def test_ten_per_cent_of_inertia_is_seen_and_of_mass_is_not(departure: Voyage) -> None:
-    nominal = estimate_yaw(SIMPLE, measured(departure, count=10, seed=3, every=4), NOMINAL).of("I_r")
+    nominal = estimate_yaw(SIMPLE, measured(departure, count=10, seed=3, every=4), YAW_TRUE).of("I_r")
     heavy = estimate_yaw(
-        SIMPLE, measured(harbour(heavier(inertia=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4), NOMINAL
+        SIMPLE,
+        measured(harbour(heavier(inertia=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4),
+        YAW_TRUE,
     ).of("I_r")
     spread = np.hypot(nominal.std(), heavy.std())
     assert heavy.mean() - nominal.mean() > 1.5 * spread
-    before = estimate_yaw(FULL, measured(departure, count=10, seed=3, every=4), NOMINAL).of("M_v")
+    before = estimate_yaw(FULL, measured(departure, count=10, seed=3, every=4), YAW_TRUE).of("M_v")
     after = estimate_yaw(
-        FULL, measured(harbour(heavier(mass=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4), NOMINAL
+        FULL, measured(harbour(heavier(mass=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4), YAW_TRUE
     ).of("M_v")
     assert abs(after.mean() - before.mean()) < np.hypot(before.std(), after.std())
 
@@ -154,10 +153,10 @@ def test_damping_and_coriolis_are_one_unless_the_ship_goes_astern(turned: Voyage
     separate = YAW_MODELS["separate"]
     size = len(separate.parameters)
     assert turned.column("u").min() >= 0
-    assert excitation_rank(separate, exact(turned), NOMINAL) == size - 1
+    assert excitation_rank(separate, exact(turned), YAW_TRUE) == size - 1
     assert rotated.column("u").max() <= 1e-9
-    assert excitation_rank(separate, exact(rotated), NOMINAL) == size - 1  # astern throughout
-    assert excitation_rank(separate, exact(rotation(ahead=2.0)), NOMINAL) == size
+    assert excitation_rank(separate, exact(rotated), YAW_TRUE) == size - 1  # astern throughout
+    assert excitation_rank(separate, exact(rotation(ahead=2.0)), YAW_TRUE) == size
 
 
 def test_halves_of_a_poor_voyage_disagree_and_those_of_a_rich_one_do_not(turned: Voyage) -> None:
@@ -167,7 +166,7 @@ def test_halves_of_a_poor_voyage_disagree_and_those_of_a_rich_one_do_not(turned:
     differ = []
     for data in (rich, poor):
         half = data.r.shape[1] // 2
-        halves = [estimate_yaw(FULL, data.part(part), NOMINAL) for part in (slice(0, half), slice(half, None))]
+        halves = [estimate_yaw(FULL, data.part(part), YAW_TRUE) for part in (slice(0, half), slice(half, None))]
         differ.append(halves_differ(*halves)[0, known].sum())
     assert differ[0] == 0
     assert differ[1] > 0

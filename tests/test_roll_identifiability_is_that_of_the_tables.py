@@ -6,8 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from expdesign.roll import G_MPS2, Body, Load, axis_inertia, first_moment, parameters, pendulum_system
+from expdesign.roll import G_MPS2, Body, Load, axis_inertia, first_moment, parameters
 from expdesign.values import Array
+from roll_closed_forms import pendulum_system
 
 PENDULUM = {"M": 22.0, "z_g": -0.02, "k": 10.4, "I_x": 0.14, "d": 0.11, "I_xm": 0.003, "m": 0.7, "z_m": -0.27}
 SHIP = {

@@ -14,21 +14,16 @@ from expdesign.roll import (
     Body,
     Load,
     axis_inertia,
-    closed_loop,
     coefficients,
-    continuous,
     discrete,
     first_moment,
-    load_from,
     named,
-    own_parameters,
     parameters,
-    pendulum_system,
     sensed_inertia,
-    simulated,
     stiffness,
 )
 from expdesign.waves import Jonswap, encounter, froude_factor
+from roll_closed_forms import closed_loop, continuous, load_from, own_parameters, pendulum_system, simulated
 from roll_truths import MODEL_SHIP, MODEL_SHIP_TRUTH, PENDULUM, PENDULUM_TRUTH, Hull, ship_system
 
 LOAD = Load(mass_kg=0.2, z_m=-0.274)

@@ -11,17 +11,14 @@ Source: doctoral thesis on grey-box identification of ship roll with few sensors
 several load conditions), chapters 4 to 6.
 """
 
-from expdesign.roll.closed_loop import ClosedLoop, closed_loop, simulated
 from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, build_problem, estimate_roll
 from expdesign.roll.fitted import fitted_pendulum
 from expdesign.roll.model import (
-    COEFFICIENTS,
     MEANINGS,
     PARAMETERS,
     UNITS,
     Coefficients,
     coefficients,
-    continuous,
     discrete,
     froude_scaled,
     named,
@@ -31,9 +28,8 @@ from expdesign.roll.model import (
     stiffness,
 )
 from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, direction, null_space, open_directions
-from expdesign.roll.pendulum import load_from, own_parameters, pendulum_system
 from expdesign.roll.prepare import LowPass, low_pass, prepared
-from expdesign.roll.runs import SIGNALS, Case, Run
+from expdesign.roll.runs import Case, Run
 from expdesign.roll.tuning import TUNING
 from expdesign.vessel.masses import (
     G_MPS2,
@@ -46,18 +42,15 @@ from expdesign.vessel.masses import (
 )
 
 __all__ = [
-    "COEFFICIENTS",
     "G_MPS2",
     "MEANINGS",
     "METHODS",
     "NOMINAL",
     "PARAMETERS",
-    "SIGNALS",
     "TUNING",
     "UNITS",
     "Body",
     "Case",
-    "ClosedLoop",
     "Coefficients",
     "Cure",
     "Direction",
@@ -69,9 +62,7 @@ __all__ = [
     "Run",
     "axis_inertia",
     "build_problem",
-    "closed_loop",
     "coefficients",
-    "continuous",
     "cures",
     "direction",
     "discrete",
@@ -79,18 +70,14 @@ __all__ = [
     "first_moment",
     "fitted_pendulum",
     "froude_scaled",
-    "load_from",
     "low_pass",
     "named",
     "null_space",
     "open_directions",
-    "own_parameters",
     "parameters",
-    "pendulum_system",
     "prepared",
     "relative_sensitivity",
     "roll_frequency",
     "sensed_inertia",
-    "simulated",
     "stiffness",
 ]

@@ -51,8 +51,6 @@ FROUDE = {
     "z_f": "length", "m": "mass", "z_m": "length",
 }  # fmt: skip
 """Parameter -> quantity of Froude's law that it scales as; kg m scales as a moment, as gravity does not change."""
-COEFFICIENTS = ("alpha1", "alpha2", "beta1", "kappa1", "gamma1")
-"""Coefficients of the continuous equation: d, k - K_vd g, -(K_vd + S1), K_r and K_delta, each over A2."""
 
 
 def parameters(**values: float) -> Array:
@@ -94,7 +92,9 @@ class Coefficients:
 
 
 def coefficients(theta: Array, body: Body, load: Load | None) -> Coefficients:
-    """Coefficients of the continuous equation, `COEFFICIENTS`.
+    """alpha1, alpha2, beta1, kappa1, gamma1 of the continuous equation.
+
+    They are d, k - K_vd g, -(K_vd + S1), K_r and K_delta, each over A2.
 
     Args:
         theta: (9,) parameters.
@@ -129,14 +129,6 @@ def discrete(theta: Array, body: Body, load: Load | None, step_s: float) -> Coef
     values = np.array([part[0] for part in parts]) / below
     slopes = np.array([part[1] for part in parts])
     return Coefficients(values=values, jacobian=(slopes - np.outer(values, below_by)) / below)
-
-
-def continuous(values: Array, step_s: float) -> Array:
-    """`COEFFICIENTS` (5,) from those of the sampled equation (5,), the inverse of the bilinear map."""
-    a1, a2, *gains = values
-    below = 1.0 - a1 + a2
-    rates = 4.0 / step_s * (1.0 - a2) / below, 4.0 / step_s**2 * (1.0 + a1 + a2) / below
-    return np.array([*rates, *(8.0 / step_s * gain / below for gain in gains)])
 
 
 def stiffness(theta: Array, body: Body, load: Load | None) -> float:

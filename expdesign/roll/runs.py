@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import Load
 
-SIGNALS = ("roll rate", "accelerometer", "yaw rate", "rudder")
-"""Columns of a run."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:

@@ -62,12 +62,6 @@ def simulate_yaw(model: YawModel, data: YawData, parameters: Array) -> tuple[Arr
     return rates.T, np.moveaxis(sensitivity, 0, 1)
 
 
-def yaw_rates(model: YawModel, data: YawData, parameters: Array) -> Array:
-    """`simulate_yaw` without sensitivities: yaw rates (n, k)."""
-    theta = np.broadcast_to(parameters, (len(data.r), len(model.parameters)))
-    return np.asarray(_integrated(_coefficients(model.shapes(data), data, theta), data).T)
-
-
 def _coefficients(shapes: Array, data: YawData, theta: Array) -> Array:
     """(4, k, n) of 1, r, |r| and r|r| in dr/dt."""
     by = np.einsum("pknj,nj->pkn", shapes, theta[:, 1:])

@@ -107,9 +107,9 @@ WORDS: Mapping[str, str] = {
     "N_abs_u_r": "damping", "m_xg": "Coriolis moment",
 }  # fmt: skip
 """Parameters in words."""
-NOMINAL: Mapping[str, float] = {
-    "I_r": 62.4e6, "M_v": -1.75142e6, "A": -3.49658e6, "N_rr": -202e6, "N_rv": -15.6e6, "N_phiur": -4.98e6,
-    "N_uv": -92e3, "N_phiuv": -0.214e6, "N_phiuu": -8e3, "N_abs_u_r": -4.71e6,
-    "m_xg": -1.21342e6,
-}  # fmt: skip
-"""Of the naval vessel of `expdesign.simulation.naval`."""
+
+
+def term_budget(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> dict[str, Array]:
+    """Parameter -> (n, k) moment of its term [Nm] along the measured motion."""
+    values = model.terms(data)
+    return {name: parameters[name] * values[..., place] for place, name in enumerate(model.parameters[1:])}

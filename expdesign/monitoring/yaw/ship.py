@@ -15,9 +15,8 @@ from expdesign.errors import InputError
 from expdesign.monitoring.changes import Change
 from expdesign.monitoring.evidence import STARTS, Grams, stretch_kinds
 from expdesign.monitoring.tuning import TUNING
-from expdesign.monitoring.yaw.budget import term_budget
 from expdesign.monitoring.yaw.estimate import LARGEST_RATE, simulate_yaw
-from expdesign.monitoring.yaw.model import WORDS, YawData, YawModel
+from expdesign.monitoring.yaw.model import WORDS, YawData, YawModel, term_budget
 from expdesign.monitoring.yaw.recorded import SAMPLES, voyages
 from expdesign.signals import Record
 from expdesign.values import Array

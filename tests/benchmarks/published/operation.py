@@ -22,22 +22,19 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from dataclasses import replace
 
 from expdesign.monitoring.yaw import (
-    NOMINAL,
     YAW_MODELS,
-    Detector,
     YawData,
     YawModel,
-    alarm_samples,
     estimate_yaw,
     estimate_yaw_by_instruments,
-    excitation_rank,
     halves_differ,
+    simulate_yaw,
     term_budget,
-    yaw_rates,
 )
-from expdesign.simulation.naval import NOMINAL as SHIP
-from expdesign.simulation.naval import Hull, Pods, Voyage, pod_force
 from naval_case import BRISK, CALM, STEP_S, exact, fleet, harbour, heavier, measured, measured_fleet, rotation, turn
+from naval_ship import NOMINAL as SHIP
+from naval_ship import YAW_TRUE, Hull, Pods, Voyage, pod_force
+from yaw_detector import Detector, alarm_samples, excitation_rank
 
 EVERY, PRIORS = 4, 5
 FULL = YAW_MODELS["full"]
@@ -66,9 +63,9 @@ def damped(term: str, factor: float) -> Hull:
 def noise_study(runs: int) -> None:
     """Bias and spread of every parameter."""
     data = measured(harbour(seed=1), count=runs, seed=0, every=EVERY)
-    found = {name: estimate_yaw(YAW_MODELS[name], data, NOMINAL) for name in ("full", "simplified")}
+    found = {name: estimate_yaw(YAW_MODELS[name], data, YAW_TRUE) for name in ("full", "simplified")}
     exact = measured(harbour(seed=1), count=1, seed=0, noise=0.0, every=EVERY)
-    without = {name: estimate_yaw(YAW_MODELS[name], exact, NOMINAL) for name in found}
+    without = {name: estimate_yaw(YAW_MODELS[name], exact, YAW_TRUE) for name in found}
     print(f"{runs} voyages of the nominal ship, in per cent of the true value:\n")
     print("| parameter | full: bias | spread | simplified: bias | spread | bias without noise |")
     print("|---|---|---|---|---|---|")
@@ -76,13 +73,13 @@ def noise_study(runs: int) -> None:
         cells = [name]
         for structure in ("full", "simplified"):
             if name in YAW_MODELS[structure].parameters:
-                error = 100.0 * (found[structure].of(name) / NOMINAL[name] - 1.0)
+                error = 100.0 * (found[structure].of(name) / YAW_TRUE[name] - 1.0)
                 cells += [f"{error.mean():+.1f}", f"{error.std():.1f}"]
             else:
                 cells += ["", ""]
         simple = YAW_MODELS["simplified"].parameters
         cells.append(
-            f"{100.0 * (without['simplified'].of(name)[0] / NOMINAL[name] - 1.0):+.1f}" if name in simple else ""
+            f"{100.0 * (without['simplified'].of(name)[0] / YAW_TRUE[name] - 1.0):+.1f}" if name in simple else ""
         )
         print(f"| {' | '.join(cells)} |")
 
@@ -100,14 +97,14 @@ def change_study(runs: int, structures: Sequence[str]) -> dict[str, float]:
     shares = {}
     for structure in structures:
         model = YAW_MODELS[structure]
-        before = estimate_yaw(model, measured(harbour(seed=1), count=runs, seed=0, every=EVERY), NOMINAL).parameters
+        before = estimate_yaw(model, measured(harbour(seed=1), count=runs, seed=0, every=EVERY), YAW_TRUE).parameters
         reach = float(scipy.stats.t.ppf(0.975, runs - 1)) * np.sqrt(1.0 + 1.0 / runs) * before.std(axis=0, ddof=1)
         low, high = before.mean(axis=0) - reach, before.mean(axis=0) + reach
         print(f"| {structure}: change | {' | '.join(model.parameters)} |")
         print("|---" * (1 + len(model.parameters)) + "|")
         for name, hull in changes.items():
             data = measured(harbour(hull, seed=1), count=runs, seed=1, every=EVERY)
-            after = estimate_yaw(model, data, NOMINAL).parameters
+            after = estimate_yaw(model, data, YAW_TRUE).parameters
             spread = np.hypot(before.std(axis=0), after.std(axis=0)) / np.sqrt(2.0)
             shift = (after.mean(axis=0) - before.mean(axis=0)) / spread
             seen = ((after < low) | (after > high)).mean(axis=0)
@@ -122,10 +119,10 @@ def instrument_study(runs: int) -> None:
     """Bias of output error and of instruments, which are beyond the thesis, and how often 95 % intervals hold."""
     voyage = harbour(seed=1, step_s=0.5)
     data = measured(voyage, count=runs, seed=7, noise=5.0**-0.5, averaged=1)
-    quiet = estimate_yaw(FULL, exact(voyage), NOMINAL)
+    quiet = estimate_yaw(FULL, exact(voyage), YAW_TRUE)
     rows = {
-        "output error": estimate_yaw(FULL, data, NOMINAL),
-        "instruments": estimate_yaw_by_instruments(FULL, data, NOMINAL),
+        "output error": estimate_yaw(FULL, data, YAW_TRUE),
+        "instruments": estimate_yaw_by_instruments(FULL, data, YAW_TRUE),
     }
     print(
         f"{runs} voyages of 600 s at 2 Hz: bias ± its standard error, spread, and share of 95 % intervals that hold:\n"
@@ -165,10 +162,10 @@ def alarm_study(runs: int, orders: Sequence[str]) -> dict[tuple[str, ...], tuple
             data = measured_fleet(learnt, seed=5000, averaged=averaged, every=EVERY)
             for structure in ("full", "simplified"):
                 model = YAW_MODELS[structure]
-                true = np.array([NOMINAL[name] for name in model.parameters])
+                true = np.array([YAW_TRUE[name] for name in model.parameters])
                 for prior, values in (
                     ("true", true[None]),
-                    ("estimated", estimate_yaw(model, data, NOMINAL).parameters),
+                    ("estimated", estimate_yaw(model, data, YAW_TRUE).parameters),
                 ):
                     rows = np.array([_alarms(model, theta, voyages, CONSTANTS[structure, prior]) for theta in values])
                     false, missed = rows[:, :2].mean(axis=0).tolist()
@@ -198,7 +195,7 @@ def _cells(rows: np.ndarray) -> str:
 
 
 def _alarms(model: YawModel, theta: np.ndarray, voyages: list[YawData], constants: Detector) -> tuple[float, ...]:
-    nominal, heavy = (data.r - yaw_rates(model, data, theta) for data in voyages)
+    nominal, heavy = (data.r - simulate_yaw(model, data, theta)[0] for data in voyages)
     rows: list[float] = []
     for detector in (constants, Detector.calibrated(nominal, false_share=0.02, deviations=1.0)):
         false, found = (alarm_samples(detector, residual) for residual in (nominal, heavy))
@@ -249,7 +246,7 @@ def manoeuvre_claims() -> tuple[tuple[str, str, str], ...]:
     peaks = [angles[pod_force(Pods(), flow, np.deg2rad(angles), 60.0)[1].argmax()] for flow in (0.0, 5.0, 10.0)]
     orders = []
     for voyage, first in ((turned, 500), (rotated, 100)):
-        budget = {name: np.abs(m[0, first:]).mean() for name, m in term_budget(FULL, exact(voyage), NOMINAL).items()}
+        budget = {name: np.abs(m[0, first:]).mean() for name, m in term_budget(FULL, exact(voyage), YAW_TRUE).items()}
         orders.append(sorted(budget, key=budget.__getitem__)[::-1])
     apart = [
         np.rad2deg(np.abs(changed.column("r") - whole.column("r")).max())
@@ -257,10 +254,10 @@ def manoeuvre_claims() -> tuple[tuple[str, str, str], ...]:
     ]
     farther = np.rad2deg(turn(more).column("psi")[-1] - turned.column("psi")[-1])
     data = measured(harbour(seed=1), count=1, seed=0, every=EVERY)
-    one = estimate_yaw(FULL, data, NOMINAL).parameters
+    one = estimate_yaw(FULL, data, YAW_TRUE).parameters
     scaled = replace(data, moment=1.25 * data.moment)
-    law = estimate_yaw(FULL, scaled, {name: 1.25 * value for name, value in NOMINAL.items()}).parameters / one / 1.25
-    ranks = [excitation_rank(YAW_MODELS["separate"], exact(v), NOMINAL) for v in (turned, rotation(ahead=2.0))]
+    law = estimate_yaw(FULL, scaled, {name: 1.25 * value for name, value in YAW_TRUE.items()}).parameters / one / 1.25
+    ranks = [excitation_rank(YAW_MODELS["separate"], exact(v), YAW_TRUE) for v in (turned, rotation(ahead=2.0))]
     differ = [halves_of(voyage) for voyage in (turned, harbour(seconds=800.0, seed=5))]
     return (
         ("8.6 m/s 50 s after full ahead", f"{turned.column('u')[500]:.2f} m/s", MEETS),
@@ -285,7 +282,7 @@ def halves_of(voyage: Voyage) -> str:
     """How the estimates of its halves differ."""
     data = measured(voyage, count=1, seed=6, every=EVERY)
     half = data.r.shape[1] // 2
-    first, second = (estimate_yaw(FULL, data.part(part), NOMINAL) for part in (slice(0, half), slice(half, None)))
+    first, second = (estimate_yaw(FULL, data.part(part), YAW_TRUE) for part in (slice(0, half), slice(half, None)))
     count = int(halves_differ(first, second)[0].sum())
     return f"{count} of 9 by more than a factor of 3, fits {first.fit[0]:.0f} and {second.fit[0]:.0f} %"
 
@@ -293,7 +290,7 @@ def halves_of(voyage: Voyage) -> str:
 def normal_p() -> float:
     """Of the Shapiro-Wilk test of the estimates of inertia."""
     data = measured(harbour(seed=1), count=100, seed=50, every=EVERY)
-    return float(scipy.stats.shapiro(estimate_yaw(FULL, data, NOMINAL).of("I_r")).pvalue)
+    return float(scipy.stats.shapiro(estimate_yaw(FULL, data, YAW_TRUE).of("I_r")).pvalue)
 
 
 if __name__ == "__main__":

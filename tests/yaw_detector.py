@@ -1,16 +1,20 @@
-"""A one-sided cumulative sum on the size of a residual, as in the thesis, and its calibration.
+"""What the thesis adds to yaw models: a cumulative sum on the size of a residual, and the rank of a voyage.
 
 s = |e| - d where |e| >= d, else -l;    g = max(0, g + s);    alarm where g > h
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from expdesign.monitoring.yaw import YawData, YawModel, simulate_yaw
 from expdesign.values import Array
+
+RANK_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,3 +68,12 @@ def alarm_samples(detector: Detector, residual: Array) -> Array:
     """(n,) first sample with an alarm; nan without one."""
     over = detector.sums(residual) > detector.h
     return np.where(over.any(axis=1), over.argmax(axis=1), np.nan)
+
+
+def excitation_rank(model: YawModel, data: YawData, parameters: Mapping[str, float]) -> int:
+    """Number of parameters that one voyage determines: rank of the sensitivities of the simulated yaw rate."""
+    scale = np.array([abs(parameters[name]) for name in model.parameters])
+    values = np.array([parameters[name] for name in model.parameters])
+    columns = simulate_yaw(model, data, values)[1][0] * scale
+    size = np.linalg.norm(columns, axis=0)
+    return int(np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), tol=RANK_TOLERANCE))

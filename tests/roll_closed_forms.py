@@ -1,4 +1,4 @@
-"""The equation of `model` closed over the accelerometer, as it may be simulated.
+"""Closed forms of roll: the equation closed over the accelerometer, a pendulum on a cart, the inverse bilinear map.
 
 The accelerometer reads the roll that it drives: a_s = F_y y - a_y, F_y = (z_s p^2 + g) / p, a_y = v' + U r. With that,
 
@@ -8,8 +8,8 @@ The accelerometer reads the roll that it drives: a_s = F_y y - a_y, F_y = (z_s p
 G0 is the ship itself, 1 - beta z_s = A1 / A2 and alpha2 - beta g = (k + g S1) / A2, and stable where she is; the
 equation that reads the accelerometer need not be, and is never simulated by itself.
 
-Source: doctoral thesis on grey-box identification of roll with few sensors, proposition 4.1, (5.25)-(5.33), with the
-sign of U r as a_s = F_y y - v' - U r has it.
+Source: doctoral thesis on grey-box identification of roll with few sensors, proposition 4.1, (4.7)-(4.35) and
+(5.25)-(5.33), with the sign of U r as a_s = F_y y - v' - U r has it.
 """
 
 from __future__ import annotations
@@ -19,8 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from expdesign.roll import named
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import G_MPS2
+from expdesign.vessel.masses import G_MPS2, Body, Load, axis_inertia, first_moment
+
+System = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,3 +82,49 @@ def simulated(loop: ClosedLoop, driven: Array, step_s: float) -> tuple[Array, Ar
 def filtered(above: Array, below: Array, signal: Array, step_s: float) -> Array:
     """A signal (k,) through a transfer function of p, by the bilinear map."""
     return np.asarray(scipy.signal.lfilter(*scipy.signal.bilinear(above, below, fs=1.0 / step_s), signal))
+
+
+def pendulum_system(theta: Array, body: Body, load: Load) -> System:
+    """Matrices A, B, C, D: states roll and roll rate, input a_y, outputs roll rate and accelerometer reading.
+
+    Args:
+        theta: (9,) parameters, of which k, A_x and d count.
+        body, load: at rest relative to the pendulum.
+    """
+    values = named(theta)
+    inertia, moment = axis_inertia(values["A_x"], body, load), first_moment(body, load)
+    lean = np.array([-(values["k"] + G_MPS2 * moment), -values["d"]]) / inertia
+    return (
+        np.array([[0.0, 1.0], lean]),
+        np.array([[0.0], [moment / inertia]]),
+        np.array([[0.0, 1.0], body.z_s * lean + [G_MPS2, 0.0]]),
+        np.array([[0.0], [body.z_s * moment / inertia - 1.0]]),
+    )
+
+
+def own_parameters(coefficients: Array, body: Body, load: Load) -> tuple[float, float, float]:
+    """k, I_x and d of a pendulum with a known load, from alpha1, alpha2, beta1 (4.34)."""
+    alpha1, alpha2, beta = coefficients[:3].tolist()
+    moment, ballast = first_moment(body, load), load.mass_kg * load.z_m * (load.z_m - body.z_s)
+    ship = body.mass_kg * body.z_g * (body.z_g - body.z_s)
+    inertia = -moment / beta - ship - ballast - load.inertia_kgm2
+    return -alpha2 / beta * moment, inertia, -alpha1 / beta * moment
+
+
+def load_from(coefficients: Array, body: Body, *, inertia: float, damping: float) -> Load:
+    """The load of a pendulum that is known without it, from alpha1 and beta1 (4.35).
+
+    The mass is a square over a product: an estimate of it above zero is no evidence.
+    """
+    alpha1, _, beta = coefficients[:3].tolist()
+    W = alpha1 * (inertia + body.mass_kg * body.z_g**2) + damping * (beta * body.z_s - 1.0)
+    top = beta * damping + alpha1 * body.mass_kg * body.z_g
+    return Load(mass_kg=-(top**2) / (alpha1 * W), z_m=W / top)
+
+
+def continuous(values: Array, step_s: float) -> Array:
+    """Continuous coefficients (5,) from those of the sampled equation (5,), the inverse of the bilinear map."""
+    a1, a2, *gains = values
+    below = 1.0 - a1 + a2
+    rates = 4.0 / step_s * (1.0 - a2) / below, 4.0 / step_s**2 * (1.0 + a1 + a2) / below
+    return np.array([*rates, *(8.0 / step_s * gain / below for gain in gains)])
