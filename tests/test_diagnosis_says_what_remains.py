@@ -60,11 +60,10 @@ def test_little_explained_is_never_called_no_error():
         leads=(Lead("wind", 3.2, (-1.0, 6.0)), Lead("current", 0.5, (-2.0, 2.0))),
     )  # fmt: skip
     assert verdict((), before, "runs", remains) == (
-        "The simulation explains little of these data and no cause is certain: the fit is 29 % in surge, the fit is "
-        "-68 % in sway and the simulation diverges in yaw; a slowly varying force that nobody measured would take 40 % "
-        "off the surge error, 75 % off the sway error and 0 % off the yaw error; the best uncertain candidates are "
-        "wind (+3.2 points of fit on runs held out, -1.0 to 6.0) and a current (+0.5 points of fit on runs held out, "
-        "-2.0 to 2.0)."
+        "The simulation explains little of these data and no cause is certain: the fit is 29 % in surge and -68 % in "
+        "sway and the simulation diverges in yaw. A slowly varying force that nobody measured would take 40 % off the "
+        "surge error, 75 % off the sway error and 0 % off the yaw error. The best uncertain candidates are wind (+3.2 "
+        "points of fit, -1.0 to 6.0) and a current (+0.5 points of fit, -2.0 to 2.0) on runs held out."
     )
     assert "no error" in verdict((), before)
 
@@ -119,7 +118,7 @@ def test_parameters_within_their_standard_deviations_are_re_estimated_and_nothin
     found = diagnose(vessel_of("barge", relative_std=0.3), record)
     assert found.findings == ()
     assert found.verdict.startswith("Parameters re-estimated within their stated standard deviations")
-    assert "no other cause is certain" in found.verdict
+    assert "No other cause is certain" in found.verdict
     assert (found.after.fit > found.before.fit).all()
     stated, refined = found.vessel.model, found.extended.model
     assert (refined.parameter_std < stated.parameter_std).all()

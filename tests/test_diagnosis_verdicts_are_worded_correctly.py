@@ -75,7 +75,7 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert verdict([], BEFORE).startswith("These data show no error of the model: the fit is 60 % in surge")
     delay, wind = Lead("actuator_delay", 0.5, (-0.6, 1.2)), Lead("wind", -2.0, (-3.0, 0.0))
     assert verdict([], BEFORE, signs=(delay, wind)).endswith(
-        "; signs of the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) and wind (-2.0 points of fit, "
+        ". Signs of the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) and wind (-2.0 points of fit, "
         "-3.0 to 0.0) improve nothing for certain on runs held out."
     )
     assert verdict([], BEFORE, signs=(wind,)).startswith("No cause of the remaining error is certain: the fit is 60 %")
@@ -95,7 +95,7 @@ def test_what_parameters_gain_within_their_standard_deviations_is_no_missing_eff
     gains += (ErrorReduction(output="v", share=0.9, low=0.1, high=0.95),)
     assert verdict([], BEFORE, within_std=gains) == (
         "Parameters re-estimated within their stated standard deviations cut the surge error by 62 % (55 to 70 %) on "
-        "runs held out; no other cause is certain."
+        "runs held out. No other cause is certain."
     )
 
 
@@ -144,7 +144,7 @@ def test_a_large_varying_current_is_noted():
 
 def test_causes_that_would_harm_the_simulation_are_said_in_one_sentence():
     """Beside findings, and where nothing is found: then the model is not called right."""
-    said = "with wind the simulation of these data would run away or be worse, so that is not written"
+    said = "With wind the simulation of these data would diverge or be worse, so it is not written"
     text = verdict([], BEFORE, refused=["wind"])
     assert text.startswith("No cause of the remaining error is certain: the fit is 60 %")
     assert text.endswith(f"{said}.")

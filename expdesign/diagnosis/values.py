@@ -119,7 +119,7 @@ class Diagnosis:
         before, after: accuracy of both on all batches, in sample.
         findings: by what the model of all loses on held-out data without each; each gain is relative to the model with
             the causes that were found before.
-        verdict: one sentence.
+        verdict: what the simulation lacks in one sentence; one more for each thing that remains.
         unexplained: what remains; None where the simulation explains much, or all but the noise.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
         errors: per finding, (w, s, 4) error of the model with the earlier findings.

@@ -1,4 +1,4 @@
-"""The verdict of a diagnosis, in one sentence: missing effects, their gains and open questions."""
+"""The verdict of a diagnosis: missing effects, their gains and open questions in one sentence, then what remains."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def verdict(
     kinds: Sequence[str] = (),
     instead: Sequence[str] = (),
 ) -> str:
-    """The whole diagnosis in one sentence.
+    """What the simulation lacks, in one sentence; then one sentence for each thing that remains.
 
     Args:
         findings: by what the model loses without each.
@@ -123,61 +123,67 @@ def verdict(
         kinds: what else the error looks like, which no cause of the catalogue is and no model can get.
         instead: the same of what explains about as much as the findings do.
     """
-    rest = f"no known cause matches what remains: it looks like {listed(kinds)}" if kinds else ""
+    beyond = [f"No known cause matches what remains: it looks like {listed(kinds)}"] if kinds else []
+    remains = [] if unexplained is None else _remainder(unexplained, unit, "Much remains unexplained")
+    harmful = _refused(refused)
     if not findings and kinds:
-        return f"{rest[0].upper()}{rest[1:]}; {accuracy_in_words(before)}."
+        return _sentences([*beyond, _capital(accuracy_in_words(before))])
     if not findings and within_std:
-        return _within_std(within_std, unexplained, unit)
+        best = _reduction(max(within_std, key=lambda item: item.low), verbs=("halve", "cut"))
+        within = f"Parameters re-estimated within their stated standard deviations {best} on {unit} held out"
+        return _sentences([within, *(remains or ["No other cause is certain"])])
     if not findings and unexplained is not None:
-        parts = [_remainder(unexplained, unit), *_refused(refused)]
-        return f"The simulation explains little of these data and no cause is certain: {'; '.join(parts)}."
+        little = "The simulation explains little of these data and no cause is certain"
+        return _sentences([*_remainder(unexplained, unit, little), *harmful])
     if not findings and (signs or refused):
-        parts = [f"No cause of the remaining error is certain: {accuracy_in_words(before)}", *_refused(refused)]
         named = [_lead(item) for item in signs]
-        parts += [f"signs of {listed(named)} improve nothing for certain on {unit} held out"] if named else []
-        return "; ".join(parts) + "."
+        open_signs = [f"Signs of {listed(named)} improve nothing for certain on {unit} held out"] if named else []
+        certain = f"No cause of the remaining error is certain: {accuracy_in_words(before)}"
+        return _sentences([certain, *open_signs, *harmful])
     if not findings:
-        return f"These data show no error of the model: {accuracy_in_words(before)}."
-    parts = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
-    parts += [_benefits(findings, unit), *_invisible(findings)]
-    parts += [_open_question(item) for item in findings if item.not_distinguishable_from]
-    parts += _refused(refused)
-    parts += [] if unexplained is None else [f"much remains unexplained: {_remainder(unexplained, unit)}"]
-    parts += (
-        [f"no cause of the catalogue, {listed(instead, 'or')} explains these data about as well"] if instead else []
-    )
-    parts += [rest] if kinds else []
-    return "; ".join(parts) + "."
+        return _sentences([f"These data show no error of the model: {accuracy_in_words(before)}"])
+    lacks = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
+    lacks += [_benefits(findings, unit), *_invisible(findings)]
+    lacks += [_open_question(item) for item in findings if item.not_distinguishable_from]
+    others = listed(instead, "or") if instead else ""
+    also = [f"A cause outside the catalogue explains these data about as well: {others}"] if others else []
+    return _sentences(["; ".join(lacks), *harmful, *remains, *also, *beyond])
 
 
-def _within_std(gains: Sequence[ErrorReduction], unexplained: Unexplained | None, unit: str) -> str:
-    best = _reduction(max(gains, key=lambda item: item.low), verbs=("halve", "cut"))
-    rest = "no other cause is certain"
-    if unexplained is not None:
-        rest = f"much remains unexplained: {_remainder(unexplained, unit)}"
-    return f"Parameters re-estimated within their stated standard deviations {best} on {unit} held out; {rest}."
+def _sentences(texts: Sequence[str]) -> str:
+    return " ".join(f"{text}." for text in texts)
 
 
-def _remainder(unexplained: Unexplained, unit: str) -> str:
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _remainder(unexplained: Unexplained, unit: str, opening: str) -> list[str]:
     """How little is explained, what an unmeasured force would account for, and the best candidates."""
-    rows = zip(unexplained.outputs, unexplained.fit.tolist(), unexplained.force_share.tolist(), strict=True)
-    fits, shares = [], []
-    for name, fit, share in rows:
-        diverged = "the simulation diverges" if fit < DIVERGED_FIT else f"the fit is {fit:.0f} %"
-        fits.append(f"{diverged} in {WORDS[name]}")
-        shares.append(f"{_percent(share)} % off the {WORDS[name]} error")
-    parts = [listed(fits), f"a slowly varying force that nobody measured would take {listed(shares)}"]
+    rows = list(zip([WORDS[name] for name in unexplained.outputs], unexplained.fit.tolist(), strict=True))
+    diverged = [word for word, fit in rows if fit < DIVERGED_FIT]
+    fits = [f"{fit:.0f} % in {word}" for word, fit in rows if fit >= DIVERGED_FIT]
+    parts = [f"the fit is {listed(fits)}"] if fits else []
+    parts += [f"the simulation diverges in {listed(diverged)}"] if diverged else []
+    shares = [
+        f"{_percent(share)} % off the {word} error"
+        for (word, _), share in zip(rows, unexplained.force_share.tolist(), strict=True)
+    ]
+    sentences = [
+        f"{opening}: {listed(parts)}",
+        f"A slowly varying force that nobody measured would take {listed(shares)}",
+    ]
     if unexplained.leads:
-        leads = [_lead(lead, f" on {unit} held out") for lead in unexplained.leads]
-        verb = "candidate is" if len(leads) == 1 else "candidates are"
-        parts.append(f"the best uncertain {verb} {listed(leads)}")
-    return "; ".join(parts)
+        verb = "candidate is" if len(unexplained.leads) == 1 else "candidates are"
+        named = listed([_lead(lead) for lead in unexplained.leads])
+        sentences += [f"The best uncertain {verb} {named} on {unit} held out"]
+    return sentences
 
 
-def _lead(lead: Lead, where: str = "") -> str:
+def _lead(lead: Lead) -> str:
     """An uncertain candidate with its gain."""
     low, high = lead.gain_interval
-    return f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit{where}, {low:.1f} to {high:.1f})"
+    return f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
@@ -206,7 +212,8 @@ def _refused(causes: Sequence[str]) -> list[str]:
     if not causes:
         return []
     names = listed([missing_effect(cause) for cause in causes])
-    return [f"with {names} the simulation of these data would run away or be worse, so that is not written"]
+    verb = "it is" if len(causes) == 1 else "they are"
+    return [f"With {names} the simulation of these data would diverge or be worse, so {verb} not written"]
 
 
 def _is_visible(reduction: ErrorReduction) -> bool:

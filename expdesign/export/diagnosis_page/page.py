@@ -47,6 +47,7 @@ def diagnosis_html(
     page = page_template("expdesign.export.diagnosis_page", "diagnosis.html")
     return page.render(
         found=found,
+        verdict=found.verdict.partition(". "),
         alarm=f"{SELECTION_TUNING.accepted_p_value:g}",
         apart=found.unit,
         findings=[_finding(item, found) for item in found.findings],
