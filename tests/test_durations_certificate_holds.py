@@ -84,9 +84,9 @@ def random_problem(draw: int) -> DurationProblem:
     return duration_problem(matrices, means=outputs)
 
 
-@pytest.mark.parametrize("draw", [*range(80), *(pytest.param(n, marks=pytest.mark.slow) for n in range(80, 200))])
+@pytest.mark.parametrize("draw", [*range(40), *(pytest.param(n, marks=pytest.mark.slow) for n in range(40, 200))])
 def test_random_problems_are_certified(draw: int):
-    """A kind of problem that is one in thirty fails the first 80 with a probability of 93 per cent."""
+    """A kind of problem that is one in fifteen fails the first 40 with a probability of 94 per cent."""
     assert certificate(solved(random_problem(draw))) < CERTIFICATE
 
 
@@ -166,17 +166,17 @@ def best_of_local_searches(problem: DurationProblem, starts: int) -> float:
 def test_local_searches_on_the_published_cost_find_the_same_and_nothing_better(dictionary: str):
     problem = example(dictionary)
     own = -schur_cost(problem, solved(problem).fractions)
-    best = best_of_local_searches(problem, 20)
+    best = best_of_local_searches(problem, 10)
     assert best < own + 1e-7
     assert best == pytest.approx(own, abs=1e-4)  # finite differences in the search cost it digits
 
 
 @pytest.mark.filterwarnings("ignore:Values in x were outside bounds")
-@pytest.mark.parametrize("draw", range(10))
+@pytest.mark.parametrize("draw", range(4))
 def test_local_searches_find_nothing_better_on_random_problems(draw: int):
     matrices = random_matrices(np.random.default_rng(draw), count=8, parameters=4, outputs=2, samples=4)
     problem = duration_problem(matrices, means=2)
-    assert best_of_local_searches(problem, 20) < -schur_cost(problem, solved(problem).fractions) + 1e-7
+    assert best_of_local_searches(problem, 10) < -schur_cost(problem, solved(problem).fractions) + 1e-7
 
 
 @dictionaries

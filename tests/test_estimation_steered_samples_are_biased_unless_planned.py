@@ -54,7 +54,7 @@ def test_instruments_from_planned_inputs_or_open_loop_are_not(treatment: str) ->
 
 
 def test_output_error_holds_under_feedback_of_white_sensor_noise_where_least_squares_does_not() -> None:
-    calm = [sailed(seed, 600, steered=np.ones(600), current_std_mps=0.0) for seed in range(20)]
+    calm = [sailed(seed, 600, steered=np.ones(600), current_std_mps=0.0) for seed in range(12)]
     assert in_standard_errors([estimate(trial, MODEL, method="oe") for trial in calm]).max() < 3.0
     assert in_standard_errors([estimate(trial, MODEL, method="ls") for trial in calm]).max() > 3.0
 
@@ -67,7 +67,7 @@ def test_inputs_that_follow_disturbances_are_found() -> None:
 
 @pytest.mark.parametrize("correlation_s", [0.0, 100.0], ids=["white", "wandering"])
 def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: float) -> None:
-    count = 60
+    count = 40
     calm = [sailed(1000 + seed, 400, steered=np.zeros(400), correlation_s=correlation_s) for seed in range(count)]
     found = chances([estimate(trial, MODEL) for trial in calm])
     assert len(found) == count
@@ -78,9 +78,9 @@ def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: fl
 def test_a_wrong_model_alone_is_not_taken_for_feedback() -> None:
     """The drag is linear, the model's quadratic: past inputs take up what is wrong."""
     quadratic = replace(MODEL, terms=(Term("u", "X_u", "u*abs(u)"), MODEL.terms[1]), parameters=np.array([-0.05, 0.02]))
-    calm = [sailed(3000 + seed, 400, steered=np.zeros(400)) for seed in range(60)]
+    calm = [sailed(3000 + seed, 400, steered=np.zeros(400)) for seed in range(40)]
     found = chances([estimate(trial, quadratic) for trial in calm])
-    assert (found < 0.05).mean() < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 60)
+    assert (found < 0.05).mean() < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 40)
 
 
 def test_marked_samples_are_not_suspected() -> None:

@@ -130,10 +130,6 @@ def test_a_very_long_name_is_whole_in_the_text_and_cut_only_beside_axes() -> Non
     assert f"{long[:31]}\N{HORIZONTAL ELLIPSIS}" in durations
 
 
-def test_the_same_trial_gives_the_same_page() -> None:
-    assert report_html(case.report_content()) == page()
-
-
 def test_the_page_says_what_the_values_say() -> None:
     text = Page(page()).text
     plan, design = case.plan(), case.design()

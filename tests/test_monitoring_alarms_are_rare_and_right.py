@@ -175,7 +175,7 @@ def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration)
 def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibration) -> None:
     limit = threshold(CHANGES, 1e4)
     for quick, unlike in ((0.3, False), (3.0, True)):
-        ends = [watched(calibration, drawn_grams(300, seed=80 + seed, quick=quick), limit) for seed in range(12)]
+        ends = [watched(calibration, drawn_grams(300, seed=80 + seed, quick=quick), limit) for seed in range(6)]
         left, judged_count = (sum(getattr(state, name) for state, *_ in ends) for name in ("left_out", "judged"))
         assert (left > 9 * judged_count) if unlike else (judged_count > 9 * left)
         assert sum(bool(alarms) for _, alarms, _ in ends) <= 1

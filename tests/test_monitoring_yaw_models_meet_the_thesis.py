@@ -134,17 +134,17 @@ def test_fewer_parameters_have_more_bias_and_less_spread(departure: Voyage) -> N
 
 
 def test_ten_per_cent_of_inertia_is_seen_and_of_mass_is_not(departure: Voyage) -> None:
-    nominal = estimate_yaw(SIMPLE, measured(departure, count=10, seed=3, every=4), YAW_TRUE).of("I_r")
+    nominal = estimate_yaw(SIMPLE, measured(departure, count=6, seed=3, every=4), YAW_TRUE).of("I_r")
     heavy = estimate_yaw(
         SIMPLE,
-        measured(harbour(heavier(inertia=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4),
+        measured(harbour(heavier(inertia=1.1), seconds=400.0, seed=1), count=6, seed=4, every=4),
         YAW_TRUE,
     ).of("I_r")
     spread = np.hypot(nominal.std(), heavy.std())
     assert heavy.mean() - nominal.mean() > 1.5 * spread
-    before = estimate_yaw(FULL, measured(departure, count=10, seed=3, every=4), YAW_TRUE).of("M_v")
+    before = estimate_yaw(FULL, measured(departure, count=6, seed=3, every=4), YAW_TRUE).of("M_v")
     after = estimate_yaw(
-        FULL, measured(harbour(heavier(mass=1.1), seconds=400.0, seed=1), count=10, seed=4, every=4), YAW_TRUE
+        FULL, measured(harbour(heavier(mass=1.1), seconds=400.0, seed=1), count=6, seed=4, every=4), YAW_TRUE
     ).of("M_v")
     assert abs(after.mean() - before.mean()) < np.hypot(before.std(), after.std())
 

@@ -128,9 +128,8 @@ def test_the_speed_named_against_a_current_overcomes_it():
     plan_trial(changed(case, transit_speed_mps=None))
 
 
-@pytest.mark.parametrize(
-    "settings", [{"transit_speed_mps": 50.0}, pytest.param({"turning_radius_m": 1.0}, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", [{"transit_speed_mps": 50.0}, {"turning_radius_m": 1.0}])
 def test_without_a_speed_or_a_radius_beyond_the_ship_there_is_a_plan(settings):
     case = problem(WIDE, **settings)
     ((key, _),) = settings.items()
@@ -166,6 +165,7 @@ def test_a_run_without_a_place_is_refused_before_anything_is_searched_and_one_wi
                 plan_room(case, water, silent)
 
 
+@pytest.mark.slow
 def test_the_clearance_named_where_no_leg_is_found_is_one_with_which_runs_are_sailed(monkeypatch):
     leg = AgilePlanner.leg
     monkeypatch.setattr(AgilePlanner, "leg", lambda self, task, water: leg(self, task, water) if wide(water) else None)

@@ -66,7 +66,7 @@ def verified(asked: PlanProblem, sailed) -> tuple[str, ...]:
     ).problems
 
 
-@pytest.mark.parametrize("moves", [TURNING, ASTERN], ids=["turning", "astern"])
+@pytest.mark.parametrize("moves", [TURNING, pytest.param(ASTERN, marks=pytest.mark.slow)], ids=["turning", "astern"])
 def test_the_first_sample_is_the_state_asked_for_and_the_check_sees_when_it_is_not(moves):
     asked = problem(moves)
     draft = draft_trial(asked)

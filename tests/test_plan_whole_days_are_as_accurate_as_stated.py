@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from expdesign.information import regressor_rows
-from expdesign.plan.solve import plan_trial
+from expdesign.plan.solve import draft_trial
 from expdesign.plan.verify import track_covariance
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment, delivered
@@ -31,7 +31,7 @@ def planned():
     case = replace(case, design=replace(case.design, total_s=240.0))
     information = scored(case)
     design = designed(case, information)
-    return case, design, plan_trial(plan_problem(case, information, design, seed=1))
+    return case, design, draft_trial(plan_problem(case, information, design, seed=1)).sailed
 
 
 @pytest.fixture(
@@ -43,8 +43,8 @@ def planned():
     ids=lambda item: item[0],
 )
 def days(planned, request):
-    (case, _, plan), (_, environment, method) = planned, request.param
-    return simulated_days(case, plan, trials=TRIALS, environment=environment, method=method)
+    (case, _, sailed), (_, environment, method) = planned, request.param
+    return simulated_days(case, sailed.commands, trials=TRIALS, environment=environment, method=method)
 
 
 def test_standard_deviations_are_those_stated_but_for_chance_and_noise_beyond_first_order(days):
@@ -63,10 +63,12 @@ def test_estimates_are_right_on_average_and_their_intervals_hold_the_truth(days)
 
 
 def test_the_covariance_of_a_track_is_the_inverse_of_its_centred_regressors(planned):
-    case, design, plan = planned
+    case, design, sailed = planned
     known = replace(case.environment, current_std_mps=0.0)
-    found = track_covariance(case.vessel, design, known, plan.sailed)
-    rows = regressor_rows(case.vessel.model, plan.trajectory, delivered(case.vessel, plan.commands), case.environment)
+    found = track_covariance(case.vessel, design, known, sailed)
+    rows = regressor_rows(
+        case.vessel.model, sailed.trajectory, delivered(case.vessel, sailed.commands), case.environment
+    )
     equation = {term.name: term.equation for term in case.vessel.model.terms}
     for output in case.vessel.model.outputs:
         own = [k for k, name in enumerate(design.problem.parameters) if equation[name] == output]

@@ -230,7 +230,7 @@ def test_terms_of_a_vanes_wind_are_right_on_average_over_its_noise(text: str):
 
 def test_instruments_find_wind_forces_from_a_noisy_vane():
     """On average over trials, which without the correction they do not."""
-    vessel, trials = ship(wind_sensor="vane", wind_angle_rad=0.3), 16
+    vessel, trials = ship(wind_sensor="vane", wind_angle_rad=0.3), 10
     inputs = np.stack([tug_commands(1500, seed=seed).values for seed in range(trials)], axis=1)
     many = simulate_ensemble(
         vessel, inputs, runs=trials, environment=WIND, rng=np.random.default_rng(1), velocity=(1.7, 0.7, 0.0)
@@ -303,7 +303,7 @@ def check_coverage(trials: int) -> None:
 
 
 def test_intervals_cover_as_often_as_without_faults():
-    check_coverage(12)
+    check_coverage(8)
 
 
 @pytest.mark.slow

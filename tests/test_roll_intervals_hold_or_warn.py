@@ -1,6 +1,7 @@
 """Intervals of roll estimates hold under moments of waves, and warn where the rudder is no instrument."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -89,6 +90,7 @@ def test_a_moment_that_hides_the_rudder_is_noticed() -> None:
     assert not any(weak(0.01, number) for number in range(3))
 
 
+@cache
 def steered(gain: float, number: int, *, planned: bool = False) -> tuple[RollEstimate, Array]:
     """Five parameters of the ship in waves under a helm that answers heading, yaw and roll rate; squares of errors."""
     rng, sea = np.random.default_rng([23, number]), replace(LITTLE, moment=0.2, damping=0.1)

@@ -6,20 +6,26 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.information import estimated_parameters
-from expdesign.plan.values import Plan
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.scenario import Scenario
+from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate
 
 
 def simulated_days(
-    case: Scenario, plan: Plan, *, trials: int, environment: Environment = CALM, method: str = "iv", seed: int = 0
+    case: Scenario,
+    commands: Commands,
+    *,
+    trials: int,
+    environment: Environment = CALM,
+    method: str = "iv",
+    seed: int = 0,
 ) -> Validated:
     """Estimates by a method from so many days of a plan, legs included, beside what is predicted.
 
     The commands are those of the plan; the whole day is one batch of data.
     """
-    vessel, commands = case.vessel, plan.commands
+    vessel = case.vessel
     day = Primitive(
         name="day",
         family="recorded",

@@ -55,7 +55,7 @@ def asked_and_found(case, information, design, trials):
     runs = tuple(item.primitive for item in information)
     limits = stated_accuracy(ASKED, design, case.vessel, runs, case.environment).limits
     plan = planned_day(ask, information, design, seed=1).plan
-    days = simulated_days(case, plan, trials=trials, environment=case.environment, method="iv-current", seed=3)
+    days = simulated_days(case, plan.commands, trials=trials, environment=case.environment, method="iv-current", seed=3)
     errors = (days.estimates - days.truth) @ limits.slopes.T
     print(f"{trials} days of {plan.day.planned_s:.0f} s each, asked for as below; chance: {chance(trials):.1%}\n")
     print("| asked for | standard deviation asked | found | over | within 1.96 of it |\n|---|---|---|---|---|")
@@ -84,7 +84,9 @@ if __name__ == "__main__":
     print("| weather | method | parameter | found | over the report's | over the limit's | in 95 % intervals |")
     print("|---|---|---|---|---|---|---|")
     for name, method in TRIED:
-        found = simulated_days(case, day.plan, trials=trials, environment=WEATHERS[name], method=method, seed=3)
+        found = simulated_days(
+            case, day.plan.commands, trials=trials, environment=WEATHERS[name], method=method, seed=3
+        )
         for k, parameter in enumerate(found.parameters):
             print(
                 f"| {name} | {method} | {parameter} | {found.found[k]:.3g} | {found.found[k] / found.forecast[k]:.2f} "
