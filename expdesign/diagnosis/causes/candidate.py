@@ -22,6 +22,7 @@ class Candidate:
         grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
             corners in it.
         bounds: weighted sums of effects that physics keeps from being positive.
+        above: effects that the data show only above these values.
         imitates: its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first.
     """
 
@@ -32,11 +33,13 @@ class Candidate:
     positive: bool = False
     grid: tuple[str, tuple[float, ...]] | None = None
     bounds: tuple[Mapping[str, float], ...] = ()
+    above: Mapping[str, float] = field(default_factory=dict)
     imitates: bool = False
 
     def is_possible(self, value: Callable[[str], float]) -> bool:
         """Whether effects with these values keep all bounds."""
-        return all(sum(weight * value(key) for key, weight in bound.items()) <= 0.0 for bound in self.bounds)
+        kept = all(sum(weight * value(key) for key, weight in bound.items()) <= 0.0 for bound in self.bounds)
+        return kept and all(value(key) > least for key, least in self.above.items())
 
     @property
     def size(self) -> int:

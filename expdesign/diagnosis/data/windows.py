@@ -72,6 +72,11 @@ class Windows:
         return self.step_s * self.steps_per_sample
 
     @property
+    def shortest_period_s(self) -> float:
+        """Period of the fastest oscillation that the compared samples show: two of them [s]."""
+        return 2.0 * self.sample_s
+
+    @property
     def steps(self) -> int:
         """Integrator steps per window."""
         return int(self.heading.shape[1])

@@ -159,10 +159,16 @@ def _prior_std(ship: ExtendedModel) -> dict[str, float]:
     return {**parameters, **ship.stated_std}
 
 
-def step_bounds(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
+def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 0.0) -> Array:
     """(2, c) least and greatest steps to the bounds of effects; infinite for those without.
 
-    Times cannot be below zero, and what holds the ship at high speed cannot push her (`resisting`).
+    Times cannot be below zero, what holds the ship at high speed cannot push her (`resisting`), and samples show no
+    faster oscillation than `Windows.shortest_period_s`.
+
+    Args:
+        ship: the model before the step.
+        keys: effects.
+        shortest_s: that period [s].
     """
     bounds = np.tile([[-np.inf], [np.inf]], len(keys))
     parameters = dict(zip(ship.model.names, ship.model.parameters.tolist(), strict=True))
@@ -170,6 +176,8 @@ def step_bounds(ship: ExtendedModel, keys: tuple[str, ...]) -> Array:
     for place, key in enumerate(keys):
         if key.startswith(POSITIVE):
             bounds[0, place] = LEAST_TIME_S - ship.get(key)
+        if key == "roll:period":  # one stated shorter may stay
+            bounds[0, place] = min(0.0, shortest_s - ship.get(key))
         sign = signs.get(key.removeprefix("theta:"), 0.0)
         if sign:
             bounds[int(sign < 0), place] = -parameters[key.removeprefix("theta:")] - ship.get(key)
@@ -227,7 +235,7 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     m = marginalised(grams, found.sensitivities, noise)
     now = deviations_of(found.ship, found.keys)
     score = m.s - found.precision @ now
-    _, best = best_step(m.A + found.precision, score, step_bounds(found.ship, found.keys))
+    _, best = best_step(m.A + found.precision, score, step_bounds(found.ship, found.keys, found.linear.motion.windows.shortest_period_s))
     return float(m.quadratic + now @ found.precision @ now - best)
 
 

@@ -135,7 +135,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
     now = deviations_of(point.ship, problem.keys)
     score = m.s - problem.precision @ now
     A = m.A + problem.precision
-    step, gain = best_step(A, score, step_bounds(point.ship, problem.keys))
+    step, gain = best_step(A, score, step_bounds(point.ship, problem.keys, problem.windows.shortest_period_s))
     cost = m.quadratic + float(now @ problem.precision @ now)
     return Fit(
         ship=point.ship,
@@ -166,7 +166,7 @@ def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise
     prior = Prior(
         precision=problem.precision,
         now=deviations_of(point.ship, problem.keys),
-        bounds=step_bounds(point.ship, problem.keys),
+        bounds=step_bounds(point.ship, problem.keys, problem.windows.shortest_period_s),
     )
     return estimate_noise(point.sensitivities, prior, guess, point.grams, ar_order=problem.options.ar_order)
 

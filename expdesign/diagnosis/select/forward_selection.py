@@ -75,7 +75,7 @@ def select_forward(
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
             exchanges += 1
-            exchanged = _exchange(steps, search)
+            exchanged = _exchange(_up_to_last_gain(steps, gains), search)
             if exchanged is not None:
                 steps, base = exchanged, exchanged[-1].chosen.fit
                 continue
@@ -105,6 +105,11 @@ def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:
     gains = [held_out_gain(*pair, 0) for pair in pairwise(held)]
     least = TUNING.least_gain_points
     return [not (gain <= least or (held[0].in_stretches and low <= 0.0)) for gain, (low, _) in gains]
+
+
+def _up_to_last_gain(steps: list[Step], gains: Sequence[bool]) -> list[Step]:
+    """The steps without the last ones that gain nothing: backward elimination takes these out."""
+    return steps[: max(place + 1 for place, one in enumerate(gains) if one)]
 
 
 def to_take_out(steps: Sequence[Step], redundant: int) -> int:

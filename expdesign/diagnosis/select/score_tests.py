@@ -104,6 +104,8 @@ def score_tests(
 
 def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
     """Value of an effect after the linear estimate."""
+    if key not in candidate.free:
+        return candidate.fixed.get(key, base.ship.get(key))
     return base.ship.get(key) + float(step[[*candidate.free].index(key)])
 
 

@@ -10,6 +10,8 @@ from expdesign.diagnosis.model import ROLL, ExtendedModel
 
 COUNT = 14
 DAMPING = 0.08
+SLOWER = 1.01
+"""Than the fastest oscillation that the data show: a fit that ends there has found no roll."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -25,6 +27,7 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
             cause="roll_coupling",
             free={"roll:sway": 0.0, "roll:yaw": 0.0},
             fixed={"roll:period": float(period), "roll:damping": DAMPING},
+            above={"roll:period": SLOWER * situation.windows.shortest_period_s},
         )
         for period in periods
     )
