@@ -9,6 +9,7 @@ unstable, so that slow disturbances remain visible.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -98,8 +99,8 @@ class Windows:
         n = self.rows_per_step
         return self.gather(tuple(rows.reshape(len(rows) // n, n, -1).mean(axis=1) for rows in self.batch_inputs))
 
-    def gather(self, batches: tuple[Array, ...]) -> Array:
-        """(w, k, ...) rows of per-batch arrays at the steps of every window."""
+    def gather(self, batches: Sequence[Array] | Mapping[int, Array]) -> Array:
+        """(w, k, ...) rows of per-batch arrays at the steps of every window; by number where only some are there."""
         return np.stack([batches[int(b)][rows] for b, rows in zip(self.batch, self.step_numbers, strict=True)])
 
     def selected(self, keep: NDArray[np.bool_]) -> Windows:

@@ -28,11 +28,18 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.gram_matrices import gram_matrices, information, marginalised, window_information
+from expdesign.diagnosis.fit.gram_matrices import (
+    MarginalInformation,
+    gram_matrices,
+    information,
+    marginalised,
+    window_information,
+)
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,
     difference_step,
     effect_disturbances,
+    in_groups,
     sensitivities_to,
 )
 from expdesign.diagnosis.fit.output_error import fit_ahead, with_longer_windows
@@ -51,6 +58,7 @@ __all__ = [
     "Fit",
     "FitOptions",
     "HeldOut",
+    "MarginalInformation",
     "bootstrap_sums",
     "build_sensitivities",
     "cluster_robust",
@@ -63,6 +71,7 @@ __all__ = [
     "fit_ahead",
     "gram_matrices",
     "held_out_gain",
+    "in_groups",
     "information",
     "judged",
     "leads_away",

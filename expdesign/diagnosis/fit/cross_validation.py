@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.output_error import fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import simulate_from_measured
+from expdesign.diagnosis.motion import LinearisedMotion, simulate_from_measured
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
@@ -87,12 +88,12 @@ def validation_units(windows: Windows) -> Array:
 
 
 class CrossValidation:
-    """Errors of fits on held-out units, each measured once."""
+    """Errors of fits on held-out units, each measured once; those of fits that nobody else holds are forgotten."""
 
     def __init__(self, windows: Windows, record: Record | None = None) -> None:
         """Of all data; without a record, stretches are no longer than windows."""
         self._windows, self._record = windows, record
-        self._known: dict[int, tuple[Fit, HeldOut]] = {}
+        self._known = WeakKeyDictionary[Fit, HeldOut]()
 
     def short_windows(self, ship: ExtendedModel) -> Windows:
         """The data in stretches of `Tuning.ahead_s`."""
@@ -100,9 +101,9 @@ class CrossValidation:
 
     def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
         """Of a model whose effects are fitted."""
-        if id(found) not in self._known:
-            self._known[id(found)] = found, self.without(found, found.ship, progress)
-        return self._known[id(found)][1]
+        if found not in self._known:
+            self._known[found] = self.without(found, found.ship, progress)
+        return self._known[found]
 
     def without(self, found: Fit | None, ship: ExtendedModel, progress: Progress = silent) -> HeldOut:
         """The same, not kept; None for a model that is not fitted."""
@@ -112,7 +113,8 @@ class CrossValidation:
         """The same, measured only as those of another are: of whole units or of short stretches."""
         if not other.in_stretches:
             return self.without(found, found.ship)
-        return replace(_of_folds(_stretch_folds(found, found.ship, self._windows, self._record)), in_stretches=True)
+        folds = _stretch_folds(_Effects.of(found), found.ship, self._windows, self._record)
+        return replace(_of_folds(folds), in_stretches=True)
 
 
 def cross_validate(
@@ -129,28 +131,66 @@ def cross_validate(
     """
     unit = validation_units(windows)
     whole = _of_folds(
-        _Folds(found=found, ship=ship, windows=windows, unit=unit, part=unit, fitted=_fitted, near=True), progress
+        _Folds(
+            ship=ship,
+            windows=windows,
+            unit=unit,
+            part=unit,
+            fitted=None if found is None else partial(_fitted, found),
+            near=None if found is None else found.linear,
+        ),
+        progress,
     )
+    effects = None if found is None else _Effects.of(found)
 
     def ahead() -> HeldOut:
-        found_ahead = _of_folds(_stretch_folds(found, ship, windows, record))
+        found_ahead = _of_folds(_stretch_folds(effects, ship, windows, record))
         return replace(found_ahead, in_stretches=True, models=whole.models)
 
     return replace(whole, ahead=cache(ahead))
 
 
-def _stretch_folds(found: Fit | None, ship: ExtendedModel, windows: Windows, record: Record | None) -> _Folds:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Effects:
+    """What stretches take from a fit, without all that it holds.
+
+    Attributes:
+        ship: fitted.
+        free_keys: effects without a prior.
+        sizes: (free, w) greatest sensitivity to each of them in every window.
+    """
+
+    ship: ExtendedModel
+    free_keys: tuple[str, ...]
+    sizes: Array
+
+    @staticmethod
+    def of(found: Fit) -> _Effects:
+        values = found.sensitivities.values[: found.free_count]
+        sizes = np.abs(values).max(axis=(2, 3), initial=0.0)
+        return _Effects(ship=found.ship, free_keys=found.free_keys, sizes=sizes)
+
+    def seen(self, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
+        """The model without effects that do nothing in these windows, and the free ones that are left.
+
+        Nothing is known there of a change of the ship that comes later, for example.
+        """
+        sizes = self.sizes[:, train].max(axis=1, initial=0.0)
+        unseen = {key for key, size in zip(self.free_keys, sizes.tolist(), strict=True) if not size > 0.0}
+        return self.ship.without_effects(unseen), tuple(key for key in self.free_keys if key not in unseen)
+
+
+def _stretch_folds(effects: _Effects | None, ship: ExtendedModel, windows: Windows, record: Record | None) -> _Folds:
     """Short stretches, one part of every run held out at a time."""
     unit = validation_units(windows)
     short, of_short = _stretches(windows, unit, ship, record)
     return _Folds(
-        found=found,
         ship=ship,
         windows=short,
         unit=_parts_of_runs(short),
         part=np.arange(float(len(of_short))),
-        fitted=partial(_fitted_ahead, unit, of_short),
-        near=False,
+        fitted=None if effects is None else partial(_fitted_ahead, unit, of_short, effects),
+        in_stretches=True,
     )
 
 
@@ -159,48 +199,48 @@ class _Folds:
     """What is cross-validated.
 
     Attributes:
-        found: its fit to all units; None for a model that is not fitted.
-        ship: the model.
+        ship: the model, fitted to all units.
         windows: that it is simulated in.
         unit: (w,) of each of them.
         part: (w,) what errors are summed over: units, or stretches of them.
-        fitted: the model fitted to some of the windows, by a mask (w,).
-        near: the windows are those of the fit, so that its motion speeds up the simulation.
+        fitted: the model fitted to some of the windows, by a mask (w,); None for a model that is not fitted.
+        in_stretches: windows are stretches of units.
+        near: motion of the fit in these windows, which speeds up the simulation; None where they are stretches.
     """
 
-    found: Fit | None
     ship: ExtendedModel
     windows: Windows
     unit: Array
     part: Array
-    fitted: Callable[[Fit, Windows, NDArray[np.bool_]], ExtendedModel | None]
-    near: bool
+    fitted: Callable[[Windows, NDArray[np.bool_]], ExtendedModel | None] | None
+    near: LinearisedMotion | None = None
+    in_stretches: bool = False
 
 
 def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
-    found, windows = given.found, given.windows
+    windows = given.windows
     names, parts = np.unique(given.unit), np.unique(given.part)
-    most = TUNING.folds if given.near else TUNING.parts
+    most = TUNING.parts if given.in_stretches else TUNING.folds
     folds = [names[index::most] for index in range(min(most, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(parts), len(columns)))
-    lost_at = None if given.near else error_of_constants(windows.measured[..., columns], windows.batch)
+    lost_at = None if not given.in_stretches else error_of_constants(windows.measured[..., columns], windows.batch)
     deviation, unconverged = np.zeros_like(error), 0
     tested: list[tuple[NDArray[np.bool_], ExtendedModel | None]] = []
     kept_out = [np.isin(given.unit, fold) for fold in folds]
-    refitted = [test for test in kept_out if found is not None and not test.all()]
-    models = in_order(given.fitted, (found, windows), [(~test,) for test in refitted])
+    refitted = [(~test,) for test in kept_out if not test.all()]
+    models = None if given.fitted is None else in_order(given.fitted, (windows,), refitted)
     for number, test in enumerate(kept_out):
         progress("measuring the gain on held-out runs", number / len(folds))
-        model = given.ship if found is None or test.all() else next(models)
+        model = given.ship if models is None or test.all() else next(models)
         tested.append((test, model))
         if model is None:
             for total in (error, deviation):
                 total[np.isin(parts, given.part[test])] = np.nan
             continue
-        unconverged += found is not None and model.effects == found.ship.effects
+        unconverged += models is not None and model.effects == given.ship.effects
         part = windows.selected(test)
-        near = found.linear.selected(test) if found is not None and given.near else None
+        near = None if given.near is None else given.near.selected(test)
         lost, varied = squared_sums(
             simulate_from_measured(model, part, near).error[..., columns], part.measured[..., columns]
         )
@@ -268,7 +308,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
 
     The effects stay if no step from the fit to all windows reduces the cost on these.
     """
-    ship, free = _seen(found, train)
+    ship, free = _Effects.of(found).seen(train)
     options = FitOptions(
         noise=found.noise,
         ar_order=found.noise.order,
@@ -283,24 +323,14 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
 
 
 def _fitted_ahead(
-    unit: Array, of_short: Array, found: Fit, short: Windows, train: NDArray[np.bool_]
+    unit: Array, of_short: Array, effects: _Effects, short: Windows, train: NDArray[np.bool_]
 ) -> ExtendedModel | None:
     """The same by output error in short stretches, with the units of the windows of the fit and of the stretches."""
-    ship, free = _seen(found, np.isin(unit, of_short[train]))
+    ship, free = effects.seen(np.isin(unit, of_short[train]))
     try:
         return fit_output_error(ship, short.selected(train), free).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
-
-
-def _seen(found: Fit, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
-    """The model without effects that do nothing in these windows, and the free ones that are left.
-
-    Nothing is known there of a change of the ship that comes later, for example.
-    """
-    seen = np.abs(found.sensitivities.values[: found.free_count, train]).max(axis=(1, 2, 3), initial=0.0)
-    unseen = {key for key, size in zip(found.free_keys, seen.tolist(), strict=True) if not size > 0.0}
-    return found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
 
 
 def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:

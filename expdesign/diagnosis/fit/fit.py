@@ -235,7 +235,8 @@ def profile_cost(found: Fit, noise: Noise) -> float:
     m = marginalised(grams, found.sensitivities, noise)
     now = deviations_of(found.ship, found.keys)
     score = m.s - found.precision @ now
-    _, best = best_step(m.A + found.precision, score, step_bounds(found.ship, found.keys, found.linear.motion.windows.shortest_period_s))
+    bounds = step_bounds(found.ship, found.keys, found.linear.motion.windows.shortest_period_s)
+    _, best = best_step(m.A + found.precision, score, bounds)
     return float(m.quadratic + now @ found.precision @ now - best)
 
 

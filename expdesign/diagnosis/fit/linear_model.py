@@ -6,7 +6,7 @@ and the random current is a random effect with piecewise linear basis functions 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,6 +80,23 @@ def build_sensitivities(
         numbers=len(disturbances),
         spacing_s=spacing,
     )
+
+
+def in_groups(linear: LinearisedMotion, count: int) -> Iterator[tuple[NDArray[np.bool_], LinearisedMotion]]:
+    """The same motion a few windows at a time, so that sensitivities to `count` disturbances take little memory.
+
+    Beside each group its windows, as a mask (w,).
+    """
+    windows, samples = linear.motion.predicted.shape[:2]
+    columns = count + 2 * TUNING.most_knots
+    each = columns * (4 * samples + columns)  # sensitivities and their inner products
+    groups = min(windows, -(-windows * each // TUNING.sensitivities_at_once))
+    if groups < 2:
+        yield np.ones(windows, dtype=bool), linear
+        return
+    group = np.arange(windows) * groups // windows
+    for number in range(groups):
+        yield group == number, linear.selected(group == number)
 
 
 def effect_disturbances(linear: LinearisedMotion, keys: Sequence[str]) -> list[Disturbance]:

@@ -18,6 +18,8 @@ class Tuning:
         current_stds_mps: standard deviations of the random current that are tried [m/s].
         current_times_s: correlation times of the random current that are tried [s].
         numbers_at_once: in matrices of random currents that are tried together, at most.
+        sensitivities_at_once: numbers in sensitivities and their inner products of windows that are taken together, so
+            that memory does not grow with the data.
         knot_spacing_s: of the random current, at least [s].
         most_knots: of the random current in a window.
         tile: edge of blocks of matrix products; for up to 64 x 64 x 64 multiplications OpenBLAS uses one thread.
@@ -47,6 +49,7 @@ class Tuning:
     current_stds_mps: tuple[float, ...] = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
     current_times_s: tuple[float, ...] = (60.0, 150.0, 400.0, 1000.0)
     numbers_at_once: int = 200_000
+    sensitivities_at_once: int = 20_000_000
     knot_spacing_s: float = 20.0
     most_knots: int = 24
     tile: int = 64

@@ -78,14 +78,15 @@ def exogenous_inputs(
 
 
 def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
-    """Delivered inputs and their forces; batches of equal length are followed at once."""
+    """Delivered inputs and their forces; batches of equal length are followed at once, those without windows never."""
     batches, found = windows.batch_inputs, dict[int, Array]()
-    for length in dict.fromkeys(map(len, batches)):
-        places = [place for place, rows in enumerate(batches) if len(rows) == length]
+    used = np.unique(windows.batch).astype(int).tolist()
+    for length in dict.fromkeys(len(batches[place]) for place in used):
+        places = [place for place in used if len(batches[place]) == length]
         rows, finer = delivered_inputs(ship, np.stack([batches[place] for place in places], axis=-1), windows)
         acting = _acting(ship.model, rows, finer, windows.rows_per_step)
         found |= {place: acting[..., at] for at, place in enumerate(places)}
-    signals = windows.gather(tuple(found[place] for place in range(len(batches))))
+    signals = windows.gather(found)
     names = _force_names(ship.model)
     names = (*names, *(f"{RISE}{name}" for name in names)) if finer > 1 else names
     return ExogenousInputs({name: signals[..., i] for i, name in enumerate(names)})

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ANGLE_STEMS, group_columns
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of, exogenous_inputs, stacked_rates
 from expdesign.values import Array
@@ -33,54 +34,62 @@ class Kind:
     Attributes:
         words: what is missing, to follow "looks like".
         unit: of its size, or empty.
-        disturbance: per unit of its size.
+        disturbance: per unit of its size, along a motion: that of all windows or of some of them.
         whole: its size is one where it is what is missing.
     """
 
     words: str
     unit: str
-    disturbance: Callable[[], Disturbance]
+    disturbance: Callable[[LinearisedMotion], Disturbance]
     whole: bool = False
 
 
 def kinds(linear: LinearisedMotion) -> tuple[Kind, ...]:
     """All kinds that the data can show."""
-    return (*_steady(linear), *_by_heading(linear), *_inputs(linear), *_slow_answers(linear), _clock(linear))
+    clock = Kind(words=CLOCK, unit="s per second", disturbance=_drifting)
+    return (*_steady(linear), *_by_heading(linear), *_inputs(linear), *_slow_answers(linear), clock)
 
 
-def _force(linear: LinearisedMotion, axis: int, values: Array) -> Callable[[], Disturbance]:
-    def pushing() -> Disturbance:
-        states = linear.motion.states
-        force = np.zeros((states.shape[0], states.shape[1] - 1, states.shape[2]))
-        force[..., axis] = values
-        return Disturbance(force=force, sensor=None)
-
-    return pushing
+def _force(axis: int, values: Callable[[Windows], Array], linear: LinearisedMotion) -> Disturbance:
+    """In an equation of motion, with values (w, k) in windows."""
+    states = linear.motion.states
+    force = np.zeros((states.shape[0], states.shape[1] - 1, states.shape[2]))
+    force[..., axis] = values(linear.motion.windows)[:, :-1]
+    return Disturbance(force=force, sensor=None)
 
 
 def _steady(linear: LinearisedMotion) -> Iterator[Kind]:
-    time = linear.motion.windows.time_s[:, :-1]
-    grown = time / max(float(time.max()), 1.0)
+    end_s = max(float(linear.motion.windows.time_s[:, :-1].max()), 1.0)
     for name in linear.motion.ship.model.outputs:
         axis, unit = OUTPUTS.index(name), "rad/s\N{SUPERSCRIPT TWO}" if name == "r" else "m/s\N{SUPERSCRIPT TWO}"
         words = f"a steady {'moment' if name == 'r' else 'force'} in {WORDS[name]}"
-        yield Kind(words=words, unit=unit, disturbance=_force(linear, axis, np.ones_like(grown)))
-        yield Kind(words=f"{words} that grows with time", unit=f"{unit} at the end",
-                   disturbance=_force(linear, axis, grown))  # fmt: skip
+        steady, growing = (partial(_force, axis, values) for values in (_ones, partial(_grown, end_s)))
+        yield Kind(words=words, unit=unit, disturbance=steady)
+        yield Kind(words=f"{words} that grows with time", unit=f"{unit} at the end", disturbance=growing)
+
+
+def _ones(windows: Windows) -> Array:
+    return np.ones_like(windows.time_s)
+
+
+def _grown(end_s: float, windows: Windows) -> Array:
+    return windows.time_s / end_s
 
 
 def _by_heading(linear: LinearisedMotion) -> Iterator[Kind]:
-    windows = linear.motion.windows
-    if not windows.has_heading:
+    if not linear.motion.windows.has_heading:
         return
-    heading = windows.heading[:, :-1]
     for name in linear.motion.ship.model.outputs:
         for times in (1, 2):
             for shape in (np.sin, np.cos):
                 text = f"{shape.__name__}({'' if times == 1 else '2 '}heading)"
                 words = f"a force in {WORDS[name]} that goes with {text}"
-                values = shape(times * heading)
-                yield Kind(words=words, unit="", disturbance=_force(linear, OUTPUTS.index(name), values))
+                values = partial(_of_heading, shape, times)
+                yield Kind(words=words, unit="", disturbance=partial(_force, OUTPUTS.index(name), values))
+
+
+def _of_heading(shape: Callable[[Array], Array], times: int, windows: Windows) -> Array:
+    return shape(times * windows.heading)
 
 
 def _inputs(linear: LinearisedMotion) -> Iterator[Kind]:
@@ -91,7 +100,7 @@ def _inputs(linear: LinearisedMotion) -> Iterator[Kind]:
         for time in times:
             for held, what in ((True, "stuck"), (False, "without effect")):
                 words = f"{name} {what} from about {time:.0f} s on"
-                changed = _with_inputs(linear, [column], partial(_stopped, held), time)
+                changed = partial(_with_inputs, [column], partial(_stopped, held), time)
                 yield Kind(words=words, unit="of it", disturbance=changed, whole=True)
     for name in dict.fromkeys(map(stem, inputs)):
         columns = group_columns(name, inputs)
@@ -99,34 +108,32 @@ def _inputs(linear: LinearisedMotion) -> Iterator[Kind]:
         sizes = np.abs(np.concatenate([rows[:, columns].ravel() for rows in windows.batch_inputs]))
         for size in np.unique(np.quantile(sizes, SATURATED)).tolist():
             words = f"less effect of {name} above {size:.2g}{unit}, as by saturation or ventilation"
-            yield Kind(words=words, unit="of it lost", disturbance=_with_inputs(linear, columns, partial(_cut, size)))
+            yield Kind(
+                words=words, unit="of it lost", disturbance=partial(_with_inputs, columns, partial(_cut, size), 0.0)
+            )
         words = f"play (hysteresis) of {name}"
-        yield Kind(words=words, unit=unit.strip(), disturbance=_with_inputs(linear, columns, _play))
+        yield Kind(words=words, unit=unit.strip(), disturbance=partial(_with_inputs, columns, _play, 0.0))
 
 
 def _with_inputs(
-    linear: LinearisedMotion,
     columns: list[int],
     change: Callable[[Array, NDArray[np.bool_]], Array],
-    begin_s: float = 0.0,
-) -> Callable[[], Disturbance]:
+    begin_s: float,
+    linear: LinearisedMotion,
+) -> Disturbance:
     """The disturbance by another course of some inputs: `change` of their values (k,) from a time on, by mask (k,)."""
-
-    def disturbance() -> Disturbance:
-        motion = linear.motion
-        windows = motion.windows
-        rows = np.concatenate(windows.batch_inputs)  # laid end to end, as the times are
-        since = np.arange(len(rows)) * windows.step_s / windows.rows_per_step >= begin_s
-        for column in columns:
-            rows[:, column] = change(rows[:, column], since)
-        ends_of_runs = np.cumsum([len(part) for part in windows.batch_inputs])[:-1]
-        changed = np.split(rows, ends_of_runs)
-        exogenous = exogenous_inputs(motion.ship, replace(windows, batch_inputs=tuple(changed))).without_last_step()
-        ends = (motion.states[:, :-1], motion.states[:, 1:])
-        force = np.mean([stacked_rates(motion.ship, one, exogenous) for one in ends], axis=0)
-        return Disturbance(force=force - linear.path_rates.mean(axis=0), sensor=None)
-
-    return disturbance
+    motion = linear.motion
+    windows = motion.windows
+    rows = np.concatenate(windows.batch_inputs)  # laid end to end, as the times are
+    since = np.arange(len(rows)) * windows.step_s / windows.rows_per_step >= begin_s
+    for column in columns:
+        rows[:, column] = change(rows[:, column], since)
+    ends_of_runs = np.cumsum([len(part) for part in windows.batch_inputs])[:-1]
+    changed = np.split(rows, ends_of_runs)
+    exogenous = exogenous_inputs(motion.ship, replace(windows, batch_inputs=tuple(changed))).without_last_step()
+    ends = (motion.states[:, :-1], motion.states[:, 1:])
+    force = np.mean([stacked_rates(motion.ship, one, exogenous) for one in ends], axis=0)
+    return Disturbance(force=force - linear.path_rates.mean(axis=0), sensor=None)
 
 
 def _cut(size: float, values: Array, _since: NDArray[np.bool_]) -> Array:
@@ -153,28 +160,29 @@ def _slow_answers(linear: LinearisedMotion) -> Iterator[Kind]:
     """Lags that are longer at speed, or in slow motion."""
     motion = linear.motion
     speed = motion.states[:, :-1, 0]
-    share = (speed - speed.mean()) / max(float(speed.std()), 1e-9)
+    mean, spread = float(speed.mean()), max(float(speed.std()), 1e-9)
     for name in dict.fromkeys(map(stem, motion.ship.model.inputs)):
         key = f"lag:{name}"
         if motion.ship.get(key):
             continue
-
-        def lagging(key: str = key) -> Disturbance:
-            force = disturbance_of(linear, motion.ship.with_effects({key: LAG_S}), LAG_S).force
-            return Disturbance(force=None if force is None else force * share[..., None], sensor=None)
-
+        lagging = partial(_lagging, key, mean, spread)
         yield Kind(words=f"a lag of {name} that changes with speed", unit="s per standard deviation of speed",
                    disturbance=lagging)  # fmt: skip
 
 
-def _clock(linear: LinearisedMotion) -> Kind:
-    """Measurements later and later: their time stamps run at another rate than those of the inputs."""
+def _lagging(key: str, mean: float, spread: float, linear: LinearisedMotion) -> Disturbance:
+    """By a lag per standard deviation of speed, given the mean speed and its standard deviation over all data."""
+    force = disturbance_of(linear, linear.motion.ship.with_effects({key: LAG_S}), LAG_S).force
+    share = (linear.motion.states[:, :-1, 0] - mean) / spread
+    return Disturbance(force=None if force is None else force * share[..., None], sensor=None)
 
-    def drifting() -> Disturbance:
-        motion = linear.motion
-        windows = motion.windows
-        time = windows.time_s[:, :: windows.steps_per_sample][:, : motion.predicted.shape[1], None]
-        return Disturbance(force=None, sensor=-time * np.gradient(motion.predicted, windows.sample_s, axis=1))
 
-    return Kind(words="time stamps of the sensors that drift against those of the inputs", unit="s per second",
-                disturbance=drifting)  # fmt: skip
+CLOCK = "time stamps of the sensors that drift against those of the inputs"
+"""Measurements are later and later: their clock runs at another rate than that of the inputs."""
+
+
+def _drifting(linear: LinearisedMotion) -> Disturbance:
+    motion = linear.motion
+    windows = motion.windows
+    time = windows.time_s[:, :: windows.steps_per_sample][:, : motion.predicted.shape[1], None]
+    return Disturbance(force=None, sensor=-time * np.gradient(motion.predicted, windows.sample_s, axis=1))

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
@@ -17,6 +18,7 @@ from expdesign.diagnosis.fit import (
     effect_disturbances,
     fit,
     gram_matrices,
+    in_groups,
     log_likelihood_gain,
     window_information,
 )
@@ -25,6 +27,7 @@ from expdesign.diagnosis.remainder.kinds import WORDS, Kind, kinds
 from expdesign.diagnosis.remainder.stability_selection import Chosen, UnitInformation, stable_selection
 from expdesign.diagnosis.remainder.term_dictionary import term_dictionary
 from expdesign.diagnosis.remainder.tuning import TUNING
+from expdesign.values import Array
 from expdesign.vessel import Term
 
 
@@ -64,23 +67,26 @@ def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
     windows, ship = base.linear.motion.windows, base.ship
     terms = term_dictionary(ship.model, ship.library)
     wider = replace(ship, library={**ship.library, **terms})
-    linear = replace(base.linear, motion=replace(base.linear.motion, ship=wider))
-    steady = term_disturbances(linear, [f"term:{name}" for name in (*ship.library, *terms)])
-    names = [key.removeprefix("term:") for key in steady if key not in base.keys]
-    others = kinds(base.linear)
-    disturbances = [
-        *effect_disturbances(base.linear, base.keys),
-        *(steady[f"term:{name}"] for name in names),
-        *(kind.disturbance() for kind in others),
-    ]
-    found = build_sensitivities(base.linear, disturbances, random_current=base.noise.current_std_mps > 0)
-    grams = gram_matrices(found, base.noise)
-    A, s = window_information(grams, found, base.noise)
-    given = UnitInformation(A=A, s=s, precision=base.precision, offset=deviations_of(ship, base.keys))
-    chosen = stable_selection(_without(_by_unit(given, windows), _impossible(given, len(names), others)), rng)
+    keys = [f"term:{name}" for name in (*ship.library, *terms) if f"term:{name}" not in base.keys]
+    others, unit, size, names = kinds(base.linear), _units(windows), 0.0, list[str]()
+    sums: tuple[Array, Array] | None = None
+    for mask, linear in in_groups(base.linear, len(base.keys) + len(keys) + len(others)):
+        steady = term_disturbances(replace(linear, motion=replace(linear.motion, ship=wider)), keys)
+        names = [key.removeprefix("term:") for key in steady]
+        disturbances = [
+            *effect_disturbances(linear, base.keys),
+            *steady.values(),
+            *(kind.disturbance(linear) for kind in others),
+        ]
+        found = build_sensitivities(linear, disturbances, random_current=base.noise.current_std_mps > 0)
+        grams = gram_matrices(found, base.noise)
+        parts, size = window_information(grams, found, base.noise), size + float(grams.ee.sum())
+        sums = _added_by_unit(sums, parts, unit[mask], int(unit.max()) + 1)
+    assert sums is not None
+    given = UnitInformation(A=sums[0], s=sums[1], precision=base.precision, offset=deviations_of(ship, base.keys))
+    chosen = stable_selection(_without(given, _impossible(given, len(names), others)), rng)
     sizes = _sizes(given, [item.index for item in chosen])
     listed = [wider.library[name] for name in names]
-    size = float(grams.ee.sum())
     return tuple(_missing(listed, others, item, *pair, size) for item, pair in zip(chosen, sizes, strict=True))
 
 
@@ -122,13 +128,24 @@ def _without(given: UnitInformation, places: list[int]) -> UnitInformation:
     return replace(given, A=A, s=s)
 
 
-def _by_unit(given: UnitInformation, windows: Windows) -> UnitInformation:
-    """Windows of one run belong together, where there are enough runs."""
+def _units(windows: Windows) -> NDArray[np.int64]:
+    """(w,) unit of every window: its run, where there are enough runs; else windows, or a few in a row where many."""
     runs = np.unique(windows.batch)
-    if len(runs) < 3:
-        return given
-    member = (windows.batch == runs[:, None]).astype(float)
-    return replace(given, A=np.einsum("bw,wij->bij", member, given.A), s=member @ given.s)
+    if len(runs) >= 3:
+        return np.searchsorted(runs, windows.batch)
+    count = len(windows.batch)
+    return np.arange(count) * min(count, TUNING.most_units) // count
+
+
+def _added_by_unit(
+    sums: tuple[Array, Array] | None, parts: tuple[Array, Array], unit: NDArray[np.int64], units: int
+) -> tuple[Array, Array]:
+    """Sums of window information by units, with those of more windows, given the unit (w,) of each."""
+    A, s = (np.zeros((units, *part.shape[1:])) for part in parts) if sums is None else sums
+    for number in np.unique(unit):
+        A[number] += parts[0][unit == number].sum(axis=0)
+        s[number] += parts[1][unit == number].sum(axis=0)
+    return A, s
 
 
 def _sizes(given: UnitInformation, chosen: list[int]) -> list[tuple[float, float]]:

@@ -35,7 +35,8 @@ class UnitInformation:
     def beside_nuisance(self, keep: NDArray[np.bool_]) -> tuple[Array, Array]:
         """(c - n, c - n) and (c - n,) of some units, (w,) by mask, with the nuisance effects projected out."""
         n = len(self.precision)
-        A, s = self.A[keep].sum(axis=0), self.s[keep].sum(axis=0)
+        weights = keep.astype(float)  # sums, without a copy of what is summed
+        A, s = np.tensordot(weights, self.A, 1), weights @ self.s
         if not n:
             return A, s
         own = A[:n, :n] + self.precision

@@ -17,6 +17,7 @@ class Tuning:
         regressors: about so many are tried, by which p-values are multiplied.
         least_statistic: of a regressor; one of 300 reaches it by chance in one of 1000 trials.
         least_own_share: of a regressor that nothing else imitates.
+        most_units: that one or two runs are divided into.
         half_samples: of the units, for stability selection.
         stable: share of them that must choose a regressor, or one that looks like it.
         alike: correlation from which on regressors look alike.
@@ -36,6 +37,7 @@ class Tuning:
     regressors: int = 300
     least_statistic: float = 25.0
     least_own_share: float = 1e-4
+    most_units: int = 200
     half_samples: int = 50
     stable: float = 0.5
     alike: float = 0.8

@@ -21,7 +21,16 @@ import numpy as np
 import scipy
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import Fit, build_sensitivities, deviations_of, effect_disturbances, information
+from expdesign.diagnosis.fit import (
+    Fit,
+    MarginalInformation,
+    build_sensitivities,
+    deviations_of,
+    effect_disturbances,
+    in_groups,
+    information,
+)
+from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.values import Array
@@ -110,29 +119,35 @@ def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
 
 
 def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
-    disturbances = effect_disturbances(base.linear, base.keys)
     shared: dict[object, int] = {}
-    places: list[list[int]] = []
-    for candidate in candidates:
-        rows = []
-        for tag, disturbance in candidate_disturbances(base.linear, candidate):
-            if tag not in shared:
-                shared[tag] = len(disturbances)
-                disturbances.append(disturbance())
-            rows.append(shared[tag])
-        places.append(rows)
-    found = build_sensitivities(base.linear, disturbances, random_current=base.noise.current_std_mps > 0)
-    m = information(found, base.noise)
-    c = len(base.keys)
+    places = [
+        np.array([shared.setdefault(tag, len(shared)) for tag, _ in candidate_disturbances(base.linear, candidate)])
+        for candidate in candidates
+    ]
+    c, parts = len(base.keys), list[MarginalInformation]()
+    for _, linear in in_groups(base.linear, c + len(shared)):
+        disturbances = [*effect_disturbances(linear, base.keys), *_distinct(linear, candidates)]
+        found = build_sensitivities(linear, disturbances, random_current=base.noise.current_std_mps > 0)
+        parts.append(information(found, base.noise))
+    A, s = np.sum([part.A for part in parts], axis=0), np.sum([part.s for part in parts], axis=0)
+    size = np.sqrt(np.maximum(np.diag(A)[c:], 1e-300))
     now = deviations_of(base.ship, base.keys)
-    A, s = m.A.copy(), m.s.copy()
     own = A[:c, :c] + base.precision
     if c:
         solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision @ now]), rcond=None)[0]
         s = s[c:] - A[c:, :c] @ solved[:, -1]
         A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
-    size = np.sqrt(np.maximum(np.diag(m.A)[c:], 1e-300))
-    return _Scores(A=A, s=s, size=size, index=tuple(np.array(rows) - c for rows in places))
+    return _Scores(A=A, s=s, size=size, index=tuple(places))
+
+
+def _distinct(linear: LinearisedMotion, candidates: Sequence[Candidate]) -> list[Disturbance]:
+    """Disturbances along a motion, each once, in the order of their first candidates."""
+    shared = dict[object, Disturbance]()
+    for candidate in candidates:
+        for tag, disturbance in candidate_disturbances(linear, candidate):
+            if tag not in shared:
+                shared[tag] = disturbance()
+    return [*shared.values()]
 
 
 def _p_value(statistic: Any, freedom: int, *, positive: bool) -> Any:
