@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import signal
+import sys
 from collections.abc import Callable, Generator
 from pathlib import Path
 
@@ -18,6 +19,9 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
 # Results must come from the code that is tested, not from the cache of whoever runs the tests.
 os.environ["EXPDESIGN_CACHE"] = "off"
+# Compiled modules are kept: else workers and every program that a test starts compile the package anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # A shell starts background jobs with SIGINT ignored, and what they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -42,7 +42,7 @@ def test_a_step_takes_products_straight_on(ship):
 
 @pytest.mark.parametrize(("key", "hidden", "truth"), [("gain", "gain", -0.2), ("inertia:v", "load_v", 0.4)])
 def test_factors_beside_uncertain_parameters_end_where_they_end_from_elsewhere(key, hidden, truth):
-    record = hidden_record("barge", seed=3, batches=5, samples=150, effects={hidden: truth}, relative_std=0.05)
+    record = hidden_record("barge", seed=3, batches=3, samples=150, effects={hidden: truth}, relative_std=0.05)
     extended = extended_model(vessel_of("barge", relative_std=0.05), record)
     windows = cut_windows(extended.model, record)
     base = fit_nuisance(extended, windows, initial_states(windows))

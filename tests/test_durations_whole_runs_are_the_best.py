@@ -52,12 +52,12 @@ def small_problem(draw: int, *, equal: bool) -> DurationProblem:
 
 
 def test_whole_runs_of_one_length_are_the_best_there_are():
-    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=True) for d in range(40))]
+    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=True) for d in range(20))]
     assert max(losses) < 1e-9
 
 
 def test_whole_runs_of_different_lengths_are_mostly_the_best_and_never_far_from_it():
-    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=False) for d in range(60))]
+    losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=False) for d in range(30))]
     # Exchange finds a local optimum; `whole_runs` states how good those were on such problems.
     assert np.mean(np.array(losses) < 1e-9) >= 0.9
     assert max(losses) < 0.03

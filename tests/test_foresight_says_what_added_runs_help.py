@@ -9,6 +9,7 @@ import pytest
 from expdesign.cli import main
 from expdesign.foresight.added import Offers, of_one_manoeuvre, together
 from expdesign.foresight.effects import joined
+from short_examples import SHORTER, copied
 
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
@@ -70,9 +71,9 @@ def test_joined_names_say_what_they_share_once():
 def test_the_command_writes_probabilities_that_follow_from_their_noncentralities(tmp_path, capsys):
     from expdesign.foresight import power
 
-    arguments = ["foresee", str(SCENARIOS / "story.toml"), "--jobs", "1", "--no-cache", "--quiet"]
-    assert main([*arguments, "--out", str(tmp_path)]) == 0
-    found = json.loads((tmp_path / "foresee.json").read_text())
+    arguments = ["foresee", str(copied(tmp_path, "story", SHORTER["story"])), "--jobs", "1", "--no-cache", "--quiet"]
+    assert main([*arguments, "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out/foresee.json").read_text())
     assert found["effects"]
     for effect in found["effects"]:
         if effect["size"] is not None:
@@ -81,7 +82,7 @@ def test_the_command_writes_probabilities_that_follow_from_their_noncentralities
     short = {item["cause"] for item in found["effects"] if (item["power"] or 1.0) < found["wanted_power"]}
     assert short == set(found["missed"])
     assert {item["cause"] for item in found["not_seen"]} >= {"shallow_water"}
-    page = (tmp_path / "foresee.html").read_text()
+    page = (tmp_path / "out/foresee.html").read_text()
     assert all(sentence[:40] in page for sentence in found["conclusions"])
     assert main([*arguments, "--plan", str(tmp_path / "none.json")]) == 2
     assert "none.json" in capsys.readouterr().err

@@ -20,7 +20,7 @@ from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
-FEW = GrowSettings(families=("zigzag", "telegraph"), pool=8, rounds=2, seed=1)
+FEW = GrowSettings(families=("zigzag",), pool=8, rounds=1, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -82,9 +82,7 @@ def first_prices_speed(problem):
 
 def test_the_same_seed_finds_the_same_of_the_duration_stated(asked):
     _, problem, accuracy = asked
-    first, again = (
-        manoeuvres_worth_adding(problem, accuracy, replace(FEW, run_s=50.0, families=("zigzag",))) for _ in range(2)
-    )
+    first, again = (manoeuvres_worth_adding(problem, accuracy, replace(FEW, run_s=50.0)) for _ in range(2))
     assert [(spec.name, spec.settings) for spec in again] == [(spec.name, spec.settings) for spec in first]
     assert {spec.settings["duration_s"] for spec in first} == {50.0}
 

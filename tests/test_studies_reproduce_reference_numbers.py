@@ -26,7 +26,7 @@ def check_scalar(case: scalar_system.Case, runs: int) -> None:
 @pytest.mark.parametrize("case", scalar_system.CASES, ids=lambda case: case.name)
 def test_scalar_system_small(case: scalar_system.Case) -> None:
     """Figures 4.1-4.11, 7.3 and 7.4 of F. Ljungberg's doctoral thesis."""
-    check_scalar(case, 20)
+    check_scalar(case, 10)
 
 
 @pytest.mark.slow
@@ -67,11 +67,6 @@ def test_the_published_tables_say_who_is_consistent(case: manoeuvring.Case) -> N
     """The verdicts expected of us are what the published numbers say: zero within mean plus/minus one deviation."""
     for estimator, letters in PUBLISHED[case].items():
         assert "".join(c for c in "XYN" if published_consistent(case.name, estimator, c)) == letters
-
-
-def test_who_is_consistent_in_severe_wind_small() -> None:
-    """Tables 6.5-6.7, all six estimators; the severe wind tells more of them apart than the mild one."""
-    assert verdicts(SEVERE, runs=6, sets=1) == PUBLISHED[SEVERE]
 
 
 @pytest.mark.slow

@@ -159,6 +159,7 @@ def test_a_watch_that_is_ended_by_force_goes_on_as_if_it_had_not_been(
         assert states[0]["reading"][key] == states[1]["reading"][key]
 
 
+@pytest.mark.slow
 def test_a_killed_watch_leaves_a_state_to_go_on_from(voyages: dict[str, Path], tmp_path: Path) -> None:
     words = [sys.executable, "-m", "expdesign", "monitor", "-", "--vessel", str(TENDER), "--quiet"]
     begin = ["--reference", str(voyages["reference"]), "--every-s", "600"]
