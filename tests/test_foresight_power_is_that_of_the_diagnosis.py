@@ -132,7 +132,7 @@ def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(f
     assert current["gyro_scale"].told_apart > 0.9
     for item in foreseen.values():
         if item.sized:
-            assert item.named <= item.power + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
+            assert item.named <= item.found + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
 
 
 def test_held_out_runs_show_most_of_what_is_certain_and_never_more_than_the_test_accepts(foreseen):

@@ -307,7 +307,7 @@ def _one(
         level=level,
         power=float(found),
         found=float(found) * shown,
-        named=named if known_size else math.nan,
+        named=named * shown if known_size else math.nan,
         least_change=change * least if known_size and noncentrality > 0 else math.inf,
         confusions=confusions if known_size else (),
     )

@@ -54,7 +54,7 @@ class Foreseen:
         level: p-value of the test alone that is accepted.
         power: probability that the test of its cause finds it.
         found: probability that a diagnosis finds it: held-out runs are then simulated or predicted better too.
-        named: probability that the test finds it and no other cause explains the data better.
+        named: probability that a diagnosis finds it and no other cause explains the data better.
         least_change: change of the same number with the wanted power; infinite where there is none.
         confusions: causes that it is not told apart from.
         added: the manoeuvre whose added runs bring it to the wanted power soonest; None where none does, or none is

@@ -18,9 +18,7 @@ def power_figure(found: Foresight) -> str:
         rows, [100 * item.power for item in items], height=0.6, color=BLUE, alpha=0.35, label="accepted by its test"
     )
     axes.barh(rows, [100 * item.found for item in items], height=0.3, color=BLUE, label="found")
-    axes.plot(
-        [100 * item.named for item in items], rows, "D", color=VERMILION, markersize=5, label="accepted and first"
-    )
+    axes.plot([100 * item.named for item in items], rows, "D", color=VERMILION, markersize=5, label="found and first")
     axes.axvline(100 * found.wanted_power, color=GREY, linewidth=0.9, linestyle="--")
     axes.set_yticks(rows, [plain(_name(item)) for item in items])
     axes.invert_yaxis()
