@@ -164,7 +164,6 @@ def pod_force(pods: Pods, flow: Any, angle: Any, speed: Any) -> tuple[Any, Any]:
 
 
 STATES = ("u", "v", "p", "r", "phi", "psi")
-SUBSTEPS = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -239,19 +238,17 @@ def sail_many(
     orders = np.stack([angle.T, speed.T], axis=1)  # (k, 2, n)
     if n == 1:
         x, orders = x[:, 0], orders[:, :, 0]
-    step, change = sample_time_s / SUBSTEPS, np.diff(orders, axis=0, append=orders[-1:]) / SUBSTEPS
+    change = np.diff(orders, axis=0, append=orders[-1:])
     states = np.empty((len(orders), *x.shape))
     sway, moment = np.empty((2, len(orders), *x.shape[1:]))
     for k, order in enumerate(orders):
         states[k], sway[k] = x, rates(x, order)[1]
         moment[k] = drives.forces(*numbers(x[:4]), *numbers(order))[3]
-        for part in range(SUBSTEPS):
-            begin, middle, end = (order + (part + share) * change[k] for share in (0.0, 0.5, 1.0))
-            k1 = rates(x, begin)
-            k2 = rates(x + step / 2 * k1, middle)
-            k3 = rates(x + step / 2 * k2, middle)
-            k4 = rates(x + step * k3, end)
-            x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        k1 = rates(x, order)
+        k2 = rates(x + sample_time_s / 2 * k1, order + change[k] / 2)
+        k3 = rates(x + sample_time_s / 2 * k2, order + change[k] / 2)
+        k4 = rates(x + sample_time_s * k3, order + change[k])
+        x = x + sample_time_s / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     states, sway, moment = states.reshape(len(orders), 6, n), sway.reshape(-1, n), moment.reshape(-1, n)
     return tuple(
         Voyage(sample_time_s=sample_time_s, states=states[..., i], sway_acceleration=sway[:, i], moment=moment[:, i])

@@ -81,6 +81,11 @@ def three_cases(seed: int = 1) -> tuple[Case, ...]:
 
 
 @cache
+def with_k_known() -> RollEstimate:
+    return estimate_roll(ship_problem(three_cases()))
+
+
+@cache
 def all_nine() -> RollEstimate:
     return estimate_roll(ship_problem(three_cases(), free=PARAMETERS))
 
@@ -92,7 +97,7 @@ def test_data_almost_without_noise_give_the_truth() -> None:
 
 
 def test_an_unknown_load_is_found_where_k_is_known() -> None:
-    found = estimate_roll(ship_problem(three_cases()))
+    found = with_k_known()
     assert found.settled
     for name, std in found.std.items():
         assert abs(found.values[name] - MODEL_SHIP_TRUTH[PARAMETERS.index(name)]) < 4.0 * std, name
@@ -256,14 +261,14 @@ def test_halves_of_a_record_scatter_as_they_say() -> None:
 
 def test_rounds_settle_within_a_few() -> None:
     """The thesis has four digits after five rounds; here spectra are estimated anew in each, and three settle."""
-    rounds = estimate_roll(ship_problem(three_cases())).rounds
+    rounds = with_k_known().rounds
     assert len(rounds) <= 7
     assert np.abs((rounds[-1] - rounds[-2]) / rounds[-1]).max() < 2e-3
 
 
 def test_k_stays_where_the_search_began_and_the_mass_does_not_care() -> None:
-    found = [estimate_roll(ship_problem(three_cases(), free=PARAMETERS, k=k)).values for k in (8.0, 9.0, 10.0)]
-    assert [one["k"] for one in found] == [8.0, 9.0, 10.0]
+    found = [estimate_roll(ship_problem(three_cases(), free=PARAMETERS, k=k)).values for k in (8.0, 10.0)]
+    assert [one["k"] for one in found] == [8.0, 10.0]
     masses = [one["m"] for one in found]
     assert np.ptp(masses) < 0.01 * np.mean(masses)
     assert np.ptp([one["z_m"] for one in found]) < 1e-3
