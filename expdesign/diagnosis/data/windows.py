@@ -48,6 +48,8 @@ class Windows:
         derived: those of u, v, r that come from the pose.
         names: of the batches.
         rows_per_step: samples of the data in an integrator step, where several are averaged.
+        white_noise: fits take what is left for white noise. In windows too short to tell slow noise or a random current
+            from a steady force, either would take the place of any slow effect.
     """
 
     step_s: float
@@ -66,6 +68,7 @@ class Windows:
     derived: tuple[str, ...]
     names: tuple[str, ...]
     rows_per_step: int = 1
+    white_noise: bool = False
 
     @property
     def sample_s(self) -> float:
@@ -195,6 +198,7 @@ def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None =
         derived=derived,
         names=tuple(batch.name for batch in record.batches),
         rows_per_step=merged,
+        white_noise=False,
         **{name: np.stack(values) for name, values in rows.items()},
     )
 

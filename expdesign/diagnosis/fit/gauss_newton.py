@@ -168,7 +168,8 @@ def _noise(problem: _Problem, point: _Point | Fit, guess: Noise | None) -> Noise
         now=deviations_of(point.ship, problem.keys),
         bounds=step_bounds(point.ship, problem.keys, problem.windows.shortest_period_s),
     )
-    return estimate_noise(point.sensitivities, prior, guess, point.grams, ar_order=problem.options.ar_order)
+    ar_order = 0 if problem.windows.white_noise else problem.options.ar_order
+    return estimate_noise(point.sensitivities, prior, guess, point.grams, ar_order=ar_order)
 
 
 def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:

@@ -112,9 +112,9 @@ def _by_difference(linear: LinearisedMotion, key: str) -> Disturbance:
 
 
 def sensitivities_to(linear: LinearisedMotion, keys: Sequence[str]) -> Sensitivities:
-    """Sensitivities to effects, with a random current where a heading is measured."""
-    disturbances = effect_disturbances(linear, keys)
-    return build_sensitivities(linear, disturbances, random_current=linear.motion.windows.has_heading)
+    """Sensitivities to effects, with a random current where a heading is measured and noise is not white."""
+    disturbances, windows = effect_disturbances(linear, keys), linear.motion.windows
+    return build_sensitivities(linear, disturbances, random_current=windows.has_heading and not windows.white_noise)
 
 
 def sensitivities_beside(

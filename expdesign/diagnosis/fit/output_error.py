@@ -15,7 +15,7 @@ from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, nearest_pos
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states, stable_windows
+from expdesign.diagnosis.motion import initial_states, longest_windows, stable_windows
 from expdesign.signals import Record
 
 
@@ -25,8 +25,7 @@ def fit_output_error(ship: ExtendedModel, windows: Windows, free: tuple[str, ...
     Raises:
         FloatingPointError: the simulation diverges at the start of the fit.
     """
-    options = FitOptions(steps=TUNING.fold_steps, ar_order=0)
-    part = replace(windows, has_heading=False)
+    options, part = FitOptions(steps=TUNING.fold_steps), replace(windows, white_noise=True)
     return fit(ship, part, free, starts=initial_states(windows, ship.states), options=options)
 
 
@@ -65,15 +64,18 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
 
     It is re-estimated within the standard deviations of the vessel file: first what is impossible in it becomes
     possible (`nearest_possible`), then it is fitted in windows short enough for it, then in longer ones. Where that
-    does not succeed, both are as given.
+    does not succeed, it is as given. Windows that stay as short are those of output error, as models are judged in.
 
     Args:
         ship: the model in use.
         record: data.
         windows: of the data, short enough for the model in use.
     """
-    if _length_s(windows) >= TUNING.ahead_s or not uncertain_keys(ship):
+    if _length_s(windows) > TUNING.ahead_s or windows.steps >= longest_windows(ship, record).steps:
         return ship, windows
+    as_given = ship, replace(windows, white_noise=True)
+    if not uncertain_keys(ship):
+        return as_given
     found = nearest_possible(ship)
     length_s = _length_s(stable_windows(found, record))
     try:
@@ -82,9 +84,9 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
             length_s *= TUNING.longer_by
         found = fit_output_error(found, cut_windows(ship.model, record, longest_s=TUNING.ahead_s), ()).ship
     except (FloatingPointError, np.linalg.LinAlgError):
-        return ship, windows
-    longer = stable_windows(found, record)
-    return found, longer if longer.steps > windows.steps else windows
+        return as_given
+    longer = max(windows, stable_windows(found, record), key=lambda item: item.steps)
+    return found, replace(longer, white_noise=_length_s(longer) <= TUNING.ahead_s)
 
 
 def _length_s(windows: Windows) -> float:

@@ -19,7 +19,7 @@ from expdesign.diagnosis.motion.simulation import (
     simulate_nearby,
     simulate_windows,
 )
-from expdesign.diagnosis.motion.window_length import stable_windows
+from expdesign.diagnosis.motion.window_length import longest_windows, stable_windows
 
 __all__ = [
     "Disturbance",
@@ -31,6 +31,7 @@ __all__ = [
     "initial_states",
     "linearise",
     "linearised_like",
+    "longest_windows",
     "responses",
     "simulate_from_measured",
     "simulate_nearby",

@@ -14,16 +14,22 @@ from expdesign.signals import Record
 
 def stable_windows(ship: ExtendedModel, record: Record) -> Windows:
     """Windows of a record: as long as possible, but at least a few, and short enough for an unstable model."""
-    total_s = sum(len(batch) * batch.sample_time_s for batch in record.batches)
-    windows = cut_windows(ship.model, record)
-    if len(windows.batch) < TUNING.fewest_windows:
-        windows = cut_windows(ship.model, record, longest_s=total_s / TUNING.fewest_windows)
+    windows = longest_windows(ship, record)
     for _ in range(TUNING.window_rounds):
         stable_s = _stable_time(ship, windows)
         if stable_s >= windows.steps * windows.step_s:
             break
         windows = cut_windows(ship.model, record, longest_s=stable_s)
     return windows
+
+
+def longest_windows(ship: ExtendedModel, record: Record) -> Windows:
+    """Windows of a record for a stable model."""
+    windows = cut_windows(ship.model, record)
+    if len(windows.batch) >= TUNING.fewest_windows:
+        return windows
+    total_s = sum(len(batch) * batch.sample_time_s for batch in record.batches)
+    return cut_windows(ship.model, record, longest_s=total_s / TUNING.fewest_windows)
 
 
 def _stable_time(ship: ExtendedModel, windows: Windows) -> float:

@@ -17,8 +17,8 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.processes import in_order
 from expdesign.values import Array
 
-FROM_NOTHING = FitOptions(steps=TUNING.short_steps, ar_order=0)
-"""White noise of unknown size."""
+FROM_NOTHING = FitOptions(steps=TUNING.short_steps)
+"""Noise of unknown size."""
 
 
 def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
@@ -29,7 +29,7 @@ def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
     samples = max(TUNING.fewest_samples, round(TUNING.short_s / windows.sample_s))
     if 2 * samples > windows.measured.shape[1]:
         return None
-    short = replace(windows.cut_shorter(samples), has_heading=False)
+    short = replace(windows.cut_shorter(samples), white_noise=True)
     try:
         return fit(base.ship, short, base.free_keys, starts=initial_states(short), options=FROM_NOTHING)
     except (FloatingPointError, np.linalg.LinAlgError):
@@ -79,7 +79,7 @@ def start_nearer(base: Fit, windows: Windows, point: StartingPoint) -> tuple[Ext
     middle = windows.cut_shorter(max(TUNING.fewest_samples, round(TUNING.middle_s / windows.sample_s)))
     ship = guess
     if after > 0.5 * before and middle.measured.shape[1] < windows.measured.shape[1]:
-        part, starts = replace(middle, has_heading=False), initial_states(middle, guess.states)
+        part, starts = replace(middle, white_noise=True), initial_states(middle, guess.states)
         ship = fit(guess, part, joint_keys(base, point.keys), starts=starts, options=FROM_NOTHING).ship
         after = _squared_error(base, windows, ship)
     return (ship, initial_states(windows)) if after < before else (guess, base.starts)
