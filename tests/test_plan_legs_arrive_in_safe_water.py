@@ -9,7 +9,7 @@ import shapely
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
-from expdesign.plan.legs import LegTask, LegWater, _ompl, dubins
+from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins
 from expdesign.plan.legs._ompl import dubins_curve, search_dubins
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.tuning import LEGS
@@ -101,6 +101,21 @@ def test_commands_take_the_vessel_to_the_desired_state_within_limits_and_rates(s
     steps = np.abs(np.diff(np.vstack([begin, values]), axis=0))
     assert (steps <= np.array(rate) * water.vessel.sample_time_s * (1 + 1e-6)).all()
     assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
+
+
+def test_a_leg_without_a_solution_in_its_corridor_is_found_where_the_whole_water_holds_one(monkeypatch):
+    solved = agile.solve_leg
+    monkeypatch.setattr(agile, "solve_leg", lambda problem: None if problem.bounded else solved(problem))
+    channel, parted = leg_water(shapely.box(-60, -350, 60, 350)), leg_water(BASIN.difference(WALL))
+    for water, begin, end in (
+        (channel, at_rest(-40, 0, 0.0), at_rest(60, 0, 0.4)),
+        (parted, at_rest(0, -70, 0.0), at_rest(0, 70, 0.0)),  # round the wall
+    ):
+        values = agile_leg(task(begin, end), water, water.ship)
+        assert values is not None
+        track = water.sail(begin, values)
+        assert np.allclose(track.pose[-1, :2], end[:2], atol=0.03)
+        assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
 
 
 def test_a_leg_through_a_gap_keeps_the_hull_clear_of_both_sides():

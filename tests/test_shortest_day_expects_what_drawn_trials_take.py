@@ -14,7 +14,7 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.control import capability
 from expdesign.plan.monte_carlo import sail_trials
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import draft_trial
+from expdesign.plan.solve import draft_trial, with_lateness
 from expdesign.plan.tuning import PLAN
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day.prices import DraftedDay, _legs_s
@@ -41,7 +41,9 @@ def drafted() -> DraftedDay:
         goal=np.array([400.0, 200.0, 0.0]),
         expected=True,
     )
-    return DraftedDay(repeats=(2,), draft=draft_trial(problem), information=np.zeros((5, 1, 1)), margin=0.0)
+    return DraftedDay(
+        repeats=(2,), draft=with_lateness(problem, draft_trial(problem)), information=np.zeros((5, 1, 1)), margin=0.0
+    )
 
 
 def test_a_draft_is_expected_to_take_as_long_as_other_drawn_trials_of_it(drafted):

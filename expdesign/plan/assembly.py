@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ from expdesign.errors import InputError, NoPlan, NoRoom
 from expdesign.plan.chart import (
     CHART,
     ClearanceField,
+    GoalDistance,
     build_goal_distance,
     clearance_field,
     connects,
@@ -26,11 +27,9 @@ from expdesign.plan.legs import LegWater, through_water
 from expdesign.plan.local_planner import (
     GoAroundTime,
     LocalPlanner,
-    Pair,
     RunSpace,
     SearchSpace,
     TransitionTrials,
-    TriedTransition,
     local_planner,
     pairs_of,
 )
@@ -45,10 +44,6 @@ from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import covering_discs
-
-Tried = Mapping[Pair, TriedTransition | None]
-"""Transitions by the runs before and after."""
-NOTHING_TRIED: Tried = {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,12 +76,12 @@ def phases_of(problem: PlanProblem, planner: LocalPlanner, progress: Progress) -
 
 
 def plan_room(
-    problem: PlanProblem, water: LegWater, progress: Progress, known: Tried = NOTHING_TRIED, *, strict: bool = False
+    problem: PlanProblem, water: LegWater, progress: Progress, like: PlanRoom | None = None, *, strict: bool = False
 ) -> PlanRoom:
     """Water and search space of the first plan, with the transitions optimised that the search uses.
 
-    Transitions known already are not optimised again. With `strict`, runs that may have a place are refused, too, where
-    none was found.
+    Transitions known from the room of a like trial are not optimised again. With `strict`, runs that may have a place
+    are refused, too, where none was found.
 
     Raises:
         NoPlan: no path leads from start to goal, or the ship cannot leave its start or reach its goal.
@@ -95,31 +90,36 @@ def plan_room(
     planner.check_ends(problem.start, problem.goal, water)
     if (stuck := without_way_out(problem, water, planner)) is not None:
         raise stuck
-    space = search_space(problem, water, planner, strict=strict)
+    known = like.space.goal_distance if like is not None and like.water is water else None
+    space = search_space(problem, water, planner, known, strict=strict)
     if _most_trials(problem, planner):
-        space = replace(space, tried=known)
+        if like is not None and like.water.ship == water.ship:
+            space = replace(space, tried=like.space.tried)
         space = _with_transitions(problem, water, space, phases_of(problem, planner, progress).transitions)
     return PlanRoom(water=water, space=space)
 
 
 def roomy_water(
-    problem: PlanProblem, ship: Capability, progress: Progress, known: Tried = NOTHING_TRIED
+    problem: PlanProblem, ship: Capability, progress: Progress, like: PlanRoom | None = None
 ) -> tuple[LegWater, PlanRoom]:
     """The water, and what the first plan is made in; on a finer grid and with more corners of the shore where need be.
+
+    Water of a like trial of the same ship, in the same part of the chart, is not measured again.
 
     Raises:
         NoPlan: as `plan_room`.
     """
-    water = leg_water(problem, ship)
+    same = like is not None and like.water.area is problem.area and like.water.ship == ship
+    water = like.water if like is not None and same else leg_water(problem, ship)
     try:
-        return water, plan_room(problem, water, progress, known, strict=True)
+        return water, plan_room(problem, water, progress, like, strict=True)
     except NoRoom:
         finer = leg_water(problem, ship, finer=PLAN.finer_grid)
     if finer.field.cell_m >= 0.75 * water.field.cell_m:  # the area is too large for it
         finer = replace(finer, field=water.field)
     if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CHART.corners[1][1]:
         water = finer
-    return water, plan_room(problem, water, progress, known)
+    return water, plan_room(problem, water, progress, like)
 
 
 def waters(problem: PlanProblem, ship: Capability) -> Iterator[SeaArea]:
@@ -171,8 +171,15 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
     )
 
 
-def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner, *, strict: bool = False) -> SearchSpace:
-    """What the search for places works on.
+def search_space(
+    problem: PlanProblem,
+    water: LegWater,
+    planner: LocalPlanner,
+    goal_distance: GoalDistance | None = None,
+    *,
+    strict: bool = False,
+) -> SearchSpace:
+    """What the search for places works on; distances to the goal may be known.
 
     Runs without room are told before paths are looked for, which takes longer, if the grid leaves a passage.
 
@@ -183,7 +190,7 @@ def search_space(problem: PlanProblem, water: LegWater, planner: LocalPlanner, *
     ends, lacking = (problem.start[:2], problem.goal[:2]), without_room(runs, strict=strict)
     if lacking is not None and narrowest_passage(water.field, *ends)[0] > runs.leg_margin_m:
         raise lacking
-    goal_distance = build_goal_distance(water.narrowest_graph, water.field, problem.goal[:2])
+    goal_distance = goal_distance or build_goal_distance(water.narrowest_graph, water.field, problem.goal[:2])
     if goal_distance is None or not water.candidate_paths(*ends):
         raise _no_path(problem, water.field, runs.leg_margin_m)
     if lacking is not None:

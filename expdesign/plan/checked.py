@@ -60,11 +60,10 @@ def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial)
     """
     rng = np.random.default_rng((problem.seed, PLAN.lateness_stream))
     trials = sail_trials(water, sailed, draws=PLAN.lateness_trials, rng=rng)
-    planned = np.array([leg.last - leg.first for leg in sailed.legs])
     done = trials.completed
     if not done.any():
-        return np.full(len(planned), np.inf)
-    return np.asarray(problem.vessel.sample_time_s * (trials.samples[:, done].mean(axis=1) - planned))
+        return np.full(len(sailed.legs), np.inf)
+    return np.asarray(problem.vessel.sample_time_s * trials.samples[:, done].mean(axis=1) - sailed.legs_s)
 
 
 def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> bool:

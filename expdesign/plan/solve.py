@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -77,13 +78,14 @@ def _in_water(
     problem: PlanProblem,
     progress: Progress,
     planned: Callable[[PlanProblem, SeaArea, Capability, Progress], Planned],
+    like: Draft | None = None,
 ) -> Planned:
-    """What is planned in the smallest part of the water that has room."""
+    """What is planned in the smallest part of the water that has room, that of a like trial before all others."""
     check_connected(problem)
     draws_for(confidence_of_run(problem))
     ship, refused = ship_on_legs(problem), NoRoom("the chart has no water")
     check_start(problem, ship)
-    for area in waters(problem, ship):
+    for area in chain([] if like is None else [like.area], waters(problem, ship)):
         try:
             return planned(problem, area, ship, progress)
         except NoPlan as error:
@@ -149,7 +151,7 @@ class Draft:
         transit_mps: that speed [m/s].
         made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
         late_s: (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s];
-            zero where plans are not compared by it.
+            zero where it is not known.
     """
 
     area: SeaArea
@@ -177,13 +179,19 @@ def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Pr
 
     Args:
         problem: the trial.
-        like: another trial between the same places; transitions that were tried for it are not tried again.
+        like: another trial between the same places; its water is tried first, and transitions that were tried for it
+            are not tried again.
         progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg.
     """
-    return _in_water(problem, never_falling(progress), partial(_drafted, like=like))
+    return _in_water(problem, never_falling(progress), partial(_drafted, like=like), like)
+
+
+def with_lateness(problem: PlanProblem, draft: Draft) -> Draft:
+    """The draft of a trial with what drawn trials take longer than it."""
+    return replace(draft, late_s=drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
 
 
 def _drafted(
@@ -191,14 +199,12 @@ def _drafted(
 ) -> Draft:
     progress("measuring the water", 0.0)
     problem = replace(whole, area=area)
-    known = like.room.space.tried if like is not None and like.water.ship == ship else {}
-    water, room = roomy_water(problem, ship, progress, known)
+    water, room = roomy_water(problem, ship, progress, None if like is None else like.room)
     budget = _budget(problem)
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
     ends = [0, *(leg.last for leg in sailed.legs)]
     left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
     speed = water.ship.transit_speed_mps
-    late_s = drawn_lateness_s(problem, water, sailed) if problem.expected else np.zeros(len(sailed.legs))
     return Draft(
         area=area,
         water=water,
@@ -208,7 +214,7 @@ def _drafted(
         direct_s=float(left_m[0]) / speed,
         transit_mps=speed,
         made_good_m=-np.diff(left_m),
-        late_s=late_s,
+        late_s=np.zeros(len(sailed.legs)),
     )
 
 

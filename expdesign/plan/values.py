@@ -129,6 +129,11 @@ class SailedTrial:
         """Everything between start and goal [s]."""
         return self.commands.duration_s
 
+    @property
+    def legs_s(self) -> Array:
+        """(legs,) time of each [s]."""
+        return np.array([leg.last - leg.first for leg in self.legs]) * self.commands.sample_time_s
+
     def seconds(self, kind: str) -> float:
         """Total time of the legs of one kind [s]."""
         return sum(leg.last - leg.first for leg in self.legs if leg.kind == kind) * self.commands.sample_time_s
@@ -307,6 +312,11 @@ class Plan:
         planned_s, risk = self.commands.duration_s, self.risk
         median_s, most_s = (np.nan, np.nan) if risk is None else (risk.extra_median_s, risk.extra_most_s)
         return DayLength(planned_s=planned_s, median_s=planned_s + median_s, most_s=planned_s + most_s)
+
+    @property
+    def legs_s(self) -> Array:
+        """(legs,) time of each [s]."""
+        return np.array([leg.last - leg.first for leg in self.legs]) * self.commands.sample_time_s
 
     def seconds(self, kind: str) -> float:
         """Total time of the legs of one kind [s]."""

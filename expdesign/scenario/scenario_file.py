@@ -90,7 +90,7 @@ class PlanTable(Table):
     transit_speed_mps: Positive | None = Field(
         default=PlanSettings.transit_speed_mps,
         description="the speed of repositioning legs through water [m/s]; when not given, nine tenths of the "
-        "actuators' limit, or 19/20 of it where design.accuracy asks for a short day",
+        "actuators' limit, or 97 % of it where design.accuracy asks for a short day",
     )
     turning_radius_m: Positive | None = Field(
         default=PlanSettings.turning_radius_m,

@@ -16,7 +16,7 @@ import numpy as np
 from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NoAnswer, NoPlan, NoRoom, NotInformative
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import Draft, draft_trial, plan_trial
+from expdesign.plan.solve import Draft, draft_trial, plan_trial, with_lateness
 from expdesign.plan.values import Plan, SailedTrial
 from expdesign.plan.verify import expected_errors, track_information
 from expdesign.progress import Progress, in_phases, silent
@@ -233,10 +233,19 @@ class _Search:
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
 
     def drafted(self, choice: Choice, days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
-        """The day with these runs; transitions that the day before tried are not tried again."""
+        """The day with these runs; the water and the transitions of the day before are not worked out again.
+
+        Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
+        are taken to be as late as the days before, second for second.
+        """
         problem = replace(self.problem, design=self.design(choice.repeats))
         draft = draft_trial(problem, like=days[-1].draft if days else None, progress=progress)
         information, covariance, margin = self._told_by(draft.sailed)
+        if margin >= 0 or not days:
+            draft = with_lateness(problem, draft)
+        else:
+            share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0
+            draft = replace(draft, late_s=share * draft.sailed.legs_s)
         return DraftedDay(
             repeats=choice.repeats, draft=draft, information=information, margin=margin, covariance=covariance
         )

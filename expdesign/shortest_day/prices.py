@@ -129,24 +129,39 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
 
 
 def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -> Offer:
-    """The offer round a day: a run more or fewer of each, by what the day's own runs tell.
+    """The offer round a day: a run more or fewer of each, by what the day's own runs tell with the legs beside them.
 
-    Each comes and goes with the average of the day's legs between runs: their turns and changes of speed are there for
-    runs, but what a leg tells depends on both its ends. Other runs tell what they are taken to, (q, d, d).
+    Other runs tell what they are taken to, (q, d, d), and come with the average of the day's legs between runs.
     """
-    had, legs = np.array(day.repeats, dtype=float), day.draft.sailed.legs
-    between = day.information[:-1][[leg.kind == "reposition" for leg in legs[:-1]]].sum(axis=0) / had.sum()
-    matrices = runs + between
+    had, legs, with_legs = np.array(day.repeats, dtype=float), day.draft.sailed.legs, _with_legs(day)
+    done = np.array([names.index(leg.name) if leg.kind == "primitive" else -1 for leg in legs])
+    alone, told = day.information[done >= 0].sum(axis=0), with_legs[done >= 0].sum(axis=0)
+    matrices = runs + (told - alone) / had.sum()
     for index in np.flatnonzero(had).tolist():
-        own = [leg.kind == "primitive" and leg.name == names[index] for leg in legs]
-        matrices[index] = day.information[own].mean(axis=0) + between
+        matrices[index] = with_legs[done == index].mean(axis=0)
     return replace(
         offer,
         matrices=matrices,
-        known=day.information[-1],
+        known=day.whole - told,
         fewest=np.clip(had - TUNING.other_runs, offer.fewest, offer.most),
         most=np.clip(had + TUNING.other_runs, offer.fewest, offer.most),
     )
+
+
+def _with_legs(day: DraftedDay) -> Array:
+    """(legs, d, d) information of runs with half of each leg beside them; of legs what is left.
+
+    Where a run is left out one leg takes the place of two, and is taken to tell what these do on average. Turns and
+    changes of speed tell much, and which there are depends on the runs at both ends.
+    """
+    found = np.array(day.information)
+    runs = [leg.kind == "primitive" for leg in day.draft.sailed.legs]
+    for place in np.flatnonzero(~np.array(runs)).tolist():
+        for beside in (place - 1, place + 1):
+            if 0 <= beside < len(runs) and runs[beside]:
+                found[beside] += day.information[place] / 2
+                found[place] -= day.information[place] / 2
+    return found
 
 
 def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
@@ -185,14 +200,14 @@ def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) ->
     beyond_s, into = list[float](), list[int]()
     for day in days:
         draft, sailed = day.draft, day.draft.sailed
-        second, runs = sailed.commands.sample_time_s, [leg.kind == "primitive" for leg in sailed.legs]
-        lost_s = (
-            second * np.array([leg.last - leg.first for leg in sailed.legs]) - draft.made_good_m / draft.transit_mps
+        runs, lost_s = (
+            [leg.kind == "primitive" for leg in sailed.legs],
+            sailed.legs_s - draft.made_good_m / draft.transit_mps,
         )
         for place in np.flatnonzero(runs).tolist():
             run = names.index(sailed.legs[place].name)
             first = place - 1 if place and not runs[place - 1] else place
-            own_s = second * (sailed.legs[place].last - sailed.legs[place].first) - saved_s[run]
+            own_s = sailed.legs_s[place] - saved_s[run]
             into.append(run)
             beyond_s.append(float((lost_s + draft.late_s)[first : place + 1].sum()) - own_s)
     average_s, count = np.mean(beyond_s), np.bincount(into, minlength=len(names))

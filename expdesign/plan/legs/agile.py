@@ -181,12 +181,20 @@ def _steered(water: LegWater, reference: Reference, state: Array, before: Array)
 
 
 def _optimised(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> Array | None:
-    """The fastest leg in the water beside a line."""
-    for problem in _problems(task, water, ship, line):
+    """The fastest leg in the water beside a line; where there is none, one that the whole water happens to hold."""
+    problems = list(_problems(task, water, ship, line))
+    for problem in (*problems, *(_unbounded(problem) for problem in problems if problem.bounded)):
         values = solve_leg(problem)
         if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
             return values
     return None
+
+
+def _unbounded(problem: LegProblem) -> LegProblem:
+    """The same leg in open water."""
+    free = np.full(len(problem.path), np.inf)
+    circle = np.r_[problem.circle[:2], np.inf]
+    return replace(problem, room_port_m=free, room_starboard_m=free, circle=circle)
 
 
 def _problems(task: LegTask, water: LegWater, ship: AgileShip, line: Line) -> Iterator[LegProblem]:

@@ -70,6 +70,11 @@ class LegProblem:
         seal(self, past="h m", delivered="m")
         seal(self, path="j 3", room_port_m="j", room_starboard_m="j", circle="3")
 
+    @property
+    def bounded(self) -> bool:
+        """Whether corridor or circle bounds it."""
+        return bool(np.isfinite([self.room_port_m.min(), self.room_starboard_m.min(), self.circle[2]]).any())
+
 
 def hull_discs(water: LegWater) -> tuple[float, float]:
     """How far ahead and astern the outer discs that cover the hull stand, and the clearance of their centres [m]."""

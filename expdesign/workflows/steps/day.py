@@ -34,7 +34,7 @@ from expdesign.workflows.steps.scored import scored
 FEW_CANDIDATES = 64
 """Candidates of every family at first, where [design.grow] does not say how many; each round's prices lead to better
 ones."""
-LEG_SPEED = 0.95
+LEG_SPEED = 0.97
 """Speed of legs as a share of the top speed, where [plan] states none: faster legs save more than steering then
 loses."""
 WORK = (0.2, 0.8)
