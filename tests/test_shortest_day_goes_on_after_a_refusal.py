@@ -7,7 +7,7 @@ import pytest
 
 from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.scenario import load_scenario
-from expdesign.shortest_day import AccuracySettings, alternate, shortest_day, stated_accuracy
+from expdesign.shortest_day import AccuracySettings, alternate, drafting, shortest_day, stated_accuracy
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_problem
@@ -37,7 +37,7 @@ def test_other_runs_are_tried_each_once(asked, monkeypatch):
             raise Found
         raise NoPlan("no place for a run")
 
-    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(drafting, "draft_trial", refuse)
     with pytest.raises(Found):
         shortest_day(*asked)
     assert len(set(tried)) == 3
@@ -47,7 +47,7 @@ def test_where_no_day_has_a_plan_the_last_refusal_is_told(asked, monkeypatch):
     def refuse(problem, *, like, progress):
         raise NoPlan("no place for a run")
 
-    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(drafting, "draft_trial", refuse)
     monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=2))
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(*asked)
@@ -66,7 +66,7 @@ def test_limits_that_allow_no_more_end_the_search_with_what_was_tried(asked, mon
         raise NoPlan("no place for a run")
 
     monkeypatch.setattr(alternate, "cheapest_runs", choose)
-    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(drafting, "draft_trial", refuse)
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)
 
@@ -83,7 +83,7 @@ def test_a_run_without_any_place_is_not_chosen_again_and_costs_no_day(asked, mon
         error.lacking = (min(tried[-1]),)
         raise error
 
-    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(drafting, "draft_trial", refuse)
     monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)
@@ -103,7 +103,7 @@ def test_a_run_that_cannot_be_sailed_is_not_chosen_again(asked, monkeypatch, wha
             raise NoPlan("no place for a run")
         raise NoPlan("a run cannot be sailed", what=what, which=min(tried[-1]))
 
-    monkeypatch.setattr(alternate, "draft_trial", refuse)
+    monkeypatch.setattr(drafting, "draft_trial", refuse)
     monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)

@@ -42,9 +42,25 @@ class LegAhead:
         return values if acceptable(task.start, end, water, values, task.past) else None
 
 
-def legs_ahead(planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask]) -> Iterator[LegAhead]:
-    """The legs of tasks, in order."""
-    return in_order(_found, (planner, water), ((task,) for task in tasks))
+KnownLegs = dict[tuple[bytes, ...], LegAhead]
+"""Legs found before, by all that decides them but chance."""
+
+
+def legs_ahead(
+    planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask], known: KnownLegs | None = None
+) -> Iterator[LegAhead]:
+    """The legs of tasks, in order; those known are not sought again, and those found become known."""
+    if known is None:
+        return in_order(_found, (planner, water), ((task,) for task in tasks))
+    listed = list(tasks)
+    fresh = [task for task in listed if _place(task) not in known]
+    known |= zip(map(_place, fresh), in_order(_found, (planner, water), ((task,) for task in fresh)), strict=True)
+    return (known[_place(task)] for task in listed)
+
+
+def _place(task: LegTask) -> tuple[bytes, ...]:
+    ends = task.start, task.end, task.start_inputs, task.end_inputs, task.past
+    return tuple(np.asarray(part, dtype=float).tobytes() for part in ends)
 
 
 def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:

@@ -12,7 +12,7 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
-from expdesign.plan.legs_ahead import LegAhead, leg_found, legs_ahead
+from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
@@ -47,6 +47,30 @@ def sail_all(
     except NoPlan as error:
         error.poses = voyage.sailed.trajectory.pose if voyage.line.stretches else None
         raise
+
+
+def sail_placed(
+    problem: PlanProblem,
+    room: PlanRoom,
+    placements: Sequence[Placement],
+    *,
+    stated: LegWater,
+    budget: WorkBudget,
+    known: KnownLegs,
+) -> SailedTrial | None:
+    """Runs at given places, in this order, with the legs between them; None where one of them is not found.
+
+    Args:
+        problem, room, stated, budget: as of `sail_all`.
+        placements: of all runs.
+        known: legs that are not sought again; grows.
+    """
+    voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
+    legs = voyage.legs_ahead(placements, known)
+    for placement in placements:
+        if voyage.sail_run(placement, next(legs)):
+            return None
+    return voyage.sailed if voyage.sail_home(next(legs)) else None
 
 
 def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTrial:
@@ -138,7 +162,7 @@ class _Voyage:
         vessel = self.problem.vessel
         return self.line.joined(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs)
 
-    def legs_ahead(self, placements: Sequence[Placement]) -> Iterator[LegAhead]:
+    def legs_ahead(self, placements: Sequence[Placement], known: KnownLegs | None = None) -> Iterator[LegAhead]:
         """Legs to runs, in this order, and on to the goal, as far as can be known now."""
         runs = [self._primitive(placement) for placement in placements]
         entries = [self._entry(placement, run) for placement, run in zip(placements, runs, strict=True)]
@@ -148,7 +172,7 @@ class _Voyage:
             values = run.commands.values
             left = self.water.states(entry, values, run.entry_inputs[None])[-1]
             tasks.append(self._task(left, values[-1], values, *end, stretches=2 * number))
-        return legs_ahead(self.planner, self.water, tasks)
+        return legs_ahead(self.planner, self.water, tasks, known)
 
     def sail_run(self, placement: Placement, ahead: LegAhead) -> str:
         """Sail to a placement and do its run; "" on success, else what failed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -28,6 +28,7 @@ from expdesign.plan.chart import reachable
 from expdesign.plan.checked import drawn_lateness_s, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
+from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.monte_carlo import (
     failed_chance_constraint,
 )
@@ -42,9 +43,9 @@ from expdesign.plan.replanning import (
     worth_replanning,
 )
 from expdesign.plan.runs import draws_for
-from expdesign.plan.sailing import sail_all
+from expdesign.plan.sailing import sail_all, sail_placed
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Plan, RiskEstimate, SailedTrial, Verification
+from expdesign.plan.values import Placement, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, never_falling, silent
@@ -202,6 +203,27 @@ def _drafted(
     water, room = roomy_water(problem, ship, progress, None if like is None else like.room)
     budget = _budget(problem)
     sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+    return _measured(area, water, room, sailed, budget.spent_s)
+
+
+def redrafted(problem: PlanProblem, draft: Draft, placements: Sequence[Placement], known: KnownLegs) -> Draft | None:
+    """The draft of a trial with other runs at given places, in this order; None where a leg or a run is not found.
+
+    Args:
+        problem: the trial; its runs are among those of the draft.
+        draft: of the same trial with other runs; its water is used.
+        placements: of all runs.
+        known: legs that are not sought again; grows.
+    """
+    problem, budget, used = replace(problem, area=draft.area), _budget(problem), {run.name for run in problem.used}
+    runs = tuple(run for run in draft.room.space.footprints if run.name in used)
+    room = replace(draft.room, space=replace(draft.room.space, footprints=runs))
+    sailed = sail_placed(problem, room, placements, stated=draft.water, budget=budget, known=known)
+    return None if sailed is None else _measured(draft.area, draft.water, room, sailed, budget.spent_s)
+
+
+def _measured(area: SeaArea, water: LegWater, room: PlanRoom, sailed: SailedTrial, spent_s: float) -> Draft:
+    """A draft and what it makes good."""
     ends = [0, *(leg.last for leg in sailed.legs)]
     left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
     speed = water.ship.transit_speed_mps
@@ -209,7 +231,7 @@ def _drafted(
         area=area,
         water=water,
         room=room,
-        spent_s=budget.spent_s,
+        spent_s=spent_s,
         sailed=sailed,
         direct_s=float(left_m[0]) / speed,
         transit_mps=speed,

@@ -13,16 +13,15 @@ from functools import partial
 
 import numpy as np
 
-from expdesign.durations import DurationDesign, with_repeats
-from expdesign.errors import NoAnswer, NoPlan, NoRoom, NotInformative
+from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import Draft, draft_trial, plan_trial, with_lateness
-from expdesign.plan.values import Plan, SailedTrial
-from expdesign.plan.verify import expected_errors, track_information
+from expdesign.plan.solve import Draft, plan_trial
+from expdesign.plan.values import Plan
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_costs_s
+from expdesign.shortest_day.drafting import Drafting
 from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, near_day, offered
 from expdesign.shortest_day.tuning import TUNING
@@ -53,6 +52,7 @@ def shortest_day(
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
     days, last, planning = search.rounds(search.untried, progress)
+    days += search.pruned(days)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
@@ -125,6 +125,11 @@ class _Search:
     accuracy: Accuracy
     added: tuple[str, ...]
     placeless: set[str] = field(default_factory=set)
+
+    @property
+    def drafting(self) -> Drafting:
+        """How days are drafted."""
+        return Drafting(problem=self.problem, accuracy=self.accuracy)
 
     def rounds(
         self, choose: Callable[[Prices, Sequence[DraftedDay], Sequence[Choice]], Choice | None], progress: Progress
@@ -233,29 +238,13 @@ class _Search:
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
 
     def drafted(self, choice: Choice, days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
-        """The day with these runs; the water and the transitions of the day before are not worked out again.
+        """The day with these runs."""
+        return self.drafting.drafted(choice.repeats, days, progress)
 
-        Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
-        are taken to be as late as the days before, second for second.
-        """
-        problem = replace(self.problem, design=self.design(choice.repeats))
-        draft = draft_trial(problem, like=days[-1].draft if days else None, progress=progress)
-        information, covariance, margin = self._told_by(draft.sailed)
-        if margin >= 0 or not days:
-            draft = with_lateness(problem, draft)
-        else:
-            share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0
-            draft = replace(draft, late_s=share * draft.sailed.legs_s)
-        return DraftedDay(
-            repeats=choice.repeats, draft=draft, information=information, margin=margin, covariance=covariance
-        )
-
-    def _told_by(self, sailed: SailedTrial) -> tuple[Array, Array | None, float]:
-        """(legs, d, d) of each leg, or (legs, d + 2, d + 2); (p, p) covariance of the whole track; and its margin."""
-        problem = self.problem
-        of_track = problem.vessel, problem.design.problem, problem.environment, sailed
-        information, covariance = track_information(*of_track), expected_errors(*of_track)
-        return information, covariance, self.accuracy.margin_of_track(information.sum(axis=0), covariance)
+    def pruned(self, days: Sequence[DraftedDay]) -> list[DraftedDay]:
+        """The shortest days that reach the accuracy, less runs that it does not need; none of which all are needed."""
+        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[: TUNING.pruned]
+        return [other for day in reached if (other := self.drafting.without_spare_runs(day)) is not day]
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
@@ -264,13 +253,6 @@ class _Search:
             self.accuracy.margin(self.offer(prices).information(np.array(day.repeats, dtype=float))) for day in days
         ]
         return replace(prices, level=promised_at_zero(promised, [day.margin for day in days]))
-
-    def design(self, repeats: Sequence[int]) -> DurationDesign:
-        """The reference with other runs; together with legs they may tell what they cannot alone."""
-        try:
-            return with_repeats(self.problem.design, repeats)
-        except NotInformative:
-            return replace(self.problem.design, repeats=tuple(repeats), efficiency_repeats=0.0, note="")
 
     def planned(
         self,
@@ -295,13 +277,13 @@ class _Search:
         """
         refused = None
         for day in best:
-            design = self.design(day.repeats)
+            design = self.drafting.design(day.repeats)
             try:
                 plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
             except NoPlan as error:  # a longer day may be less risky
                 refused = error
                 continue
-            if good(plan, margin := self._told_by(plan.sailed)[2]):
+            if good(plan, margin := self.drafting.told_by(plan.sailed)[2]):
                 return ShortestDay(
                     plan=plan,
                     design=design,

@@ -112,10 +112,8 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
     durations, limits = problem.design.problem, problem.design.problem.constraints
     names, run_s = durations.names, durations.run_s
     barred = set(limits.excluded) - set(free)
-    least_s = np.array([limits.least_s.get(name, 0.0) for name in names])
     most_s = np.array([0.0 if name in barred else limits.most_s.get(name, np.inf) for name in names])
-    required = np.array([float(name in limits.required) for name in names])
-    fewest = np.maximum(np.ceil(least_s / run_s), required)
+    fewest = fewest_runs(problem)
     most = np.minimum(np.floor(most_s / run_s), TUNING.most_runs)
     return Offer(
         matrices=prices.runs + prices.leg,
@@ -128,17 +126,25 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
     )
 
 
+def fewest_runs(problem: PlanProblem) -> Array:
+    """(q,) of each primitive, by the limits on durations."""
+    durations, limits = problem.design.problem, problem.design.problem.constraints
+    least_s = np.array([limits.least_s.get(name, 0.0) for name in durations.names])
+    required = np.array([float(name in limits.required) for name in durations.names])
+    return np.asarray(np.maximum(np.ceil(least_s / durations.run_s), required))
+
+
 def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -> Offer:
     """The offer round a day: a run more or fewer of each, by what the day's own runs tell with the legs beside them.
 
     Other runs tell what they are taken to, (q, d, d), and come with the average of the day's legs between runs.
     """
-    had, legs, with_legs = np.array(day.repeats, dtype=float), day.draft.sailed.legs, _with_legs(day)
+    had, legs, joined = np.array(day.repeats, dtype=float), day.draft.sailed.legs, with_legs(day)
     done = np.array([names.index(leg.name) if leg.kind == "primitive" else -1 for leg in legs])
-    alone, told = day.information[done >= 0].sum(axis=0), with_legs[done >= 0].sum(axis=0)
+    alone, told = day.information[done >= 0].sum(axis=0), joined[done >= 0].sum(axis=0)
     matrices = runs + (told - alone) / had.sum()
     for index in np.flatnonzero(had).tolist():
-        matrices[index] = with_legs[done == index].mean(axis=0)
+        matrices[index] = joined[done == index].mean(axis=0)
     return replace(
         offer,
         matrices=matrices,
@@ -148,7 +154,7 @@ def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -
     )
 
 
-def _with_legs(day: DraftedDay) -> Array:
+def with_legs(day: DraftedDay) -> Array:
     """(legs, d, d) information of runs with half of each leg beside them; of legs what is left.
 
     Where a run is left out one leg takes the place of two, and is taken to tell what these do on average. Turns and
@@ -200,20 +206,22 @@ def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) ->
     beyond_s, into = list[float](), list[int]()
     for day in days:
         draft, sailed = day.draft, day.draft.sailed
-        runs, lost_s = (
-            [leg.kind == "primitive" for leg in sailed.legs],
-            sailed.legs_s - draft.made_good_m / draft.transit_mps,
-        )
+        runs, beyond = [leg.kind == "primitive" for leg in sailed.legs], lost_s(draft) + draft.late_s
         for place in np.flatnonzero(runs).tolist():
             run = names.index(sailed.legs[place].name)
             first = place - 1 if place and not runs[place - 1] else place
             own_s = sailed.legs_s[place] - saved_s[run]
             into.append(run)
-            beyond_s.append(float((lost_s + draft.late_s)[first : place + 1].sum()) - own_s)
+            beyond_s.append(float(beyond[first : place + 1].sum()) - own_s)
     average_s, count = np.mean(beyond_s), np.bincount(into, minlength=len(names))
     sums_s = np.bincount(into, weights=beyond_s, minlength=len(names))
     learnt_s: Array = (TUNING.average_legs * average_s + sums_s) / (TUNING.average_legs + count)
     return np.asarray(np.maximum(learnt_s, TUNING.least_leg_s))
+
+
+def lost_s(draft: Draft) -> Array:
+    """(legs,) time beyond that of the way that each run or leg makes good [s]."""
+    return np.asarray(draft.sailed.legs_s - draft.made_good_m / draft.transit_mps)
 
 
 def _made_good_s(primitives: Sequence[Primitive], transit_mps: float) -> Array:

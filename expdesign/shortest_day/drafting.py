@@ -1,0 +1,117 @@
+"""Days drafted and judged by the information of their whole track, and with runs left out while the rest tells enough.
+
+The choice of runs foresees what another day tells to a fifth or so, as all runs are placed anew. Where one is left out
+here, the others stay where they are, and only the leg past it is planned: nothing is foreseen but which to try first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.durations import DurationDesign, with_repeats
+from expdesign.errors import NotInformative
+from expdesign.plan.legs_ahead import KnownLegs
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import Draft, draft_trial, redrafted, with_lateness
+from expdesign.plan.values import Placement, SailedTrial
+from expdesign.plan.verify import expected_errors, track_information
+from expdesign.progress import Progress
+from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.prices import DraftedDay, fewest_runs, lost_s, with_legs
+from expdesign.shortest_day.tuning import TUNING
+from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drafting:
+    """Drafts days.
+
+    Attributes:
+        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used.
+        accuracy: to be reached by the whole track, legs included.
+    """
+
+    problem: PlanProblem
+    accuracy: Accuracy
+
+    def drafted(self, repeats: Sequence[int], days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
+        """The day with these runs; the water and the transitions of the day before are not worked out again.
+
+        Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
+        are taken to be as late as the days before, second for second.
+        """
+        like = days[-1].draft if days else None
+        day = self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))
+        if day.margin >= 0 or not days:
+            return self._late(day)
+        share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0
+        return replace(day, draft=replace(day.draft, late_s=share * day.draft.sailed.legs_s))
+
+    def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
+        """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""
+        known, begun = KnownLegs(), day
+        while True:
+            drafts = (self._redrafted(day.draft, rest, known) for rest in _with_one_fewer(day, self.accuracy))
+            shorter = (other for other in drafts if other and other.margin >= 0 and other.day_s < day.day_s)
+            found = next(shorter, None)
+            if found is None:
+                return day if day is begun else self._late(day)
+            day = found
+
+    def told_by(self, sailed: SailedTrial) -> tuple[Array, Array | None, float]:
+        """(legs, d, d) of each leg, or (legs, d + 2, d + 2); (p, p) covariance of the whole track; and its margin."""
+        problem = self.problem
+        of_track = problem.vessel, problem.design.problem, problem.environment, sailed
+        information, covariance = track_information(*of_track), expected_errors(*of_track)
+        return information, covariance, self.accuracy.margin_of_track(information.sum(axis=0), covariance)
+
+    def design(self, repeats: Sequence[int]) -> DurationDesign:
+        """The reference with other runs; together with legs they may tell what they cannot alone."""
+        try:
+            return with_repeats(self.problem.design, repeats)
+        except NotInformative:
+            return replace(self.problem.design, repeats=tuple(repeats), efficiency_repeats=0.0, note="")
+
+    def _of(self, repeats: Sequence[int]) -> PlanProblem:
+        """The trial with these runs."""
+        return replace(self.problem, design=self.design(repeats))
+
+    def _judged(self, repeats: Sequence[int], draft: Draft) -> DraftedDay:
+        """A draft with what its track tells."""
+        information, covariance, margin = self.told_by(draft.sailed)
+        return DraftedDay(
+            repeats=tuple(repeats), draft=draft, information=information, margin=margin, covariance=covariance
+        )
+
+    def _late(self, day: DraftedDay) -> DraftedDay:
+        """The day with what drawn trials of it take longer."""
+        return replace(day, draft=with_lateness(self._of(day.repeats), day.draft))
+
+    def _redrafted(self, draft: Draft, placements: Sequence[Placement], known: KnownLegs) -> DraftedDay | None:
+        """The day of a draft with runs at given places alone; None where they are too few, or a leg is not found."""
+        names = [item.primitive for item in placements]
+        repeats = [names.count(name) for name in self.problem.design.problem.names]
+        if (repeats < fewest_runs(self.problem)).any():
+            return None
+        other = redrafted(self._of(repeats), draft, placements, known)
+        return None if other is None else self._judged(repeats, other)
+
+
+def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:
+    """The runs of the day but one, for each that might be left out; those first that save most for what they tell."""
+    draft, told, lost = day.draft, with_legs(day), lost_s(day.draft)
+    legs, poses = draft.sailed.legs, draft.sailed.trajectory.pose
+    are_runs = np.array([leg.kind == "primitive" for leg in legs])
+    runs = np.flatnonzero(are_runs).tolist()
+    if len(runs) < 2:
+        return []
+    saved_s = (lost + np.convolve(np.where(are_runs, 0.0, lost), [0.5, 0.0, 0.5], "same"))[runs]
+    spare = day.margin - accuracy.margin(day.whole)
+    margins = np.array([accuracy.margin(day.whole - told[place]) + spare for place in runs])
+    placed = [Placement(primitive=legs[place].name, pose=poses[legs[place].first]) for place in runs]
+    worth = saved_s / np.maximum(day.margin - margins, TUNING.choice_gap)
+    order = [row for row in np.argsort(-worth).tolist() if margins[row] > -TUNING.foreseen and saved_s[row] > 0]
+    return [placed[:row] + placed[row + 1 :] for row in order[: TUNING.left_out]]

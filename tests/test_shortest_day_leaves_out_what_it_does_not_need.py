@@ -1,0 +1,90 @@
+"""Runs that a drafted day does not need are left out, and the others stay where they are."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapely
+
+from expdesign.plan import PlanSettings
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import draft_trial, redrafted
+from expdesign.plan.values import Leg, Placement
+from expdesign.shortest_day.drafting import Drafting
+from expdesign.shortest_day.prices import DraftedDay
+from expdesign.simulation import CALM
+from plan_case import acceleration, area, ship
+
+TOLD = {"much": 5.0, "little": 1.0, "less": 0.5}
+NAMES = tuple(TOLD)
+NEEDED = 6.5
+
+
+def of_runs(*counts: int) -> SimpleNamespace:
+    limits = SimpleNamespace(least_s={}, required=frozenset())
+    return SimpleNamespace(
+        problem=SimpleNamespace(names=NAMES, run_s=np.full(3, 60.0), constraints=limits), repeats=counts
+    )
+
+
+def test_other_runs_and_their_legs_stay_as_they_are():
+    vessel = ship()
+    problem = PlanProblem(
+        vessel=vessel,
+        area=area(shapely.box(-500, -500, 900, 900)),
+        environment=CALM,
+        settings=PlanSettings(),
+        primitives=(acceleration(vessel, speed_mps=1.0),),
+        design=SimpleNamespace(problem=SimpleNamespace(names=("go",)), repeats=(2,)),
+        start=np.zeros(3),
+        goal=np.array([400.0, 200.0, 0.0]),
+    )
+    draft = draft_trial(problem)
+    pose, legs, known = draft.sailed.trajectory.pose, draft.sailed.legs, {}
+    places = [Placement(primitive="go", pose=pose[leg.first]) for leg in legs if leg.kind == "primitive"]
+    both = redrafted(problem, draft, places, known)
+    one = replace(problem, design=SimpleNamespace(problem=problem.design.problem, repeats=(1,)))
+    alone = redrafted(one, draft, places[:1], known)
+    assert both is not None
+    assert alone is not None
+    assert len(known) == 3 + 1  # the leg past the second run is the only one sought
+    kept = both.sailed.legs[1].last
+    assert np.array_equal(alone.sailed.commands.values[:kept], both.sailed.commands.values[:kept])
+    assert [leg.kind for leg in alone.sailed.legs] == ["reposition", "primitive", "reposition"]
+    assert alone.sailed.trajectory.pose[-1, :2] == pytest.approx(problem.goal[:2], abs=0.03)
+    assert alone.sailed.day_s < both.sailed.day_s
+
+
+def day_of(runs: list[str]) -> DraftedDay:
+    """A day in which every leg takes 10 s, every run 60 s, and legs tell a fifth of a unit."""
+    kinds = [part for name in runs for part in (("reposition", name), ("primitive", name))] + [("reposition", "goal")]
+    lengths = [60 if kind == "primitive" else 10 for kind, _ in kinds]
+    ends = np.cumsum([0, *lengths]).tolist()
+    legs = tuple(Leg(kind=k, name=n, first=a, last=b) for (k, n), a, b in zip(kinds, ends, ends[1:], strict=False))
+    told = np.array([TOLD[name] if kind == "primitive" else 0.2 for kind, name in kinds])
+    track = SimpleNamespace(pose=np.zeros((ends[-1] + 1, 3)))
+    sailed = SimpleNamespace(legs=legs, legs_s=np.array(lengths, dtype=float), day_s=float(ends[-1]), trajectory=track)
+    draft = SimpleNamespace(sailed=sailed, made_good_m=np.zeros(len(legs)), transit_mps=1.0, late_s=np.zeros(len(legs)))
+    repeats = tuple(runs.count(name) for name in NAMES)
+    return DraftedDay(
+        repeats=repeats, draft=draft, information=told[:, None, None], margin=float(np.log(told.sum() / NEEDED))
+    )
+
+
+@pytest.mark.parametrize(("required", "left"), [((), ["much", "little"]), (("less",), ["much", "little", "less"])])
+def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required, left):
+    """Of 5, 1, 1 and 0.5 units in runs, and a fifth in each leg, the least go."""
+    accuracy = SimpleNamespace(margin=lambda M: float(np.log(M[0, 0] / NEEDED)))
+    design = of_runs(1, 2, 1)
+    design.problem.constraints.required = frozenset(required)
+    drafting = Drafting(problem=SimpleNamespace(design=design), accuracy=accuracy)
+    monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places, known: places)
+    monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
+    monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
+    monkeypatch.setattr(Drafting, "_late", lambda self, day: day)
+    begun = day_of(["much", "little", "less", "little"])
+    found = drafting.without_spare_runs(begun)
+    assert found.repeats == tuple(left.count(name) for name in NAMES)
+    assert found.margin >= 0
+    assert drafting.without_spare_runs(found) is found
