@@ -30,7 +30,7 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("tuning",), ("file",), ("pose",), ("remarks",), ("load", "labels", "levels", "pieces")),
+    "records": (("tuning",), ("file",), ("pose",), ("load", "labels", "levels", "pieces")),
     "step_trials": (
         ("tuning",),
         ("holds", "regression", "steady_state", "responses"),
@@ -43,7 +43,7 @@ FLOORS = {
         ("regression",),
         ("noise", "replay"),
         ("solve",),
-        ("excitation", "output_error", "feedback", "least_squares"),
+        ("excitation", "output_error", "feedback"),
         ("values",),
         ("disturbance", "equation_wise"),
         ("settings",),

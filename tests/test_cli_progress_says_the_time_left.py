@@ -2,13 +2,13 @@
 
 import pytest
 
-from expdesign.cli import progress
+from expdesign.cli import app
 
 
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(app.time, "monotonic", lambda: now[0])
     return now
 
 
@@ -24,7 +24,7 @@ def clock(monkeypatch):
     ],
 )
 def test_the_rest_goes_on_as_the_work_so_far(clock, capsys, after_s, share, words):
-    with progress.shown_progress(quiet=False) as report:
+    with app.shown_progress(quiet=False) as report:
         clock[0] += after_s
         report("at work", share)
     line = capsys.readouterr().err.strip()

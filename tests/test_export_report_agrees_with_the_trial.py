@@ -20,8 +20,7 @@ from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
-from expdesign.export.report.figures.footprints import footprints
-from expdesign.export.report.figures.labels import place_labels
+from expdesign.export.report.figures.chart import footprints, place_labels
 from expdesign.export.report.figures.position_axes import nice_step
 from expdesign.export.report.parameters import expected, parameter_rows
 from expdesign.export.report.trust import chain

@@ -1,4 +1,4 @@
-"""Estimates by instrumental variables, around a steady current that is sought where a method asks for one."""
+"""Estimates by instrumental variables, around a steady current that is sought where asked for, and by least squares."""
 
 from __future__ import annotations
 
@@ -9,14 +9,28 @@ import numpy as np
 
 from expdesign.errors import Diverged, NoAnswer
 from expdesign.estimation.equation_wise import ALL, with_strata
-from expdesign.estimation.least_squares import quick_least_squares
 from expdesign.estimation.regression import Guess, Layout, Rows, build_regression
 from expdesign.estimation.replay import InstrumentModel, Replay, apart_from_start, build_replay
 from expdesign.estimation.settings import Settings
-from expdesign.estimation.solve import Prior, Refined, refine_iv
+from expdesign.estimation.solve import Prior, Refined, Solution, Weighting, refine_iv, solve_ls
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Record
 from expdesign.values import Array
+
+
+def least_squares(rows: Rows, weighting: Weighting) -> Refined:
+    """The estimate of least squares.
+
+    Args:
+        rows: of the regression.
+        weighting: whose covariance is wanted; its mean and blocks are those of instruments.
+    """
+    return Refined(solve_ls(rows.regression, replace(weighting, mean="none", blocks="one")), 0, ())
+
+
+def quick_least_squares(rows: Rows, weighting: Weighting) -> Solution:
+    """Least squares for another method to start from, with a covariance that takes no time."""
+    return least_squares(rows, replace(weighting, covariance="hc0")).solution
 
 
 def instrumental_estimate(

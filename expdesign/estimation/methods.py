@@ -10,8 +10,7 @@ import numpy as np
 from expdesign.errors import InputError, UnknownName
 from expdesign.estimation.equation_wise import EQUATION_WISE, sample_notes, with_strata
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
-from expdesign.estimation.instrumental import instrumental_estimate
-from expdesign.estimation.least_squares import least_squares, quick_least_squares
+from expdesign.estimation.instrumental import instrumental_estimate, least_squares, quick_least_squares
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
     PREDICTORS,

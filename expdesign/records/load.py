@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS
 from expdesign.errors import InputError, UnknownName
@@ -17,6 +19,7 @@ from expdesign.records.file import (
     Table,
     check_ranges,
     check_wind,
+    is_input,
     read_clock,
     read_table,
     relative_wind,
@@ -39,9 +42,34 @@ from expdesign.records.pose import (
     with_continuous_heading,
     with_metres,
 )
-from expdesign.records.remarks import motion_remarks, table_remarks
+from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY, Batch, Record
 from expdesign.vessel import column_name
+
+UNCHECKED = ("time_s", "batch", "depth_m", "lat_deg", "lon_deg")
+
+
+def table_remarks(table: Table) -> Iterator[str]:
+    """Remarks on the columns of a file."""
+    for name, values in table.columns.items():
+        if name in UNCHECKED or np.ptp(values) > 0:
+            continue
+        what = "so its effect cannot be estimated" if is_input(name) else "a dead sensor?"
+        yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, {what}"
+    if "north_m" in table.columns:
+        still = np.all(np.diff(table.stack("north_m", "east_m"), axis=0) == 0, axis=1)
+        if TUNING.held_share < np.mean(still) < 1:
+            yield f"the position repeats in {np.mean(still):.0%} of the rows: differences of held values are inaccurate"
+
+
+def motion_remarks(batches: list[Batch], origins: Mapping[str, str]) -> Iterator[str]:
+    """Remarks on velocities that come from the pose of one file."""
+    if any(origins.get(output, MEASURED) == MEASURED for output in ("u", "v")):
+        return
+    u, v = np.sqrt(np.mean(np.vstack([batch.velocity[:, :2] for batch in batches]) ** 2, axis=0))
+    if v > TUNING.sideways_ratio * u:
+        found = f"the ship moves sideways at {v:.3g} m/s and ahead at {u:.3g} m/s, root mean square"
+        yield f"{found}: are the axes of the pose what their names say?"
 
 
 def load_records(

@@ -2,11 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from expdesign.export.monitor_page.budget import budget_figure, budget_header, budget_tables
-from expdesign.export.monitor_page.content import HEADER, MonitorContent, monitor_tables, sentences
-from expdesign.export.monitor_page.figures import estimate_figure, statistic_figure
+from expdesign.export.monitor_page.content import HEADER, HOUR, MonitorContent, monitor_tables, sentences
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import report_style
+from expdesign.export.pages.figures import (
+    BLUE,
+    GREY,
+    LINES,
+    VERMILION,
+    light_grid,
+    new_figure,
+    plain,
+    report_style,
+    svg,
+)
+
+SHOWN = 5
+"""Largest number of estimates that are drawn."""
+
+
+def statistic_figure(content: MonitorContent) -> str:
+    """The largest sum in every piece of the data, the threshold and the alarms."""
+    figure = new_figure(6.8, 2.8)
+    axes = figure.subplots()
+    time = np.array([moment.time_s for moment in content.moments]) / HOUR
+    axes.step(time, [moment.statistic for moment in content.moments], where="pre", color=BLUE, label="statistic")
+    axes.axhline(content.limit, color=GREY, linestyle="--", linewidth=0.9, label="threshold")
+    for number, alarm in enumerate(content.found):
+        axes.axvline(alarm.time_s / HOUR, color=VERMILION, linewidth=1.2, label=None if number else "alarm")
+    axes.set_ylim(0, None)
+    axes.set_xlabel("time [h]")
+    axes.set_ylabel("log-likelihood ratio")
+    axes.legend(loc="upper left", fontsize=9)
+    light_grid(axes)
+    return svg(figure, key="statistic", label="Statistic of the watch over time, with its threshold")
+
+
+def estimate_figure(content: MonitorContent) -> str:
+    """The changes that are known best at the end, or that alarms name, over time with 95 % intervals."""
+    figure = new_figure(6.8, 3.2)
+    axes = figure.subplots()
+    time = np.array([moment.time_s for moment in content.moments]) / HOUR
+    for number, colour in zip(_shown(content), LINES, strict=False):
+        value = np.array([moment.value[number] for moment in content.moments])
+        half = 1.96 * np.array([moment.std[number] for moment in content.moments])
+        axes.plot(time, value, color=colour, label=plain(content.changes[number].words))
+        axes.fill_between(time, value - half, value + half, color=colour, alpha=0.15, linewidth=0)
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    axes.set_xlabel("time [h]")
+    axes.set_ylabel("change, in sizes watched for")
+    axes.legend(loc="upper left", fontsize=8, ncols=2)
+    light_grid(axes)
+    return svg(figure, key="estimate", label="Estimated changes over time with 95 % intervals")
+
+
+def _shown(content: MonitorContent) -> Sequence[int]:
+    """Those named first, then those that are known best."""
+    watched = np.flatnonzero(content.calibration.watched)
+    best = watched[np.argsort(-content.calibration.rate[watched])].tolist()
+    return list(dict.fromkeys([*(alarm.change for alarm in content.found), *best]))[:SHOWN]
 
 
 def monitor_html(content: MonitorContent) -> str:

@@ -11,13 +11,12 @@ beyond the thesis.
 Source: a master's thesis on the estimation of a ship's yaw dynamics in operation, chapters 2 to 6.
 """
 
-from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw
+from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw, start_values
 from expdesign.monitoring.yaw.instruments import estimate_yaw_by_instruments
 from expdesign.monitoring.yaw.learnt import halves_in_words, learnt_ship
 from expdesign.monitoring.yaw.model import YAW_MODELS, YawData, YawModel, term_budget
 from expdesign.monitoring.yaw.recorded import needed_columns
 from expdesign.monitoring.yaw.ship import KEY, YawShip, ship_of_changes, yaw_changes, yaw_grams
-from expdesign.monitoring.yaw.start import start_values
 
 __all__ = [
     "KEY",

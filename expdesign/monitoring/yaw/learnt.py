@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.errors import NotInformative
-from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw
+from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw, start_values
 from expdesign.monitoring.yaw.instruments import estimate_yaw_by_instruments
 from expdesign.monitoring.yaw.model import YawData, YawModel
 from expdesign.monitoring.yaw.recorded import MOMENT, SAMPLES, measures_moment, voyages
 from expdesign.monitoring.yaw.ship import YawShip
-from expdesign.monitoring.yaw.start import start_values
 from expdesign.signals import Record
 from expdesign.vessel import VesselModel
 

@@ -1,7 +1,6 @@
 """Lower bounds on repositioning time that hold for every plan."""
 
-from expdesign.plan.bounds.cheapest_orders import cheapest_orders, place_values
 from expdesign.plan.bounds.displacement import Headway
-from expdesign.plan.bounds.repositioning import reposition_bound_s, time_to_sail_s
+from expdesign.plan.bounds.repositioning import cheapest_orders, place_values, reposition_bound_s, time_to_sail_s
 
 __all__ = ["Headway", "cheapest_orders", "place_values", "reposition_bound_s", "time_to_sail_s"]

@@ -1,7 +1,6 @@
 """Order and placement of the runs: the planners by name, beam search, local search, state lattice."""
 
-from expdesign.plan.search.beam import place_runs
-from expdesign.plan.search.heuristic import path_exceeds_displacement
+from expdesign.plan.search.beam import path_exceeds_displacement, place_runs
 from expdesign.plan.search.planners import PlacementSearch, placement_search
 from expdesign.plan.search.successors import have_room, runs_clear
 

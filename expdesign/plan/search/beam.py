@@ -9,18 +9,59 @@ Clearances are looked up on a grid here; every leg and run is checked exactly la
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoRoom
+from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
-from expdesign.plan.search.heuristic import OrdersAhead, orders_ahead, path_exceeds_displacement
 from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
 from expdesign.plan.search.successors import clear_successors
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
 from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OrdersAhead:
+    """Least losses by what is left and what was last.
+
+    Attributes:
+        base: (q,) place values that number the combinations of runs left.
+        lost_s: (combinations, q) by the last run; (q, 1) by the next one where there are too many combinations.
+    """
+
+    base: np.ndarray
+    lost_s: Array
+
+    def seconds(self, left: np.ndarray, last: np.ndarray) -> Array:
+        """(...,) time lost from plans with runs left (..., q) after runs (...,)."""
+        if self.lost_s.shape[1] == 1 and len(self.lost_s) == left.shape[-1]:
+            return np.asarray(left @ self.lost_s[:, 0])
+        return np.asarray(self.lost_s[left @ self.base, last])
+
+
+def orders_ahead(space: SearchSpace, repeats: Sequence[int], *, made_good: bool) -> OrdersAhead:
+    """Least sums over the best orders.
+
+    Args:
+        space: the runs, and how legs between them lose time.
+        repeats: of each run.
+        made_good: whether displacement towards the goal counts, as the path is longer than that of all runs.
+    """
+    pairs, home = space.planner.losses_s(space, made_good=made_good)
+    table = cheapest_orders(pairs, home, repeats)
+    if table is None:
+        return OrdersAhead(base=np.ones(len(repeats), dtype=int), lost_s=pairs.min(axis=0)[:, None])
+    return OrdersAhead(base=place_values(repeats), lost_s=table)
+
+
+def path_exceeds_displacement(space: SearchSpace, repeats: Sequence[int], start: Array) -> bool:
+    """Whether the path to the goal is longer than what all runs can make good."""
+    made_good_m = sum(count * run.displacement_m for run, count in zip(space.footprints, repeats, strict=True))
+    return bool(space.goal_distance.to_goal(start[None, :2])[0] > made_good_m)
 
 
 def place_runs(

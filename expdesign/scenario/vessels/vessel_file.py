@@ -12,9 +12,8 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.scenario.tables import Entry, check_table, offer, read_toml, shown
-from expdesign.scenario.vessels.correlations import check_names, checked_correlation
 from expdesign.scenario.vessels.environment_table import build_environment
-from expdesign.scenario.vessels.pendulum_table import build_pendulum
+from expdesign.scenario.vessels.pendulum_table import build_pendulum, check_names, checked_correlation
 from expdesign.scenario.vessels.vessel_tables import (
     ACTUATOR_TABLES,
     SAME_AS,

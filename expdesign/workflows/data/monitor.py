@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.monitor_page import (
+    Moment,
     MonitorContent,
     budget_entries,
     monitor_html,
@@ -23,18 +24,27 @@ from expdesign.export.monitor_page import (
     sentences,
 )
 from expdesign.export.monitor_page.content import HEADER
-from expdesign.monitoring import TUNING, RollWatch, saved
+from expdesign.monitoring import (
+    TUNING,
+    RollWatch,
+    restored_alarm,
+    restored_calibration,
+    restored_changes,
+    restored_roll,
+    restored_state,
+    saved,
+)
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
-from expdesign.records import STREAM, pieces
+from expdesign.records import STREAM, Taken, pieces
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.data.prepared import Asked, Read, prepared
-from expdesign.workflows.data.restored import restored_watch
 from expdesign.workflows.data.watched_ship import VESSEL, check_model
 from expdesign.workflows.data.watching import (
     HOUR,
     Learning,
+    Reading,
     Ready,
     Watch,
     Watching,
@@ -47,6 +57,55 @@ from expdesign.workflows.data.watching import (
 )
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.workers import workers
+
+
+def restored_watch(table: Mapping[str, Any]) -> Watch:
+    """A watch, read from what `saved` made of it.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: it is none.
+    """
+    return Watch(
+        changes=restored_changes(table["changes"]),
+        reading=_reading(table["reading"]),
+        phase=_phase(table["phase"]),
+        roll=restored_roll(table["roll"]),
+    )
+
+
+def _phase(table: Mapping[str, Any]) -> Learning | Ready | Watching:
+    if "state" in table:
+        return _watching(table)
+    if "calibration" in table:
+        return Ready(calibration=restored_calibration(table["calibration"]), reference_s=table["reference_s"])
+    return Learning()
+
+
+def _reading(table: Mapping[str, Any]) -> Reading:
+    return Reading(
+        **{
+            **table,
+            "now_s": float(table["now_s"]),
+            "notes": tuple(table["notes"]),
+            "pending": tuple(table["pending"]),
+            "taken": tuple(Taken(**{**taken, "last_s": float(taken["last_s"])}) for taken in table["taken"]),
+        }
+    )
+
+
+def _watching(table: Mapping[str, Any]) -> Watching:
+    return Watching(
+        calibration=restored_calibration(table["calibration"]),
+        reference_s=table["reference_s"],
+        state=restored_state(table["state"]),
+        alarms=tuple(map(restored_alarm, table["alarms"])),
+        moments=tuple(
+            Moment(**{**m, "value": np.array(m["value"], float), "std": np.array(m["std"], float)})
+            for m in table["moments"]
+        ),
+        changed=tuple(table["changed"]),
+    )
+
 
 STATE = "monitor-state.json"
 MOST_ROWS = 20_000

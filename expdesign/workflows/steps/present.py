@@ -18,7 +18,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
 from expdesign.scenario import Scenario, load_scenario, load_vessel
-from expdesign.scenario.berth import berth_problem
+from expdesign.scenario.scenario_file import berth_problem
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, delivered_at_samples
 from expdesign.values import Array, seal

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from expdesign.conventions import to_n_frame
+from expdesign.errors import NoPlan
 from expdesign.export.pages.figures import (
     BLACK,
     FORBIDDEN,
@@ -25,18 +27,86 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.figures.footprints import footprints
-from expdesign.export.report.figures.labels import place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.export.tuning import TUNING
 from expdesign.indices import DEPTH_BY_DRAUGHT
+from expdesign.plan.runs import dispersion_m
 from expdesign.plan.values import Plan
 from expdesign.sea_area import SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
+from expdesign.vessel.hull import covering_discs, hull_polygons
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import PathPatch
+
+
+Range = tuple[float, float]
+
+
+def place_labels(anchors: Array, track: Array, *, size: float, bounds: tuple[Range, Range]) -> Array:
+    """A place near each anchor that keeps off the track, the frame and the labels placed before.
+
+    Args:
+        anchors: (n, 2) x, y to be labelled, in order.
+        track: (k, 2) what labels should not cover.
+        size: diameter of a label, in the unit of the coordinates.
+        bounds: x range and y range.
+
+    Returns:
+        (n, 2) label centres.
+    """
+    angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    offsets = np.concatenate([ring * size * reach for reach in (1.1, 1.7, 2.6, 3.6)])
+    (low_x, high_x), (low_y, high_y) = bounds
+    placed: list[Array] = []
+    for anchor in anchors:
+        centres = anchor + offsets
+        near_track = np.hypot(*(centres[:, None, :] - track).transpose(2, 0, 1)) < 0.75 * size
+        cost = np.hypot(*offsets.T) / size + 4.0 * near_track.any(axis=1)
+        for other in placed:
+            cost += 12.0 * (np.hypot(*(centres - other).T) < 1.15 * size)
+        outside = (centres < [low_x + size / 2, low_y + size / 2]) | (centres > [high_x - size / 2, high_y - size / 2])
+        placed.append(centres[int(np.argmin(cost + 50.0 * outside.any(axis=1)))])
+    return np.array(placed).reshape(-1, 2)
+
+
+def footprints(content: ReportContent) -> list[shapely.Geometry]:
+    """The area (east, north) that the hull covers in each run with the plan's confidence; none where not computable."""
+    plan, vessel = content.plan, content.vessel
+    centres, _ = covering_discs(vessel.length_m, vessel.beam_m)
+    primitives = {item.primitive.name: item.primitive for item in content.information}
+    radii: dict[str, Array | None] = {}
+    found = []
+    for leg in plan.legs:
+        if leg.kind != "primitive" or leg.name not in primitives:
+            continue
+        if leg.name not in radii:
+            try:
+                radii[leg.name] = dispersion_m(
+                    vessel,
+                    primitives[leg.name],
+                    content.environment,
+                    centres_m=centres,
+                    confidence=content.confidence,
+                    rng=np.random.default_rng(TUNING.footprint_seed),
+                )
+            except NoPlan:
+                radii[leg.name] = None
+        radius = radii[leg.name]
+        if radius is not None:
+            found.append(_covered(plan.trajectory.pose[leg.first : leg.last + 1], radius, vessel.hull_b))
+    return found
+
+
+def _covered(pose: Array, radius: Array, hull_b: Array) -> shapely.Geometry:
+    count = min(len(pose), len(radius))
+    chosen = np.unique(np.linspace(0, count - 1, TUNING.footprint_pieces).round().astype(int))
+    grown = shapely.buffer(hull_polygons(pose[chosen], hull_b), radius[chosen], quad_segs=4)
+    spans = [shapely.union_all(pair).convex_hull for pair in pairwise(grown)]
+    return shapely.union_all(spans)
+
 
 WIDTH_IN = 6.4
 KINDS = {"reposition": (REPOSITION, 1.3), "primitive": (PRIMITIVE, 2.4)}
