@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 from counted_work import counted_work
 from expdesign import workflows
+from expdesign.memory import VARIABLE
 from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -29,12 +32,13 @@ def copied(folder: Path, name: str, changes: dict[str, str]) -> Path:
 
 
 def example_run(made_once: Callable, name: str, *, whole: bool = False) -> tuple[Path, list[str]]:
-    """Folder and file names of `expdesign run` on an example, seed 1."""
+    """Folder and file names of `expdesign run` on an example, seed 1; what it remembers lies beside it in `-cache`."""
 
     def run(folder: Path) -> list[str]:
         scenario = copied(folder.with_name(f"{folder.name}-scenario"), name, {} if whole else SHORTER[name])
         told: list[tuple[str, float]] = []
-        with counted_work() as (counts, progress):
+        memory = {VARIABLE: str(folder.with_name(f"{folder.name}-cache"))}
+        with counted_work() as (counts, progress), patch.dict(os.environ, memory):
 
             def report(activity: str, share: float) -> None:
                 told.append((activity, share))

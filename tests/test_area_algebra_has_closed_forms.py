@@ -85,7 +85,7 @@ def test_points_and_lines_are_no_polygons():
     assert as_multipolygon(shapely.MultiPolygon([ISLAND])).equals(ISLAND)
 
 
-@pytest.mark.parametrize("clearance_m", [5.0, 20.0])
+@pytest.mark.parametrize("clearance_m", [5.0, pytest.param(20.0, marks=pytest.mark.slow)])
 def test_clearance_from_a_shore_of_many_corners_is_the_same_in_steps_as_at_once(clearance_m):
     """At once, GEOS leaves out corners by up to a hundredth of the distance, and chords cut arcs by 0.12 per cent."""
     rng = np.random.default_rng(4)

@@ -36,7 +36,9 @@ def slow_leg(water, start, end, before):
     return find_leg(task, water)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "delay" else name for name in CASES]
+)
 def test_a_leg_arrives_although_actuators_are_slow(name):
     water, start, end = slow_water(CASES[name]), at_rest(0, 0, 0.0), at_rest(60, 40, 1.0)
     before = np.array([[0.0] * 4, [1.5, 0.1, -1.5, 0.1], [3.0, 0.2, -2.0, 0.2]])

@@ -55,9 +55,9 @@ def sailed(ship: str, case: str):
 BOTH = pytest.mark.parametrize(
     ("ship", "case"),
     [
-        ("coaster", "after a turn"),
         ("coaster", "to rest"),
         ("coaster", "far"),
+        pytest.param("coaster", "after a turn", marks=pytest.mark.slow),
         pytest.param("coaster", "off from rest", marks=pytest.mark.slow),
         pytest.param("catamaran", "after a turn", marks=pytest.mark.slow),
         pytest.param("catamaran", "far", marks=pytest.mark.slow),

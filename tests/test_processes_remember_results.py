@@ -19,7 +19,7 @@ from counted_work import counted_work
 from expdesign import memory, workflows
 from expdesign.memory import ABSENT, VARIABLE, Memory, digest, in_order, recalled, remembering, user_memory
 from nomoto_ship import nomoto_ship
-from short_examples import SHORTER, copied, example_run
+from short_examples import example_run, example_work
 
 CALLS: list[object] = []
 
@@ -40,36 +40,32 @@ def entries(folder: Path) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def repeated(made_once, tmp_path_factory):
-    """A short trial without cache, then planned with an empty one and run with what that left; work and result."""
-    off, _ = example_run(made_once, "model-ship")
-    folder = tmp_path_factory.mktemp("repeated")
-    scenario = off.with_name(f"{off.name}-scenario") / "scenarios" / "model-ship.toml"
-    if not scenario.exists():
-        scenario = copied(scenario.parents[1], "model-ship", SHORTER["model-ship"])
-    work = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(VARIABLE, str(folder / "cache"))
-        for name, workflow in (("cold", workflows.plan), ("warm", workflows.run)):
-            with counted_work() as (counts, progress):
-                workflow(scenario, folder / name, seed=1, progress=progress)
-            work[name] = counts
-    return {"off": off, "cold": folder / "cold", "warm": folder / "warm"}, work
+    """A short scenario, folders of its run with an empty memory and with what that left, and work of the second."""
+    cold, _ = example_run(made_once, "model-ship")
+    scenario = cold.with_name(f"{cold.name}-scenario") / "scenarios" / "model-ship.toml"
+    warm = tmp_path_factory.mktemp("repeated") / "warm"
+    with pytest.MonkeyPatch.context() as patch, counted_work() as (counts, progress):
+        patch.setenv(VARIABLE, str(cold.with_name(f"{cold.name}-cache")))
+        workflows.run(scenario, warm, seed=1, progress=progress)
+    return scenario, cold, warm, counts
 
 
-@pytest.mark.parametrize("name", ["cold", "warm"])
-def test_files_are_the_same_with_a_cold_a_warm_and_no_cache(repeated, name):
-    folders, _ = repeated
-    written = {path.name for path in folders[name].iterdir()}
-    assert written >= {"plan.json", "track.csv", "commands.csv"}
-    assert name == "cold" or written == {path.name for path in folders["off"].iterdir()}
-    for file in written:
-        assert (folders[name] / file).read_bytes() == (folders["off"] / file).read_bytes(), file
+def test_files_are_the_same_with_a_cold_and_a_warm_cache(repeated):
+    _, cold, warm, _ = repeated
+    files = {path.name: path.read_bytes() for path in cold.iterdir()}
+    assert {path.name: path.read_bytes() for path in warm.iterdir()} == files
 
 
-def test_a_second_run_solves_nothing_and_sails_no_drawn_trials(repeated):
-    _, work = repeated
-    done = {kind for phase, counts in work["warm"].items() if phase != "files" for kind in counts}
-    assert sum(counts.get("solves", 0) for counts in work["cold"].values()) > 0
+def test_durations_are_the_same_without_a_cache(repeated, tmp_path):
+    scenario, cold, *_ = repeated
+    workflows.durations(scenario, tmp_path, jobs=1, seed=1)
+    assert (tmp_path / "durations.json").read_bytes() == (cold / "durations.json").read_bytes()
+
+
+def test_a_second_run_solves_nothing_and_sails_no_drawn_trials(made_once, repeated):
+    *_, work = repeated
+    done = {kind for phase, counts in work.items() if phase != "files" for kind in counts}
+    assert sum(counts.get("solves", 0) for counts in example_work(made_once, "model-ship").values()) > 0
     assert not done & {"solves", "iterations", "steps of many ships"}
 
 
