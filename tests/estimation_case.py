@@ -13,7 +13,7 @@ from expdesign.estimation.values import Estimate
 from expdesign.processes import in_order
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.scenario import load_vessel
-from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Ensemble, Environment, Variation, simulate_ensemble
 from expdesign.vessel import Sensors, Vessel

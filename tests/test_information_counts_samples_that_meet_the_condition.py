@@ -15,7 +15,7 @@ from expdesign.information.excitation import FREE, REQUIRED, REWARDED, kept_runs
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.moments import regressor_rows
 from expdesign.scenario import load_scenario, load_vessel
-from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.simulation import CALM, Environment, delivered, simulate
 from expdesign.workflows.steps.design_problem import duration_problem
 from expdesign.workflows.steps.scored import scored

@@ -11,7 +11,7 @@ from expdesign.processes import local_processes
 from expdesign.rehearsal import validation
 from expdesign.rehearsal.validation import Rehearsal, heading_rad, trial_parts, validate
 from expdesign.scenario import load_vessel
-from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, Variation
 from expdesign.vessel import Actuator, Limit, Sensors, Term, Vessel, VesselModel

@@ -22,7 +22,7 @@ from expdesign.export.validation_page.content import surely_biased
 from expdesign.information import estimated_parameters, score_primitives
 from expdesign.rehearsal import Rehearsal, Validated, validate
 from expdesign.scenario import load_vessel
-from expdesign.scenario.dictionaries.dictionary_file import load_dictionary
+from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.simulation import CALM
 from expdesign.vessel import Sensors, Vessel
 from shared_work import add_sharing, shared_work

@@ -6,6 +6,7 @@ from expdesign.export.load_page.content import (
     STEP_HEADER,
     LoadContent,
     case_rows,
+    load_plan_html,
     load_plan_json,
     load_sentences,
     loads_toml,
@@ -13,7 +14,6 @@ from expdesign.export.load_page.content import (
     repeats_json,
     step_rows,
 )
-from expdesign.export.load_page.page import load_plan_html
 
 __all__ = [
     "CASE_HEADER",

@@ -1,4 +1,4 @@
-"""A load plan as JSON, tables, sentences, and the files of its load cases."""
+"""A load plan as JSON, tables, sentences and a page, and the files of its load cases."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
 
@@ -196,3 +197,17 @@ def loads_toml(content: LoadContent) -> str:
         if values:
             lines += ["", f"[{head}]", *(f"{name} = {value!r}" for name, value in values.items())]
     return "\n".join(lines) + "\n"
+
+
+def load_plan_html(content: LoadContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("expdesign.export.load_page", "load_plan.html").render(
+        content=content,
+        sentences=load_sentences(content),
+        case_header=[name.capitalize() for name in CASE_HEADER],
+        case_rows=case_rows(content),
+        precision_header=[name.capitalize() for name in PRECISION_HEADER],
+        precision_rows=precision_rows(content),
+        step_header=[name.capitalize() for name in STEP_HEADER],
+        step_rows=step_rows(content),
+    )

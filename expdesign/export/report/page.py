@@ -16,11 +16,14 @@ from expdesign.export.report import criteria, tables
 from expdesign.export.report.checks import checks, conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.figures.chart import chart, chart_legend
-from expdesign.export.report.figures.design import durations_figure, information_figure
+from expdesign.export.report.figures.design import (
+    durations_figure,
+    information_figure,
+    pareto_figure,
+    uncertainty_figure,
+)
 from expdesign.export.report.figures.gallery import primitive_figure
-from expdesign.export.report.figures.pareto import pareto_figure
 from expdesign.export.report.figures.timeline import timeline_figure
-from expdesign.export.report.figures.uncertainty import uncertainty_figure
 from expdesign.export.report.growth import growth_rows, growth_sentences
 from expdesign.export.report.parameters import (
     Expected,

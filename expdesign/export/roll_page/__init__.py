@@ -6,10 +6,10 @@ from expdesign.export.roll_page.content import (
     RollContent,
     cure_rows,
     parameter_rows,
+    roll_html,
     roll_json,
     roll_sentences,
 )
-from expdesign.export.roll_page.page import roll_html
 
 __all__ = [
     "CURE_HEADER",

@@ -1,4 +1,4 @@
-"""Roll identification as JSON, tables and sentences."""
+"""Roll identification as JSON, tables, sentences and a page."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
 from expdesign.roll import (
     G_MPS2,
     MEANINGS,
@@ -238,3 +239,17 @@ def _parameter(content: RollContent, name: str) -> dict[str, object]:
         "std": std,
         "determined": _determined(content, name),
     }
+
+
+def roll_html(content: RollContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("expdesign.export.roll_page", "roll.html").render(
+        content=content,
+        sentences=roll_sentences(content),
+        parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
+        parameter_rows=parameter_rows(content),
+        scaled_header=[name.capitalize() for name in SCALED_HEADER],
+        scaled_rows=scaled_rows(content),
+        cure_header=[name.capitalize() for name in CURE_HEADER],
+        cure_rows=cure_rows(content),
+    )

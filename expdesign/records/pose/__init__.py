@@ -5,17 +5,19 @@ from expdesign.records.pose.fix import Fix, last_fix
 from expdesign.records.pose.motion import (
     MEASURED,
     SMOOTHED,
+    VELOCITY_METHODS,
     Request,
     batch_velocity,
+    central_difference,
     kept_samples,
     left_out_notes,
     long_enough,
     needed_columns,
     origin_notes,
+    smoothed_velocity,
     velocity_origins,
 )
 from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
-from expdesign.records.pose.velocity import VELOCITY_METHODS, central_difference, smoothed_velocity
 
 __all__ = [
     "MEASURED",

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from expdesign.scenario.charts.area_tables import AreaTable
-from expdesign.scenario.dictionaries.dictionary_file import DictionaryTable, PrimitiveTable
+from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
 from expdesign.scenario.keys import Key, keys_of
 from expdesign.scenario.loads_file import LoadsFile
 from expdesign.scenario.scenario_file import ScenarioFile

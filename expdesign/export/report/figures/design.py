@@ -1,4 +1,4 @@
-"""Durations with the equivalence theorem, and the information of each primitive about each parameter."""
+"""Durations with the equivalence theorem, information of each primitive, time against accuracy, standard errors."""
 
 from __future__ import annotations
 
@@ -7,10 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from expdesign.durations import DurationDesign
-from expdesign.export.pages.figures import BLUE, GREY, PRIMITIVE, light_grid, new_figure, short, svg
+from expdesign.export.pages.figures import (
+    BLACK,
+    BLUE,
+    GREY,
+    PRIMITIVE,
+    VERMILION,
+    light_grid,
+    new_figure,
+    round_ticks,
+    short,
+    svg,
+)
 from expdesign.export.report.content import ReportContent, relative_information
+from expdesign.export.report.parameters import Expected
 from expdesign.export.report.tables import shown_names
 from expdesign.export.tuning import TUNING
+from expdesign.shortest_day import ShortestDay
+from expdesign.values import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,3 +98,67 @@ def information_figure(content: ReportContent) -> str:
     bar.set_label("of the most informative manoeuvre", fontsize=9)
     label = "Heat map: information per minute of each primitive about each parameter, relative to the best primitive"
     return svg(figure, key="information", label=label)
+
+
+def pareto_figure(day: ShortestDay) -> str:
+    """Every day planned as a point, the estimated shortest days as a line, and the bound."""
+    figure = new_figure(6.4, 3.6)
+    axes = figure.subplots()
+    minutes, shares = day.curve.T[0] / 60, 100 * day.curve.T[1]
+    axes.plot(minutes, shares, "-", color=BLUE, linewidth=1.4, label="shortest, estimated")
+    tried = np.array([(item.day_s / 60, 100 * item.information) for item in day.tried])
+    axes.plot(*tried.T, "o", color=VERMILION, markersize=5, label="planned")
+    for number, point in enumerate(tried, start=1):
+        axes.annotate(str(number), point, (5, 4), textcoords="offset points", fontsize=9)
+    chosen_s = day.plan.day.planned_s
+    axes.plot(chosen_s / 60, 100 * day.information, "o", color="none", markeredgecolor=BLACK, markersize=12)
+    asked = 100.0 if day.most_s is None else None
+    if asked is not None:
+        axes.axhline(asked, color=BLACK, linewidth=0.9, linestyle=":", label="asked for")
+    else:
+        axes.axvline((day.most_s or np.nan) / 60, color=BLACK, linewidth=0.9, linestyle=":", label="asked for")
+    low, high = axes.get_xlim()
+    if day.bound is not None and day.bound.day_s > 0:
+        low = min(low, day.bound.day_s / 60 - 0.04 * (high - low))
+        axes.axvspan(low, day.bound.day_s / 60, color=GREY, alpha=0.25, linewidth=0)
+    axes.set_xlim(low, high)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("day as planned [min]")
+    axes.set_ylabel("information [% of what is needed]" if day.most_s is None else "information [% of total_s]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes)
+    return svg(figure, key="pareto", label="Length of the day against the information of its whole track")
+
+
+def uncertainty_figure(content: ReportContent, found: Expected) -> str:
+    """One row for each parameter, logarithmic: prior, after the runs, after the whole track."""
+    names = [short(name) for name in content.parameters]
+    figure = new_figure(6.4, 1.4 + 0.27 * len(names))
+    axes = figure.subplots()
+    size = parameter_size(content)
+    rows = np.arange(len(names))
+    before, runs, track = (
+        100 * np.where(std > 0, std, np.nan) / size for std in (found.before, found.runs, found.track)
+    )
+    axes.hlines(rows, np.fmin(before, track), np.fmax(before, track), color=GREY, linewidth=1.0)
+    axes.plot(before, rows, "s", color="white", markeredgecolor=BLACK, label="before")
+    axes.plot(runs, rows, "D", color=PRIMITIVE, markersize=5, label="after the runs alone")
+    axes.plot(track, rows, "o", color=BLUE, label="after the whole track")
+    axes.set_xscale("log")
+    axes.set_yticks(rows, names)
+    axes.invert_yaxis()
+    axes.set_xlabel("standard deviation, % of the parameter (where it is 0: of the one before)")
+    axes.xaxis.label.set_fontsize(9)
+    round_ticks(axes)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9, columnspacing=1.0)
+    light_grid(axes, "x")
+    return svg(figure, key="uncertainty", label="Standard deviation of every parameter before and after the trial")
+
+
+def parameter_size(content: ReportContent) -> Array:
+    """(p,) reference for standard deviations: the value, the prior where that is zero, else 1."""
+    model = content.vessel.model
+    nominal = dict(zip(model.names, np.abs(model.parameters).tolist(), strict=True))
+    values = np.array([nominal[name] for name in content.parameters])
+    prior = content.parameter_std
+    return np.where(values > 0, values, np.where(prior > 0, prior, 1.0))
