@@ -260,7 +260,8 @@ def test_a_cause_with_fewer_numbers_comes_before_one_that_imitates_many():
 def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data_better():
     """By more than a point, or by less where it is about as likely; one of the same cause is no rival.
 
-    One with as many numbers is a rival where it is about as likely, and comes first where it is better by a point.
+    One with as many numbers is a rival where it is about as likely, and comes first where it is better by a point. Of
+    the same cause only one with fewer numbers is, where it is about as likely.
     """
     about, less = (100.0 * (TUNING.about_as_likely + more) for more in (0.01, -0.01))
 
@@ -281,9 +282,12 @@ def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data
         (4, about, 90.0, False),
     ):
         rival = item("actuator_scale", numbers, fit_percent, gain)
-        accepted = [wind, item("wind", 1, 90.0, 99.0), item("current", 3, 90.0, less), rival]
+        accepted = [wind, item("wind", 1, 90.0, less), item("current", 3, 90.0, less), rival]
         chosen = _best_on_held_out(wind, accepted, validation)  # type: ignore[arg-type,list-item]
         assert chosen is (rival if better else wind)
+    one = item("wind", 1, 59.5, about)
+    for fewer in (item("wind", 3, 90.0, about), item("wind", 1, 58.5, about), one):
+        assert (_best_on_held_out(wind, [wind, fewer], validation) is fewer) == (fewer is one)  # type: ignore[arg-type,list-item]
 
 
 def test_what_physics_excludes_is_no_finding():

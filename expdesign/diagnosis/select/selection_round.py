@@ -187,11 +187,15 @@ def _is_about_as_likely(rival: FittedCandidate, first: FittedCandidate) -> bool:
 
 
 def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_number: bool) -> list[FittedCandidate]:
-    """The best candidate of each other cause with fewer numbers, or as many if it is about as likely."""
+    """The best candidate of each other cause with fewer numbers, or as many if it is about as likely.
+
+    And one of the same cause with fewer numbers that is about as likely, such as one parameter of a block.
+    """
     found: dict[str, FittedCandidate] = {}
     for item in accepted:
-        most = first.numbers if _is_about_as_likely(item, first) else first.numbers - 1
-        if (any_number or item.numbers <= most) and item.candidate.cause != first.candidate.cause:
+        likely, other = _is_about_as_likely(item, first), item.candidate.cause != first.candidate.cause
+        most = first.numbers if likely and other else first.numbers - 1
+        if ((any_number and other) or item.numbers <= most) and (likely or other):
             found.setdefault(item.candidate.cause, item)
     return [*found.values()][: TUNING.shortlist if any_number else TUNING.rivals]
 
