@@ -218,7 +218,8 @@ def _select(
     comparable = found.steps and found.first.keys and within_stated_std(found.first)
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
-    rest = with_unlisted_terms(kept, held, windows, validation, seed)
+    rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
+    rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])
     return _Selected(
         found=found,

@@ -20,7 +20,8 @@ from expdesign.values import Array
 from expdesign.vessel import stem
 
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
-LAG_S = 4.0
+LAG_S, MORE_LAG_S = 4.0, 1.0
+"""Of an actuator without a lag, and beyond one that it has."""
 TIMES = 9
 """Number of times at which an effect may begin, evenly over the data."""
 SATURATED = (0.5, 0.75)
@@ -157,22 +158,21 @@ def _play(values: Array, _since: NDArray[np.bool_]) -> Array:
 
 
 def _slow_answers(linear: LinearisedMotion) -> Iterator[Kind]:
-    """Lags that are longer at speed, or in slow motion."""
+    """Lags that are longer at speed, or in slow motion, beside a lag that the model has."""
     motion = linear.motion
     speed = motion.states[:, :-1, 0]
     mean, spread = float(speed.mean()), max(float(speed.std()), 1e-9)
     for name in dict.fromkeys(map(stem, motion.ship.model.inputs)):
-        key = f"lag:{name}"
-        if motion.ship.get(key):
-            continue
-        lagging = partial(_lagging, key, mean, spread)
+        lagging = partial(_lagging, f"lag:{name}", mean, spread)
         yield Kind(words=f"a lag of {name} that changes with speed", unit="s per standard deviation of speed",
                    disturbance=lagging)  # fmt: skip
 
 
 def _lagging(key: str, mean: float, spread: float, linear: LinearisedMotion) -> Disturbance:
     """By a lag per standard deviation of speed, given the mean speed and its standard deviation over all data."""
-    force = disturbance_of(linear, linear.motion.ship.with_effects({key: LAG_S}), LAG_S).force
+    lag_s = linear.motion.ship.get(key)
+    more_s = MORE_LAG_S if lag_s else LAG_S
+    force = disturbance_of(linear, linear.motion.ship.with_effects({key: lag_s + more_s}), more_s).force
     share = (linear.motion.states[:, :-1, 0] - mean) / spread
     return Disturbance(force=None if force is None else force * share[..., None], sensor=None)
 

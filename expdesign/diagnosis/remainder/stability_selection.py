@@ -33,7 +33,10 @@ class UnitInformation:
     offset: Array
 
     def beside_nuisance(self, keep: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """(c - n, c - n) and (c - n,) of some units, (w,) by mask, with the nuisance effects projected out."""
+        """(c - n, c - n) and (c - n,) of some units, (w,) by mask, with the nuisance effects projected out.
+
+        Zero for regressors that these imitate up to rounding.
+        """
         n = len(self.precision)
         weights = keep.astype(float)  # sums, without a copy of what is summed
         A, s = np.tensordot(weights, self.A, 1), weights @ self.s
@@ -41,7 +44,10 @@ class UnitInformation:
             return A, s
         own = A[:n, :n] + self.precision
         solved = np.linalg.lstsq(own, np.column_stack([A[:n, n:], s[:n] - self.precision @ self.offset]), rcond=None)[0]
-        return A[n:, n:] - A[n:, :n] @ solved[:, :-1], s[n:] - A[n:, :n] @ solved[:, -1]
+        left, scores = A[n:, n:] - A[n:, :n] @ solved[:, :-1], s[n:] - A[n:, :n] @ solved[:, -1]
+        imitated = np.diag(left) <= TUNING.rounding * np.diag(A)[n:]
+        left[imitated], left[:, imitated], scores[imitated] = 0.0, 0.0, 0.0
+        return left, scores
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,6 +18,7 @@ class Tuning:
         least_statistic: of a regressor; one of 300 reaches it by chance in one of 1000 trials.
         least_own_share: of a regressor that nothing else imitates.
         most_units: that one or two runs are divided into.
+        rounding: share of a regressor's information that is rounding, where the rest is imitated by what is estimated.
         half_samples: of the units, for stability selection.
         stable: share of them that must choose a regressor, or one that looks like it.
         alike: correlation from which on regressors look alike.
@@ -38,6 +39,7 @@ class Tuning:
     least_statistic: float = 25.0
     least_own_share: float = 1e-4
     most_units: int = 200
+    rounding: float = 1e-11
     half_samples: int = 50
     stable: float = 0.5
     alike: float = 0.8
