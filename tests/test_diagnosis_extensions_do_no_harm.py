@@ -8,6 +8,8 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import judgement
+from expdesign.diagnosis.causes.candidate import Situation
+from expdesign.diagnosis.causes.hull import ROLL_COUPLING
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import best_step, nearest_possible, step_bounds
 from expdesign.diagnosis.fit.output_error import fit_output_error
@@ -109,6 +111,26 @@ def test_bounds_are_those_of_times_and_of_damping(record):
     low, high = step_bounds(ship.with_effects({"lag:all": 2.0}), ("lag:all", "theta:N_abs_r_r", "theta:N_r"))
     np.testing.assert_allclose(low, [-2.0, -np.inf, -np.inf], atol=1e-5)
     np.testing.assert_allclose(high, [np.inf, 0.5, np.inf])
+
+
+@pytest.mark.parametrize(("period_s", "least"), [(3.0, -1.0), (1.5, 0.0)])
+def test_roll_is_no_faster_than_two_samples_unless_it_was_stated_so(record, period_s: float, least: float):
+    ship = extended_model(with_quadratic_yaw_damping(-0.5, 0.1), record).with_effects({"roll:period": period_s})
+    windows = cut_windows(ship.model, record)
+    assert windows.shortest_period_s == 2.0 * windows.sample_s
+    low, high = step_bounds(ship, ("roll:period", "roll:sway"), 2.0)
+    np.testing.assert_allclose(low, [least, -np.inf])
+    assert np.isposinf(high).all()
+
+
+def test_a_fit_that_ends_at_the_fastest_oscillation_has_found_no_roll(record):
+    ship = extended_model(with_quadratic_yaw_damping(-0.5, 0.1), record)
+    windows = cut_windows(ship.model, record)
+    rolls = ROLL_COUPLING.candidates(Situation(ship=ship, windows=windows))
+    assert rolls
+    for one in rolls:
+        assert one.is_possible(lambda key, one=one: {**one.free, **one.fixed}[key])
+        assert not one.is_possible(lambda _key: windows.shortest_period_s)
 
 
 def test_a_first_cause_that_shows_nowhere_for_certain_is_a_remark(monkeypatch):
