@@ -17,7 +17,7 @@ from expdesign.workflows.steps.scored import scored
 from whole_days import chance, simulated_days
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
-TRIALS = 16
+TRIALS = 24
 """More take long: `tests/benchmarks/stated_accuracy.py` has 500."""
 UNKNOWN = Environment(current_std_mps=0.15)
 """As the story's forecast."""
