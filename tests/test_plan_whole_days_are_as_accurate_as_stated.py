@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binom, chi2, norm, t
 
 from expdesign.information import regressor_rows
 from expdesign.plan.solve import draft_trial
@@ -14,7 +15,7 @@ from expdesign.simulation import CALM, Environment, delivered
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
-from whole_days import chance, simulated_days
+from whole_days import simulated_days
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 TRIALS = 24
@@ -23,6 +24,8 @@ UNKNOWN = Environment(current_std_mps=0.15)
 """As the story's forecast."""
 FIRST_ORDER = 0.1
 """What the noise beyond first order may add or take."""
+RARE = norm.sf(3.5)
+"""Chance of each one-sided test: with ten parameters one in 200 such tests is beyond."""
 
 
 @pytest.fixture(scope="module")
@@ -49,17 +52,16 @@ def days(planned, request):
 
 def test_standard_deviations_are_those_stated_but_for_chance_and_noise_beyond_first_order(days):
     assert days.failed == 0
-    most = 1 + FIRST_ORDER + 3.5 * chance(TRIALS)  # ten parameters: one in 200 such tests is beyond by chance
+    least, most = np.sqrt(chi2.ppf([RARE, 1 - RARE], TRIALS - 1) / (TRIALS - 1))
     ratio = days.found / days.forecast
-    assert (ratio < most).all()
-    assert (ratio > 1 / most).all()
+    assert (ratio < most * (1 + FIRST_ORDER)).all()
+    assert (ratio > least / (1 + FIRST_ORDER)).all()
 
 
 def test_estimates_are_right_on_average_and_their_intervals_hold_the_truth(days):
     error = days.bias / (days.found / np.sqrt(TRIALS))
-    assert (np.abs(error) < 3.5 + FIRST_ORDER * np.sqrt(TRIALS)).all()
-    binomial = np.sqrt(0.95 * 0.05 / TRIALS)
-    assert (days.coverage > 0.95 - 0.02 - 3.5 * binomial).all()
+    assert (np.abs(error) < t.isf(RARE, TRIALS - 1) + FIRST_ORDER * np.sqrt(TRIALS)).all()
+    assert (days.coverage * TRIALS >= binom.ppf(RARE, TRIALS, 0.95 - 0.02)).all()
 
 
 def test_the_covariance_of_a_track_is_the_inverse_of_its_centred_regressors(planned):
