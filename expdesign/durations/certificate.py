@@ -81,7 +81,8 @@ class DurationDesign:
         repeats: (q,) whole runs.
         efficiency_repeats: efficiency of the whole runs by the criterion: the optimum reaches the same in this share
             of the time.
-        efficiency_uniform: the same for equal time on every primitive, whether that is allowed or not.
+        efficiency_uniform: the same for equal time on every primitive that is not excluded, whether other limits allow
+            that or not.
         certificate: proof of optimality.
         note: a warning about the whole runs in one sentence, or "".
     """

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.durations.criteria import Aim, Picked
 from expdesign.durations.limits import NO_CONSTRAINTS, Constraints
@@ -132,6 +133,11 @@ class DurationProblem:
     def picked(self) -> Picked:
         """The arguments of a criterion."""
         return Picked(aim=self.aim, parameters=self.parameters, dimension=self.dimension)
+
+    @property
+    def included(self) -> NDArray[np.bool_]:
+        """(q,) primitives that the limits do not exclude by name."""
+        return np.array([name not in self.constraints.excluded for name in self.names])
 
     @property
     def symmetric(self) -> bool:

@@ -272,4 +272,5 @@ def _with_runs(design: DurationDesign, repeats: tuple[int, ...]) -> DurationDesi
 
 
 def _uniform_efficiency(problem: DurationProblem, fractions: Array) -> float:
-    return efficiency_of_shares(problem, fractions, np.full(len(problem.names), 1.0 / len(problem.names)))
+    """Of equal time on every primitive that is not excluded."""
+    return efficiency_of_shares(problem, fractions, problem.included / problem.included.sum())

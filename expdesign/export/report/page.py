@@ -250,18 +250,26 @@ def facts(content: ReportContent) -> list[Fact]:
             value=words.distance(check.clearance_min_m),
             remark=f"{words.distance(content.clearance_m)} required{'' if plan.area.depths else '; to land only'}",
         ),
-        Fact(
-            name="Short of the optimum by",
-            value=criteria.short_of_optimum(content),
-            remark="at most, proven"
-            + (f"; whole runs reach {words.percent(design.efficiency_repeats)}" if content.day is None else ""),
-        ),
+        _proof(content),
         Fact(
             name="Information realised",
             value="not computed" if realised is None else words.percent(realised),
             remark=f"of {words.duration(design.problem.total_s)} of the optimal design, repositioning included",
         ),
     ]
+
+
+def _proof(content: ReportContent) -> Fact:
+    """How far the trial is from the best: of the day where it was to be short, else of the durations."""
+    day, reached = content.day, words.percent(content.design.efficiency_repeats)
+    if day is None or day.most_s is not None or day.bound is None or day.bound.day_s <= 0:
+        runs = f"; whole runs reach {reached}" if day is None else ""
+        value = criteria.short_of_optimum(content)
+        return Fact(name="Short of the optimum by", value=value, remark=f"at most, proven{runs}")
+    share = words.percent(day.bound.day_s / day.plan.commands.duration_s)
+    return Fact(
+        name="No day is shorter than", value=words.duration(day.bound.day_s), remark=f"proven; {share} of this day"
+    )
 
 
 def _simulated(day: DayLength) -> str:

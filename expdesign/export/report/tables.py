@@ -16,6 +16,8 @@ from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
 
 REST_MPS, REST_RADPS = 0.02, 0.0005
+NEARLY_ZERO = 1e-9
+"""In SI; smaller settings are rounding errors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +94,7 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
         design.durations_s,
         design.repeats,
         design.sensitivities - design.certificate.prices,
+        design.problem.included,
         strict=True,
     )
     return [
@@ -106,9 +109,9 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
             share=words.percent(float(fraction)),
             optimal=words.duration(float(seconds)),
             runs=runs,
-            sensitivity=words.number(float(sensitivity), 3),
+            sensitivity=words.number(float(sensitivity), 3) if included else "excluded",
         )
-        for item, fraction, seconds, runs, sensitivity in columns
+        for item, fraction, seconds, runs, sensitivity, included in columns
     ]
 
 
@@ -148,8 +151,8 @@ def shown_name(item: PrimitiveInformation) -> str:
 
 def settings_sentence(item: PrimitiveInformation) -> str:
     """Settings of a primitive in friendly units, without its duration and offsets of zero."""
-    settings = item.primitive.settings.items()
-    chosen = {name: value for name, value in settings if name != "duration_s" and (value or "offset" not in name)}
+    told = {name: value for name, value in item.primitive.settings.items() if name != "duration_s"}
+    chosen = {name: value for name, value in told.items() if abs(value) > NEARLY_ZERO or "offset" not in name}
     return ", ".join(setting(name, value) for name, value in chosen.items())
 
 
@@ -157,6 +160,7 @@ def setting(name: str, value: float) -> str:
     """Name and value of a setting, in friendly units."""
     stem, _, ending = name.rpartition("_")
     unit, factor = UNITS.get(ending, ("", 1.0)) if stem else ("", 1.0)
+    value = 0.0 if abs(value) < NEARLY_ZERO else value
     title = (stem if unit else name).replace("_", " ")
     if ending == "mps" and value:
         knots = words.number(value * KNOTS_PER_MPS, 1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
 from expdesign.export.routes import DEGREE_DECIMALS
+from expdesign.shortest_day import ShortestDay
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +24,7 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
     design, plan, check = content.design, content.plan, content.plan.verification
     links = [
         Link(
-            step="Optimal durations",
+            step=f"Optimal durations{', which state the accuracy' if _asks_accuracy(content.day) else ''}",
             found=f"no other allocation of the time is better by more than {short_of_optimum}",
             proof="equivalence theorem, with the matrices in dictionary.json",
         ),
@@ -32,6 +33,7 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
             found=f"{words.percent(design.efficiency_repeats)} of that optimum",
             proof="information of the whole runs",
         ),
+        *_day_links(content.day),
     ]
     if plan.design_efficiency_placed is not None:
         links.append(
@@ -60,6 +62,23 @@ def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
         )
     )
     return [*links, *_route_links(content)]
+
+
+def _asks_accuracy(day: ShortestDay | None) -> bool:
+    return day is not None and day.most_s is None
+
+
+def _day_links(day: ShortestDay | None) -> list[Link]:
+    if day is None or day.bound is None or day.bound.day_s <= 0:
+        return []
+    share = words.percent(day.bound.day_s / day.plan.commands.duration_s)
+    return [
+        Link(
+            step="The day",
+            found=f"no day is shorter than {words.duration(day.bound.day_s)}, {share} of this one",
+            proof="transit at the largest speed; an upper bound on the information rate of any motion within limits",
+        )
+    ]
 
 
 def _route_links(content: ReportContent) -> list[Link]:

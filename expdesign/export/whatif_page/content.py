@@ -139,6 +139,8 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
         yield "It cannot be compared with the scenario, because they have no common parameter."
         return
     yield _accuracy(first, case, against)
+    if case.legs_count and not content.planned:
+        yield "These durations only state its accuracy; the shortest day has other runs, and --plan finds them."
     yield from _parameters(against)
     yield from _runs(first, case)
     missing = [name for name in first.parameters if name not in case.parameters]

@@ -39,12 +39,13 @@ def design_tables(design: DurationDesign, compared: Sequence[Efficiencies]) -> t
 def _shares_table(design: DurationDesign) -> TextTable:
     proof = design.certificate
     net = design.sensitivities - proof.prices
-    columns = zip(design.problem.names, design.fractions, design.durations_s, design.repeats, net, strict=True)
+    told = [f"{value:.4f}" if kept else "excluded" for value, kept in zip(net, design.problem.included, strict=True)]
+    columns = zip(design.problem.names, design.fractions, design.durations_s, design.repeats, told, strict=True)
     return TextTable(
         title=f"How long to run each primitive; at the optimum those used have sensitivity {proof.level:.6g}",
         header=("primitive", "share", "seconds", "whole runs", "sensitivity"),
         rows=tuple(
-            (name, f"{share:.4f}", f"{seconds:.1f}", str(runs), f"{sensitivity:.4f}")
+            (name, f"{share:.4f}", f"{seconds:.1f}", str(runs), sensitivity)
             for name, share, seconds, runs, sensitivity in columns
         ),
     )

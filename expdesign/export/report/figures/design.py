@@ -65,10 +65,11 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     used, bound = design.fractions > TUNING.least_fraction, design.certificate.level
     net = design.sensitivities - design.certificate.prices
     axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound:.4g}")
-    axes.hlines(rows, min(0.0, bound), net, color=GREY, linewidth=0.8)
+    shown = design.problem.included  # nothing is to be proved of the others
+    axes.hlines(rows[shown], min(0.0, bound), net[shown], color=GREY, linewidth=0.8)
     axes.plot(net[used], rows[used], "o", color=BLUE, label="used")
-    axes.plot(net[~used], rows[~used], "o", color="white", markeredgecolor=BLUE, label="not used")
-    low, high = min(0.0, float(net.min())), max(bound, float(net.max()))
+    axes.plot(net[shown & ~used], rows[shown & ~used], "o", color="white", markeredgecolor=BLUE, label="not used")
+    low, high = min(0.0, float(net[shown].min())), max(bound, float(net[shown].max()))
     axes.set_xlim(low - 0.12 * (high - low) * (low < 0), high + 0.12 * (high - low))
     axes.set_xlabel("sensitivity minus price" if design.certificate.multipliers else "sensitivity")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=9, columnspacing=1.0)
