@@ -81,14 +81,21 @@ def replayed(commands: dict[str, np.ndarray], track: dict[str, np.ndarray], vess
 
 
 def recomputed_gap(folder: Path) -> float:
-    """max_q trace(B(w)^-1 B_q) / dimension - 1 from dictionary.json and the fractions of durations.json."""
+    """max_q trace(B(w)^-1 B_q) / dimension - 1 from dictionary.json and the fractions of durations.json.
+
+    Manoeuvres added for a short day have no part in the durations that state its accuracy.
+    """
     dictionary = json.loads((folder / "dictionary.json").read_text())
-    fractions = [item["fraction"] for item in json.loads((folder / "durations.json").read_text())["primitives"]]
+    day = folder / "day.json"
+    added = json.loads(day.read_text())["added"] if day.exists() else {}
+    durations = json.loads((folder / "durations.json").read_text())["primitives"]
+    fractions = [item["fraction"] for item in durations if item["name"] not in added]
     n = len(dictionary["outputs"])
     parts = np.array(
         [
             np.block([[np.array(q["X"]), np.array(q["Y"])], [np.array(q["Z"]).T, np.eye(n)]])
             for q in dictionary["primitives"]
+            if q["name"] not in added
         ]
     )
     root = np.sqrt(np.einsum("qii->i", parts))

@@ -141,7 +141,7 @@ def test_predicted_covariance_follows_the_samples() -> None:
 
 def test_a_dictionary_without_offset_is_refused_by_name(tmp_path: Path) -> None:
     text = (
-        (ROOT / "helsinki.toml")
+        (ROOT / "helsinki-hour.toml")
         .read_text(encoding="utf-8")
         .replace("[design]\n", '[design]\nexcitation = "required"\n')
     )

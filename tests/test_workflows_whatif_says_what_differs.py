@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from expdesign.scenario import load_scenario, load_variant
 from scenario_files import write_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
-MODEL_SHIP, HELSINKI = SCENARIOS / "model-ship.toml", SCENARIOS / "helsinki.toml"
+MODEL_SHIP, HOUR = SCENARIOS / "model-ship.toml", SCENARIOS / "helsinki-hour.toml"
 VARIANTS = sorted((SCENARIOS / "variants").glob("*.toml"))
 
 
@@ -29,10 +30,10 @@ def cases(outcome) -> dict[str, dict]:
 
 @pytest.mark.parametrize("path", VARIANTS, ids=lambda path: path.stem)
 def test_the_example_variants_change_what_they_say(path):
-    found = load_variant(HELSINKI, path)
+    found = load_variant(HOUR, path)
     assert found.scenario.name == path.stem
     assert found.changes
-    assert found.scenario.area.name == load_scenario(HELSINKI).area.name
+    assert found.scenario.area.name == load_scenario(HOUR).area.name
 
 
 def test_twice_the_time_is_twice_the_information_and_the_same_files_give_no_difference(tmp_path):
@@ -137,6 +138,9 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
     page = whatif_html(content)
     assert 'id="days-' in page
     assert page.count("Legs included, the day has 0.50 times the information of the scenario") == 1
+    asked = replace(case_of("asked", track=None, day_s=0.0, legs_count=True), plan={})
+    unplanned = WhatIfContent(cases=(first, asked), planned=False, command="", version="")
+    assert whatif_html(unplanned).count("These durations only state its accuracy;") == 1
     for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
         assert f">{minutes}<" in page
 

@@ -48,7 +48,7 @@ FRAME = LocalFrame(lat_deg=60.0, lon_deg=25.0)
 
 def runs(hours: int) -> float:
     """Plan and verify so many hours of runs off Helsinki, one process."""
-    case = load_scenario(SCENARIOS / "helsinki.toml")
+    case = load_scenario(SCENARIOS / "helsinki-hour.toml")
     longer = replace(case, design=replace(case.design, total_s=3600.0 * hours))
     began = _spent_s()
     information = workflows.scored(longer)
@@ -58,7 +58,7 @@ def runs(hours: int) -> float:
 
 def candidates(count: int) -> float:
     """Build and score so many candidates in the wind and a current."""
-    case = load_scenario(SCENARIOS / "helsinki.toml")
+    case = load_scenario(SCENARIOS / "helsinki-hour.toml")
     kinds, shares = case.dictionary, np.linspace(*SHARES, -(-count // len(case.dictionary)))
     specs = [_scaled(kinds[index % len(kinds)], float(shares[index // len(kinds)]), index) for index in range(count)]
     environment = replace(case.environment, current_to=np.array([0.1, -0.05]))
@@ -143,7 +143,7 @@ def archipelago(folder: Path, corners: int) -> Path:
     )
     middle, apart = side // 2, math.ceil(APART_M / pitch_m)
     start, goal = FRAME.to_degrees(pitch_m * np.array([[middle - apart, middle], [middle, middle]]) - CHART_M / 2)
-    example = (SCENARIOS / "helsinki.toml").read_text("utf-8").replace("areas/helsinki.toml", "area.toml")
+    example = (SCENARIOS / "helsinki-hour.toml").read_text("utf-8").replace("areas/helsinki.toml", "area.toml")
     for kind in ("vessels", "dictionaries"):
         example = example.replace(f'"{kind}/', f'"{SCENARIOS}/{kind}/')
     for before, after in zip(("60.1632", "24.9628", "60.1150", "24.9450"), (*start, *goal), strict=True):

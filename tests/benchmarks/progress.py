@@ -22,7 +22,7 @@ from expdesign import workflows
 from expdesign.progress import Progress
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-EXAMPLES = ("story", "coaster", "harbour", "helsinki", "model-ship", "narrows")
+EXAMPLES = ("story", "coaster", "harbour", "helsinki", "helsinki-hour", "model-ship", "narrows")
 VARIANTS = tuple(SCENARIOS / "variants" / name for name in ("half-an-hour.toml", "no-telegraph.toml"))
 TENDER, TRUE_TENDER = (SCENARIOS / "vessels" / f"tender-20m{kind}.toml" for kind in ("", "-true"))
 AZIMUTH, TRUE_AZIMUTH = (SCENARIOS / "vessels" / f"azimuth-30m{kind}.toml" for kind in ("", "-true"))
@@ -107,16 +107,16 @@ BEFORE: dict[str, tuple[str, ...]] = {
     "simulate story": ("run story",),
     "diagnose story": ("run story", "simulate story"),
     "diagnose where nothing is hidden": ("run story",),
-    "diagnose an hour": ("run helsinki",),
-    "estimate an hour by output error": ("run helsinki",),
+    "diagnose an hour": ("run helsinki-hour",),
+    "estimate an hour by output error": ("run helsinki-hour",),
     "replan story": ("run story", "simulate story", "diagnose story"),
 }
 """Cases that others take files from."""
 READY: dict[str, Callable[[Path], object]] = {
     "run story, shortest day": asks_for_the_shortest_day,
     "diagnose where nothing is hidden": partial(recorded, "run story", "clean", TENDER),
-    "diagnose an hour": partial(recorded, "run helsinki", "hour", TRUE_AZIMUTH),
-    "estimate an hour by output error": partial(recorded, "run helsinki", "hour", TRUE_AZIMUTH),
+    "diagnose an hour": partial(recorded, "run helsinki-hour", "hour", TRUE_AZIMUTH),
+    "estimate an hour by output error": partial(recorded, "run helsinki-hour", "hour", TRUE_AZIMUTH),
 }
 """What is done before the clock starts."""
 

@@ -79,7 +79,7 @@ if __name__ == "__main__":
     )
     print("| processor |\n|---|---|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as drawn:
-        given = asked.scenarios or [SCENARIOS / f"{name}.toml" for name in ("story", "helsinki")]
+        given = asked.scenarios or [SCENARIOS / f"{name}.toml" for name in ("story", "helsinki-hour")]
         for scenario in charted(asked.charts, Path(drawn)) if asked.charts else given:
             ways = ("shortest day",) if asked.alone else ("total_s", "shortest day")
             compared(scenario, asked.seed, ways, asked.starts)
