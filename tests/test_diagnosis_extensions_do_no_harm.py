@@ -120,7 +120,14 @@ def test_roll_is_no_faster_than_two_samples_unless_it_was_stated_so(record, peri
     assert windows.shortest_period_s == 2.0 * windows.sample_s
     low, high = step_bounds(ship, ("roll:period", "roll:sway"), 2.0)
     np.testing.assert_allclose(low, [least, -np.inf])
-    assert np.isposinf(high).all()
+    np.testing.assert_allclose(high, [ship.longest_roll_s - period_s, np.inf])
+
+
+def test_the_longest_roll_is_that_of_a_narrow_righting_lever_and_all_mass_at_the_sides(record):
+    """An oscillator of radius of gyration B / 2 and metacentric height B / 100, by its equation k^2 w^2 = g GM."""
+    ship = extended_model(with_quadratic_yaw_damping(-0.5, 0.1), record)
+    frequency_radps = 2 * np.pi / ship.longest_roll_s
+    assert (ship.beam_m / 2 * frequency_radps) ** 2 == pytest.approx(9.81 * ship.beam_m / 100)
 
 
 def test_a_fit_that_ends_at_the_fastest_oscillation_has_found_no_roll(record):
@@ -131,6 +138,7 @@ def test_a_fit_that_ends_at_the_fastest_oscillation_has_found_no_roll(record):
     for one in rolls:
         assert one.is_possible(lambda key, one=one: {**one.free, **one.fixed}[key])
         assert not one.is_possible(lambda _key: windows.shortest_period_s)
+        assert not one.is_possible(lambda _key: ship.longest_roll_s)
 
 
 def test_a_first_cause_that_shows_nowhere_for_certain_is_a_remark(monkeypatch):

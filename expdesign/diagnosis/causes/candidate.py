@@ -23,6 +23,7 @@ class Candidate:
             corners in it.
         bounds: weighted sums of effects that physics keeps from being positive.
         above: effects that the data show only above these values.
+        below: effects that the ship can have only below these values.
         imitates: its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first.
     """
 
@@ -34,12 +35,14 @@ class Candidate:
     grid: tuple[str, tuple[float, ...]] | None = None
     bounds: tuple[Mapping[str, float], ...] = ()
     above: Mapping[str, float] = field(default_factory=dict)
+    below: Mapping[str, float] = field(default_factory=dict)
     imitates: bool = False
 
     def is_possible(self, value: Callable[[str], float]) -> bool:
         """Whether effects with these values keep all bounds."""
         kept = all(sum(weight * value(key) for key, weight in bound.items()) <= 0.0 for bound in self.bounds)
-        return kept and all(value(key) > least for key, least in self.above.items())
+        above = all(value(key) > least for key, least in self.above.items())
+        return kept and above and all(value(key) < most for key, most in self.below.items())
 
     @property
     def size(self) -> int:

@@ -162,8 +162,8 @@ def _prior_std(ship: ExtendedModel) -> dict[str, float]:
 def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 0.0) -> Array:
     """(2, c) least and greatest steps to the bounds of effects; infinite for those without.
 
-    Times cannot be below zero, what holds the ship at high speed cannot push her (`resisting`), and samples show no
-    faster oscillation than `Windows.shortest_period_s`.
+    Times cannot be below zero, what holds the ship at high speed cannot push her (`resisting`), samples show no faster
+    oscillation than `Windows.shortest_period_s`, and a stable ship rolls no slower than `longest_roll_s`.
 
     Args:
         ship: the model before the step.
@@ -177,7 +177,7 @@ def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 
         if key.startswith(POSITIVE):
             bounds[0, place] = LEAST_TIME_S - ship.get(key)
         if key == "roll:period":  # one stated shorter may stay
-            bounds[0, place] = min(0.0, shortest_s - ship.get(key))
+            bounds[:, place] = min(0.0, shortest_s - ship.get(key)), max(0.0, ship.longest_roll_s - ship.get(key))
         sign = signs.get(key.removeprefix("theta:"), 0.0)
         if sign:
             bounds[int(sign < 0), place] = -parameters[key.removeprefix("theta:")] - ship.get(key)

@@ -32,6 +32,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
         library=term_library(model),
         draught_m=vessel.draught_m,
         length_m=vessel.length_m,
+        beam_m=vessel.beam_m,
         derived=derived,
         max_draught_over_depth=max_draught_over_depth,
         effects=known,

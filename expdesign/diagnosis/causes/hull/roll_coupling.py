@@ -10,8 +10,9 @@ from expdesign.diagnosis.model import ROLL, ExtendedModel
 
 COUNT = 14
 DAMPING = 0.08
-SLOWER = 1.01
-"""Than the fastest oscillation that the data show: a fit that ends there has found no roll."""
+INSIDE = 1.01
+"""Of the shortest period that the data show and of the longest that the ship can have: a fit that ends there has found
+no roll."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
@@ -20,14 +21,17 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
         return ()
     if situation.ship.has_roll:  # the vessel file has a mode, which may be another
         return (Candidate(cause="roll_coupling", free=dict.fromkeys(ROLL, 0.0)),)
-    shortest = 4.0 * situation.windows.sample_s
-    periods = np.geomspace(shortest, max(30.0 * shortest / 4, 2 * shortest), COUNT)
+    shortest, longest = 4.0 * situation.windows.sample_s, situation.ship.longest_roll_s / INSIDE
+    if shortest > longest:
+        return ()
+    periods = np.geomspace(shortest, min(7.5 * shortest, longest), COUNT)
     return tuple(
         Candidate(
             cause="roll_coupling",
             free={"roll:sway": 0.0, "roll:yaw": 0.0},
             fixed={"roll:period": float(period), "roll:damping": DAMPING},
-            above={"roll:period": SLOWER * situation.windows.shortest_period_s},
+            above={"roll:period": INSIDE * situation.windows.shortest_period_s},
+            below={"roll:period": longest},
         )
         for period in periods
     )
