@@ -1,6 +1,8 @@
 """No motion of a class tells what is needed in less time than the bound says, and its proof stands on its own."""
 
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,19 +10,24 @@ import pytest
 from design_case import WIND, force_actuator, scored_example, vessel
 from expdesign.durations import Collected, build_durations, optimal_shares
 from expdesign.information import regressor_rows
+from expdesign.scenario import load_scenario
 from expdesign.shortest_day import Accuracy
-from expdesign.shortest_day.bounds import Motions, fewest_samples, richest_sample, speed_changes
+from expdesign.shortest_day.bounds import Motions, day, fewest_samples, richest_sample, speed_changes
 from expdesign.shortest_day.bounds.affine import AFFINE, over_boxes
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.vessel import NUMPY, Limit, Term, VesselModel
 from expdesign.vessel.expressions import parse_expression
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.planned import plan_problem
+from expdesign.workflows.steps.scored import scored
 from rudder_ship import rudder_ship
 
 AZIMUTHS = vessel("azimuth-30m")
 FASTEST = np.array([[-1.45, 1.45], [-0.7, 0.7], [-0.1, 0.1]])
 FEW = 4000
 """Boxes; the bound holds with any number of them."""
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SUBTRACTIONS = ("none", "batch", "complete")
 
 
@@ -181,6 +188,19 @@ def test_wider_limits_never_raise_the_bound_and_twice_the_accuracy_doubles_it():
     assert wide.least < narrow.least
     assert doubled.enough == pytest.approx(2 * narrow.enough, rel=0.03)
     assert doubled.least == pytest.approx(2 * narrow.least, rel=0.15)
+
+
+def test_no_day_is_shorter_than_the_runs_that_limits_require(monkeypatch):
+    """Nine runs from a berth and back, where neither way nor information takes any time."""
+    case = load_scenario(SCENARIOS / "harbour.toml")
+    information = scored(case)
+    problem = plan_problem(case, information, designed(case, information))
+    accuracy = std_accuracy(np.full(len(problem.design.problem.parameters), np.inf), case.vessel.model.names)
+    trajectory = problem.primitives[0].trajectory
+    monkeypatch.setattr(day, "fewest_samples", lambda *_, **__: SimpleNamespace(least=0.0, estimate=0.0))
+    found = day.day_bound(problem, accuracy, SimpleNamespace(trajectory=trajectory))
+    assert found.way_s < 30.0
+    assert found.day_s == case.design.total_s == 1200.0
 
 
 def test_a_ship_that_only_surges_gets_under_way_in_closed_form():

@@ -86,6 +86,7 @@ class DayBound:
         information_s: least time in which a motion of the class tells what is needed; proved, 0 where nothing is.
         searched_s: the same if the search found the samples that tell most; an estimate, never less.
         way_s: least time from start to goal in safe water, up to the largest speed of the class, and stopping there.
+        required_s: time of the runs that the limits on durations require.
         velocities: (3, 2) limits of u, v and r through water [m/s, rad/s].
         speed_mps: largest speed through water, in any direction.
     """
@@ -93,6 +94,7 @@ class DayBound:
     information_s: float
     searched_s: float
     way_s: float
+    required_s: float
     velocities: Array
     speed_mps: float
 
@@ -102,7 +104,7 @@ class DayBound:
     @property
     def day_s(self) -> float:
         """Of the whole day."""
-        return max(self.information_s, self.way_s)
+        return max(self.information_s, self.way_s, self.required_s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -283,10 +283,11 @@ def _bound_sentences(day: ShortestDay) -> list[str]:
         return []
     (u_low, u_high), (_, v), (_, r) = bound.velocities.tolist()
     informing = f", and gathering the information at least {words.duration(bound.information_s)}"
+    required = f", and the runs that limits require {words.duration(bound.required_s)}" if bound.required_s else ""
     return [
         f"No day is shorter than {words.duration(bound.day_s)}, "
         f"{words.percent(bound.day_s / day.plan.commands.duration_s)} of this one: the way to the goal takes at least "
-        f"{words.duration(bound.way_s)}{informing if bound.information_s > 0 else ''}. "
+        f"{words.duration(bound.way_s)}{informing if bound.information_s > 0 else ''}{required}. "
         f"Proved for all motions through water with {u_low:.2f} to {u_high:.2f} m/s ahead, {v:.2f} m/s to a side, "
         f"{bound.speed_mps:.2f} m/s in all and {r:.3f} rad/s, by any input within limits; no ship can do most of them."
     ]

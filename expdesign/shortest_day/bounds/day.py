@@ -15,6 +15,7 @@ from expdesign.shortest_day.bounds.fewest_samples import fewest_samples
 from expdesign.shortest_day.bounds.motions import Motions
 from expdesign.shortest_day.bounds.tuning import TUNING
 from expdesign.shortest_day.bounds.under_way import speed_changes
+from expdesign.shortest_day.prices import fewest_runs
 from expdesign.shortest_day.values import DayBound
 from expdesign.simulation import to_body
 from expdesign.values import Array
@@ -48,6 +49,7 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
         information_s=samples.least * second if samples else 0.0,
         searched_s=samples.estimate * second if samples else 0.0,
         way_s=_from_rest_to_rest_s(problem, velocities, speed_mps),
+        required_s=float(fewest_runs(problem) @ design.run_s),
         velocities=velocities,
         speed_mps=speed_mps,
     )

@@ -272,6 +272,7 @@ def _bound(found: ShortestDay) -> dict[str, object]:
             "information_s": bound.information_s,
             "information_searched_s": bound.searched_s,
             "way_s": bound.way_s,
+            "required_runs_s": bound.required_s,
         },
     }
 
