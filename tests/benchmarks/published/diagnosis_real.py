@@ -122,7 +122,11 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     """The case's ship with or without terms of the wind, fitted by least squares.
 
     Where the model runs away on these data, damping that grows fastest with speed and pushes is taken out, and the rest
-    fitted anew: nobody has a model in use that cannot be simulated.
+    fitted anew: nobody has a model in use that cannot be simulated. Where the data do not tell parameters apart, the first
+    of them is held, as `estimate` advises.
+
+    Raises:
+        NotInformative: the data tell nothing of parameters of which none is left to hold.
     """
     ship = vessel_of(case)
     model = ship.model
@@ -139,7 +143,14 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     methods, held = ("ls-air" if wind else "ls",), list[str]()
     fastest = max(float(np.nanmax(np.abs(batch.velocity))) for batch in record.batches)
     while True:
-        model = assess(ship, record, EstimateOptions(methods=methods, mean="none", fixed=tuple(held))).best.model
+        options = EstimateOptions(methods=methods, mean="none", fixed=tuple(held))
+        try:
+            model = assess(ship, record, options).best.model
+        except NotInformative as error:
+            if not error.parameters:
+                raise
+            held.append(error.parameters[0])
+            continue
         values = dict(zip(model.names, model.parameters.tolist(), strict=True))
         pushing = [name for name, sign in resisting(model).items() if values[name] * sign < 0]
         if not pushing or error_ahead(replace(ship, model=model), record).max() < fastest:
