@@ -122,8 +122,8 @@ def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
     """The case's ship with or without terms of the wind, fitted by least squares.
 
     Where the model runs away on these data, damping that grows fastest with speed and pushes is taken out, and the rest
-    fitted anew: nobody has a model in use that cannot be simulated. Where the data do not tell parameters apart, the first
-    of them is held, as `estimate` advises.
+    fitted anew: nobody has a model in use that cannot be simulated. Where the data do not tell parameters apart, the
+    first of them is held, as `estimate` advises.
 
     Raises:
         NotInformative: the data tell nothing of parameters of which none is left to hold.
