@@ -14,6 +14,7 @@ from expdesign.durations import DurationProblem, optimal_shares, solve_durations
 from expdesign.estimation.methods import estimate
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_scenario, load_vessel
+from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting, Response
@@ -146,6 +147,15 @@ def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
     assert counted.left_s == load_scenario(STORY).design.total_s - SAMPLES
     assert not counted.left_stated
     assert rest_of(present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
+
+
+def test_the_rest_of_a_shortest_day_tells_most_in_the_time_left(tmp_path: Path) -> None:
+    measured(tmp_path / "a.csv")
+    state = present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0)
+    asked = replace(state.first.design, accuracy=AccuracySettings(as_durations=True))
+    case, notes = rest_of(replace(state, first=replace(state.first, design=asked)))
+    assert case.design == rest_of(state)[0].design
+    assert [note for note in notes if "design.accuracy" in note]
 
 
 def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, capsys):

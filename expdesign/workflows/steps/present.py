@@ -253,9 +253,15 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
     names = {spec.name for spec in kept}
     if settings.least_s or settings.most_s or settings.required or settings.budgets:
         notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets apply to the rest of the trial.")
+    if settings.accuracy is not None:
+        notes = (
+            *notes,
+            "The rest tells most in the time left; design.accuracy is of a whole trial and not asked.",
+        )
     design = replace(
         settings,
         total_s=state.left_s,
+        accuracy=None,
         prior_data=(*settings.prior_data, *state.data),
         most_s={name: value for name, value in settings.most_s.items() if name in names},
         excluded=tuple(name for name in settings.excluded if name in names),
