@@ -35,6 +35,7 @@ from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.workers import workers
 
 OF_DESIGN = "the runs of the design, without the legs between them"
+OF_ACCURACY = "the durations that state the accuracy, not the day: --plan foresees that"
 OF_PLAN = "the planned trial, its legs counted"
 
 
@@ -84,7 +85,7 @@ def foresee(
     content = ForesightContent(
         scenario=case.name,
         vessel=case.vessel.name,
-        source=OF_DESIGN if plan is None else OF_PLAN,
+        source=OF_PLAN if plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN,
         found=found,
         command=words,
         version=__version__,
