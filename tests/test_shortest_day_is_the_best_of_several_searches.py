@@ -22,7 +22,7 @@ STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 def found(monkeypatch, *outcomes):
     """The day of searches that end so: a median, or a refusal."""
 
-    def search(case, information, design, accuracy, seed, start, progress):
+    def search(case, information, design, accuracy, stated, seed, start, progress):
         outcome = outcomes[start]
         if isinstance(outcome, Exception):
             raise outcome
@@ -30,7 +30,9 @@ def found(monkeypatch, *outcomes):
         return step.Day(information=(), design=design, plan=plan)
 
     monkeypatch.setattr(step, "_searched", search)
-    return step._shortest_of(len(outcomes), (None, (), None, None, 0), lambda activity, share: None).plan.day.median_s
+    return step._shortest_of(
+        len(outcomes), (None, (), None, None, None, 0), lambda activity, share: None
+    ).plan.day.median_s
 
 
 def test_the_day_with_the_shortest_median_is_taken(monkeypatch):
@@ -75,7 +77,7 @@ def test_several_searches_reach_the_trial_and_each_is_made(monkeypatch):
     information = tuple(scored(case))
     made = []
 
-    def search(case, information, design, accuracy, seed, start, progress):
+    def search(case, information, design, accuracy, stated, seed, start, progress):
         made.append((seed, start))
         raise NoAnswer("enough was seen")
 

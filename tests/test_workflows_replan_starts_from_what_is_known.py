@@ -14,12 +14,24 @@ from expdesign.durations import DurationProblem, optimal_shares, solve_durations
 from expdesign.estimation.methods import estimate
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_scenario, load_vessel
-from expdesign.shortest_day import AccuracySettings
+from expdesign.shortest_day import AccuracySettings, stated_accuracy
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting, Response
+from expdesign.workflows.steps import day
+from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.known import combined, expected_std, purchases
-from expdesign.workflows.steps.present import _at_end, _standing, present_state, rest_of, weather_for_rest
+from expdesign.workflows.steps.present import (
+    PresentState,
+    _at_end,
+    _left,
+    _standing,
+    present_state,
+    rest_of,
+    weather_for_rest,
+)
+from expdesign.workflows.steps.scored import scored
+from expdesign.workflows.trials.replan import _stated_before
 from scenario_files import spoil
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -149,13 +161,37 @@ def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
     assert rest_of(present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
 
 
-def test_the_rest_of_a_shortest_day_tells_most_in_the_time_left(tmp_path: Path) -> None:
-    measured(tmp_path / "a.csv")
-    state = present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0)
+def shortest_day_so_far(folder: Path, remaining_s: float | None = None) -> PresentState:
+    """The story's trial, asked for in the shortest day, after 200 s."""
+    measured(folder / "a.csv")
+    state = present_state(STORY, [folder / "a.csv"], remaining_s=remaining_s)
     asked = replace(state.first.design, accuracy=AccuracySettings(as_durations=True))
-    case, notes = rest_of(replace(state, first=replace(state.first, design=asked)))
-    assert case.design == rest_of(state)[0].design
+    first = replace(state.first, design=asked)
+    return replace(state, first=first, left_s=_left(first, state.sailed_s, remaining_s))
+
+
+def test_the_rest_of_a_shortest_day_tells_most_in_the_time_left_where_that_is_stated(tmp_path: Path) -> None:
+    case, notes = rest_of(shortest_day_so_far(tmp_path, remaining_s=240.0))
+    assert case.design.accuracy is None
+    assert case.design.total_s == 240.0
     assert [note for note in notes if "design.accuracy" in note]
+
+
+def test_else_it_lacks_what_the_data_do_not_tell_of_the_same_accuracy(tmp_path: Path, monkeypatch) -> None:
+    state = shortest_day_so_far(tmp_path)
+    assert np.isnan(state.left_s)
+    case, _ = rest_of(state)
+    information = tuple(scored(case))
+    design, reference = designed(case, information), _stated_before(state, case, information, 0)
+    asked = []
+    monkeypatch.setattr(day, "_searched", lambda case, information, design, accuracy, *_: asked.append(accuracy))
+    day.planned_day(case, information, design, reference=reference)
+    (lacking,) = asked
+    whole = stated_accuracy(case.design.accuracy, reference, case.vessel)
+    enough = whole.samples * np.tensordot(reference.fractions, reference.problem.matrices, axes=1)
+    assert whole.margin(enough) == pytest.approx(0.0, abs=1e-6)
+    assert lacking.margin(enough) > 0.01  # with the data it is more than enough
+    assert lacking.margin(enough - lacking.prior) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, capsys):

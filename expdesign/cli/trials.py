@@ -158,7 +158,8 @@ def replan(
         typer.Option(
             "--remaining",
             metavar="S",
-            help="Informative time left [s]. Default: design.total_s less the time of the data.",
+            help="Informative time left [s]. Default: what design.accuracy still takes; without it design.total_s less "
+            "the time of the data.",
         ),
     ] = None,
     interest: Annotated[

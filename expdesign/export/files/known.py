@@ -37,7 +37,7 @@ class Known:
         data: files so far.
         sailed_s: time in them [s].
         total_s: informative time of the whole trial [s].
-        remaining_s: informative time left [s].
+        remaining_s: informative time left [s]; nan where it is as long as the accuracy asked for takes.
         remaining_stated: whether the user stated it.
         pose: (3,) of the ship at the end of the data, in the area's frame.
         speed_mps: over ground in the last sample.
@@ -99,7 +99,7 @@ def replan_json(known: Known) -> str:
             "data": list(known.data),
             "sailed_s": known.sailed_s,
             "total_s": known.total_s,
-            "remaining_s": known.remaining_s,
+            "remaining_s": finite(known.remaining_s),
             "remaining_stated": known.remaining_stated,
             "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),
             "measured_speed_mps": known.speed_mps,

@@ -65,11 +65,7 @@ def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
         return []
     lat, lon = frame.to_degrees(known.pose[:2]).tolist()
     files = ", ".join(known.data)
-    left = (
-        "as stated"
-        if known.remaining_stated
-        else f"that is {words.duration(known.total_s)} for the whole trial minus the duration of the data"
-    )
+    left = _time_left(known)
     current = words.current(known.environment.current_to, known.environment.current_std_mps)
     wind = words.wind(known.environment.wind_to, known.environment.wind_std_mps)
     moving = f"The speed over ground was {words.speed(known.speed_mps)}. " + (
@@ -79,13 +75,22 @@ def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
     )
     return [
         f"This plan is for the rest of a trial. Data so far: {words.duration(known.sailed_s)} ({files}). Informative "
-        f"time left: {words.duration(known.remaining_s)}, {left}.",
+        f"time left: {left}.",
         f"The data end with the ship at {words.latitude(lat)}, {words.longitude(lon)}, heading "
         f"{words.bearing(float(known.pose[2]))}. {moving}",
         f"Model: {known.model}. Weather: {current}; {wind} ({known.weather}).",
         *known.notes,
         _gain(known),
     ]
+
+
+def _time_left(known: Known) -> str:
+    if math.isnan(known.remaining_s):
+        return "as long as the accuracy asked for takes"
+    left, whole = words.duration(known.remaining_s), words.duration(known.total_s)
+    if known.remaining_stated:
+        return f"{left}, as stated"
+    return f"{left}, that is {whole} for the whole trial minus the duration of the data"
 
 
 def _gain(known: Known) -> str:

@@ -24,6 +24,7 @@ from expdesign.processes import begin, in_order, reported_together
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
+from expdesign.vessel import VesselModel
 from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.design_tables import design_summary
@@ -65,6 +66,8 @@ def planned_day(
     information: Sequence[PrimitiveInformation],
     design: DurationDesign,
     *,
+    reference: DurationDesign | None = None,
+    stated: VesselModel | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Day:
@@ -73,7 +76,9 @@ def planned_day(
     Args:
         case: the scenario.
         information: of its dictionary.
-        design: the optimal durations in total_s.
+        design: the optimal durations in total_s, beside what is known.
+        reference: those whose accuracy is asked for, where less was known when it was stated; `design` when None.
+        stated: as of `duration_problem`.
         seed: of everything drawn.
         progress: of the planning.
 
@@ -89,19 +94,21 @@ def planned_day(
 
     runs = tuple(item.primitive for item in information)
     accuracy = stated_accuracy(asked, design, case.vessel, runs, case.environment)
+    if reference is not None:
+        accuracy = replace(accuracy, level=stated_accuracy(asked, reference, case.vessel, runs, case.environment).level)
     case = replace(case, plan=with_leg_speed(case))
     problem = plan_problem(case, information, design, seed=seed)
     check_start(problem, ship_on_legs(problem))
     if asked.day_s is not None:
         check_way_fits(problem, asked.day_s)
     if asked.starts == 1:
-        return _searched(case, information, design, accuracy, seed, 0, progress)
-    return _shortest_of(asked.starts, (case, information, design, accuracy, seed), progress)
+        return _searched(case, information, design, accuracy, stated, seed, 0, progress)
+    return _shortest_of(asked.starts, (case, information, design, accuracy, stated, seed), progress)
 
 
 def _shortest_of(
     starts: int,
-    shared: tuple[Scenario, tuple[PrimitiveInformation, ...], DurationDesign, Accuracy, int],
+    shared: tuple[Scenario, tuple[PrimitiveInformation, ...], DurationDesign, Accuracy, VesselModel | None, int],
     progress: Progress,
 ) -> Day:
     """The day of several searches whose drawn trials end soonest, by their median; that of the first of equal ones.
@@ -125,6 +132,7 @@ def _answered(
     information: tuple[PrimitiveInformation, ...],
     design: DurationDesign,
     accuracy: Accuracy,
+    stated: VesselModel | None,
     seed: int,
     start: int,
     progress: Progress,
@@ -132,7 +140,7 @@ def _answered(
     """The outcome of one search, perhaps in another process."""
     with remembering(memory):
         try:
-            return _searched(case, information, design, accuracy, seed, start, progress)
+            return _searched(case, information, design, accuracy, stated, seed, start, progress)
         except NoAnswer as error:
             return error
 
@@ -142,6 +150,7 @@ def _searched(
     information: tuple[PrimitiveInformation, ...],
     design: DurationDesign,
     accuracy: Accuracy,
+    stated: VesselModel | None,
     seed: int,
     start: int,
     progress: Progress,
@@ -157,7 +166,7 @@ def _searched(
     if added:
         case = _with_additions(case, added)
         information = scored(case)
-        design = designed(case, information, seed=seed)
+        design = designed(case, information, stated=stated, seed=seed)
     problem = replace(plan_problem(case, information, design, seed=seed), expected=True)
     names = tuple(spec.name for spec in added)
     search = (

@@ -42,7 +42,7 @@ class PresentState:
         pose: (3,) of the ship in the area's frame.
         under_way: how it moves; None where it has stopped through the water.
         sailed_s: time in the data.
-        left_s: informative time left.
+        left_s: informative time left; nan where it is as long as design.accuracy takes.
         left_stated: whether --remaining gives it.
         ship: what the rest is planned with.
         origin: where its model comes from.
@@ -193,11 +193,13 @@ def _standing(batch: Batch, ship: Vessel) -> Array:
 
 
 def _left(first: Scenario, sailed_s: float, stated_s: float | None) -> float:
-    """Informative time left."""
+    """Informative time left; nan where it is as long as design.accuracy takes."""
     if stated_s is not None:
         if not 0 < stated_s < np.inf:
             raise InputError(f"--remaining is {stated_s:g}, expected more than 0 seconds")
         return stated_s
+    if first.design.accuracy is not None:
+        return float("nan")
     left_s = first.design.total_s - sailed_s
     if not left_s > 0:
         raise InputError(
@@ -253,15 +255,14 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
     names = {spec.name for spec in kept}
     if settings.least_s or settings.most_s or settings.required or settings.budgets:
         notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets apply to the rest of the trial.")
-    if settings.accuracy is not None:
-        notes = (
-            *notes,
-            "The rest tells most in the time left; design.accuracy is of a whole trial and not asked.",
-        )
+    accuracy = settings.accuracy
+    if accuracy is not None and state.left_stated:
+        accuracy = None
+        notes = (*notes, "The rest tells most in the time left, as --remaining asks, not what design.accuracy lacks.")
     design = replace(
         settings,
-        total_s=state.left_s,
-        accuracy=None,
+        total_s=first.design.total_s if accuracy else state.left_s,
+        accuracy=accuracy,
         prior_data=(*settings.prior_data, *state.data),
         most_s={name: value for name, value in settings.most_s.items() if name in names},
         excluded=tuple(name for name in settings.excluded if name in names),

@@ -5,6 +5,7 @@ The rest begins with the motion and the commands of the data's last rows, or wit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
-from expdesign.information import estimated_parameters
+from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.memory import recalled
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
@@ -25,11 +26,11 @@ from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.case import drafted
+from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.design_tables import design_summary
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
-from expdesign.workflows.steps.planned import plan_summary, planned
+from expdesign.workflows.steps.planned import plan_summary
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
 from expdesign.workflows.steps.workers import workers
@@ -59,7 +60,8 @@ def replan(
         out: folder, runs/<scenario> when None.
         data: measured so far; the last row of the last file is where the ship is now.
         vessel: the model to go on with, e.g. an extended one; estimated from the data when None.
-        remaining_s: informative time left; the scenario's less the time of the data when None.
+        remaining_s: informative time left; when None, as long as the scenario's accuracy takes beside the data, or
+            where none is stated, its time less that of the data.
         interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
         stopped: whether the ship stops at its present place before the rest begins.
         seed: of all chance.
@@ -109,20 +111,27 @@ def _replanned(
     design = designed(
         case, information, stated=state.first.vessel.model, seed=seed, progress=within(progress, 0.05, 0.12)
     )
-    _check_runs(design)
-    plan = planned(case, information, design, seed=seed, progress=within(progress, 0.13, 0.74))
+    compared = recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design)
+    reference = _stated_before(state, case, information, seed)
+    if reference is None:
+        _check_runs(design)
+    day = planned_day(
+        case, information, design, reference=reference, stated=state.first.vessel.model, seed=seed,
+        progress=within(progress, 0.13, 0.74),
+    )  # fmt: skip
     writing = within(progress, 0.74, 1.0)
     writing("writing routes, run cards and report", 0.0)
-    known = known_of(replace(state, notes=(*state.notes, *notes)), case, design, plan)
-    route = built_route(case, plan)
+    known = known_of(replace(state, notes=(*state.notes, *notes)), case, day.design, day.plan)
+    route = built_route(case, day.plan)
     content = replace(
-        report_content(case, information, design, plan, seed),
-        compared=recalled(efficiencies, design),
+        report_content(case, day.information, day.design, day.plan, seed),
+        compared=compared,
         route=route,
         known=known,
         command=words,
+        day=day.shortest,
     )
-    files = trial_files(case, growth, content, route, progress=writing)
+    files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     files |= {
         VESSEL_FILE: vessel_toml(state.ship, comments=[f"The rest of trial {case.name!r} is planned with it.",
                                                        f"Its model is {state.origin}."]),
@@ -130,9 +139,19 @@ def _replanned(
     }  # fmt: skip
     written = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
-    facts = {**growth_summary(growth, case), **design_summary(design), **plan_summary(plan)}
+    facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(day.plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
-    return Outcome(files=written, summary=summary, tables=(_table(known),))
+    return Outcome(files=written, summary=summary, tables=(_table(known), *day_tables(day)))
+
+
+def _stated_before(
+    state: PresentState, case: Scenario, information: Sequence[PrimitiveInformation], seed: int
+) -> DurationDesign | None:
+    """The durations whose accuracy the whole trial was to have, without its data; None where none is asked for."""
+    if case.design.accuracy is None:
+        return None
+    before = replace(case, design=replace(case.design, prior_data=state.first.design.prior_data))
+    return designed(before, information, stated=state.first.vessel.model, seed=seed)
 
 
 def _check_runs(design: DurationDesign) -> None:
@@ -182,10 +201,12 @@ def _stated(vessel: Vessel) -> dict[str, float]:
 
 
 def _summary(known: Known) -> dict[str, object]:
-    left = () if known.remaining_stated else ("remaining_s is design.total_s less the time of the data",)
+    asked = math.isnan(known.remaining_s)
+    of_total = not (asked or known.remaining_stated)
+    left = ("remaining_s is design.total_s less the time of the data",) if of_total else ()
     return {
         "data_s": known.sailed_s,
-        "remaining_s": known.remaining_s,
+        **({} if asked else {"remaining_s": known.remaining_s}),
         "model": known.model,
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
