@@ -260,9 +260,10 @@ def found_sentence(day: ShortestDay) -> str:
             f"legs included, holds {words.percent(day.information)} of the information that the optimal durations "
             f"would in {words.duration(day.design.problem.total_s)}."
         )
+    known = " with what was known before," if day.design.problem.prior.any() else ""
     return (
-        f"It is the shortest of {tried} planned that is as accurate as asked for: its track, legs included, holds "
-        f"{words.percent(day.information)} of the information needed."
+        f"It is the shortest of {tried} planned that is as accurate as asked for: its track, legs included,{known} "
+        f"holds {words.percent(day.information)} of the information needed."
     )
 
 
