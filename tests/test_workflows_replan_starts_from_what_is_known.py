@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,58 +12,20 @@ from expdesign.cli import main
 from expdesign.durations import DurationProblem, optimal_shares, solve_durations
 from expdesign.estimation.methods import estimate
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.scenario import load_scenario, load_vessel
-from expdesign.shortest_day import AccuracySettings, stated_accuracy
+from expdesign.scenario import load_scenario
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
 from expdesign.vessel import Mounting, Response
-from expdesign.workflows.steps import day
-from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.known import combined, expected_std, purchases
 from expdesign.workflows.steps.present import (
-    PresentState,
     _at_end,
-    _left,
     _standing,
     present_state,
     rest_of,
     weather_for_rest,
 )
-from expdesign.workflows.steps.scored import scored
-from expdesign.workflows.trials.replan import _stated_before
+from replan_case import NAMES, SAMPLES, SCENARIOS, SHIP, STORY, measured, wandering
 from scenario_files import spoil
-
-SCENARIOS = Path(__file__).parents[1] / "scenarios"
-STORY = SCENARIOS / "story.toml"
-SHIP = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
-SAMPLES = 200
-NAMES = ("time_s", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps")
-
-
-def wandering() -> Commands:
-    """Commands that excite every parameter: slow beats of both thrusters."""
-    time = np.arange(SAMPLES)
-    speeds = np.stack([7 + 4 * np.sin(time / 9), 6 + 5 * np.sin(time / 14 + 1)], axis=1)
-    angles = np.stack([0.9 * np.sin(time / 23), 0.8 * np.sin(time / 31 + 2)], axis=1)
-    values = np.stack([speeds[:, 0], angles[:, 0], speeds[:, 1], angles[:, 1]], axis=1)
-    return Commands(sample_time_s=1.0, names=SHIP.model.inputs, values=values)
-
-
-def measured(path: Path, *, noise: float = 1e-3, drop=(), degrees=False, pose=(-100.0, -450.0, 1.0)):
-    """A data file of the nominal ship; the last row's pose."""
-    commands, rng = wandering(), np.random.default_rng(0)
-    run = simulate(SHIP, commands, pose=np.array(pose))
-    state = np.concatenate([run.pose[:-1], run.velocity[:-1] + noise * rng.standard_normal((SAMPLES, 3))], axis=1)
-    table = dict(zip(NAMES, np.column_stack([np.arange(SAMPLES), state]).T, strict=True))
-    if degrees:
-        lat_lon = load_scenario(STORY).area.frame.to_degrees(state[:, :2])
-        table |= {"lat_deg": lat_lon[:, 0], "lon_deg": lat_lon[:, 1]}
-        drop = (*drop, "north_m", "east_m")
-    table |= dict(zip(("n1_rps", "a1_rad", "n2_rps", "a2_rad"), commands.values.T, strict=True))
-    kept = {name: values for name, values in table.items() if name not in drop}
-    rows = [",".join(kept), *(",".join(map(repr, row)) for row in np.array(list(kept.values())).T.tolist())]
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    return state[-1, :3]
 
 
 def refused(capsys, *arguments: object, status: int = 2) -> str:
@@ -159,39 +120,6 @@ def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
     assert counted.left_s == load_scenario(STORY).design.total_s - SAMPLES
     assert not counted.left_stated
     assert rest_of(present_state(STORY, [tmp_path / "a.csv"], remaining_s=240.0))[0].design.total_s == 240.0
-
-
-def shortest_day_so_far(folder: Path, remaining_s: float | None = None) -> PresentState:
-    """The story's trial, asked for in the shortest day, after 200 s."""
-    measured(folder / "a.csv")
-    state = present_state(STORY, [folder / "a.csv"], remaining_s=remaining_s)
-    asked = replace(state.first.design, accuracy=AccuracySettings(as_durations=True))
-    first = replace(state.first, design=asked)
-    return replace(state, first=first, left_s=_left(first, state.sailed_s, remaining_s))
-
-
-def test_the_rest_of_a_shortest_day_tells_most_in_the_time_left_where_that_is_stated(tmp_path: Path) -> None:
-    case, notes = rest_of(shortest_day_so_far(tmp_path, remaining_s=240.0))
-    assert case.design.accuracy is None
-    assert case.design.total_s == 240.0
-    assert [note for note in notes if "design.accuracy" in note]
-
-
-def test_else_it_lacks_what_the_data_do_not_tell_of_the_same_accuracy(tmp_path: Path, monkeypatch) -> None:
-    state = shortest_day_so_far(tmp_path)
-    assert np.isnan(state.left_s)
-    case, _ = rest_of(state)
-    information = tuple(scored(case))
-    design, reference = designed(case, information), _stated_before(state, case, information, 0)
-    asked = []
-    monkeypatch.setattr(day, "_searched", lambda case, information, design, accuracy, *_: asked.append(accuracy))
-    day.planned_day(case, information, design, reference=reference)
-    (lacking,) = asked
-    whole = stated_accuracy(case.design.accuracy, reference, case.vessel)
-    enough = whole.samples * np.tensordot(reference.fractions, reference.problem.matrices, axes=1)
-    assert whole.margin(enough) == pytest.approx(0.0, abs=1e-6)
-    assert lacking.margin(enough) > 0.01  # with the data it is more than enough
-    assert lacking.margin(enough - lacking.prior) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_data_that_fill_the_whole_time_need_a_word_about_what_is_left(tmp_path, capsys):

@@ -86,7 +86,7 @@ def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
 
 def _time_left(known: Known) -> str:
     if math.isnan(known.remaining_s):
-        return "as long as the accuracy asked for takes"
+        return "as long as the day asked for takes"
     left, whole = words.duration(known.remaining_s), words.duration(known.total_s)
     if known.remaining_stated:
         return f"{left}, as stated"

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from expdesign.durations import efficiencies
-from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import drafted, loaded, written
-from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
+from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
@@ -54,7 +52,7 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
     design = designed(case, information, seed=seed, progress=within(progress, 0.05, 0.13))
     progress("comparing criteria", 0.13)
-    compared = recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design)
+    compared = compared_criteria(case, design)
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 0.83))
     writing = within(progress, 0.83, 1.0)
     writing("writing routes, run cards and report", 0.0)

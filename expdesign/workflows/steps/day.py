@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec
-from expdesign.durations import DurationDesign
+from expdesign.durations import DurationDesign, Efficiencies, efficiencies
 from expdesign.errors import InputError, NoAnswer
 from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
@@ -292,6 +292,11 @@ def _information_bound(found: ShortestDay) -> dict[str, object]:
     if bound is None or not bound.information_s > 0 or found.most_s is None or found.design.problem.prior.any():
         return {}
     return {"information_bound": found.most_s / bound.information_s}
+
+
+def compared_criteria(case: Scenario, design: DurationDesign) -> tuple[Efficiencies, ...]:
+    """The design under every criterion; without its whole runs where a day chooses others."""
+    return tuple(recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design))
 
 
 def day_summary(day: Day) -> dict[str, object]:

@@ -19,6 +19,7 @@ from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.scenario_file import berth_problem
+from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, delivered_at_samples
 from expdesign.values import Array, seal
@@ -256,7 +257,9 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
     if settings.least_s or settings.most_s or settings.required or settings.budgets:
         notes = (*notes, "Limits of the scenario's [design] on times, runs and budgets apply to the rest of the trial.")
     accuracy = settings.accuracy
-    if accuracy is not None and state.left_stated:
+    if accuracy is not None and not state.left_stated:
+        accuracy = _left_of_day(accuracy, state.sailed_s)
+    elif accuracy is not None:
         accuracy = None
         notes = (*notes, "The rest tells most in the time left, as --remaining asks, not what design.accuracy lacks.")
     design = replace(
@@ -277,6 +280,23 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
         environment=weather,
     )
     return case, notes
+
+
+def _left_of_day(asked: AccuracySettings, sailed_s: float) -> AccuracySettings:
+    """What is asked of the day, its lengths less the time sailed.
+
+    Raises:
+        InputError: no time is left.
+    """
+    lengths = {"design.day_s": asked.day_s, "design.accuracy.most_s": asked.most_s}
+    for key, length_s in lengths.items():
+        if length_s is not None and length_s <= sailed_s:
+            raise InputError(
+                f"the data last {sailed_s:g} s and {key} is {length_s:g}: no time is left; expected a longer day, or "
+                "--remaining S, the informative time left"
+            )
+    day_s, most_s = (None if length_s is None else length_s - sailed_s for length_s in lengths.values())
+    return replace(asked, day_s=day_s, most_s=most_s)
 
 
 def _possible(

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.durations import DurationDesign, efficiencies
+from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
 from expdesign.information import PrimitiveInformation, estimated_parameters
-from expdesign.memory import recalled
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
@@ -26,7 +25,7 @@ from expdesign.vessel import Vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
 from expdesign.workflows.steps.case import drafted
-from expdesign.workflows.steps.day import day_files, day_summary, day_tables, planned_day
+from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
@@ -111,7 +110,7 @@ def _replanned(
     design = designed(
         case, information, stated=state.first.vessel.model, seed=seed, progress=within(progress, 0.05, 0.12)
     )
-    compared = recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design)
+    compared = compared_criteria(case, design)
     reference = _stated_before(state, case, information, seed)
     if reference is None:
         _check_runs(design)
