@@ -24,6 +24,7 @@ from expdesign.diagnosis.conclusions import (
     note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
+    note_on_predictions,
     note_on_random_current,
     note_on_stretches,
     note_on_unconverged,
@@ -46,14 +47,23 @@ from expdesign.diagnosis.fit import (
     with_longer_windows,
     within_stated_std,
 )
-from expdesign.diagnosis.judgement import LITTLE_FIT, errors_as_judged, harms, losses_without, without_harm
+from expdesign.diagnosis.judgement import (
+    LITTLE_FIT,
+    errors_as_judged,
+    found_by_predictions,
+    harms,
+    losses_without,
+    without_harm,
+)
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
+    Compared,
     Selection,
     Step,
+    compare_predictions,
     eliminate_backward,
     leading_candidates,
     select_forward,
@@ -72,8 +82,9 @@ LEAST_GAIN_WITHIN_STD = 1.0
 """Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
 MOST_SAMPLES = 400_000
 """Eleven hours at 10 Hz. 36,000 of 1 s take about 840 MiB of memory, the program's own included."""
-SIMULATED, VALIDATED, CONCLUDED = 18.0, 4.0, 25.0
-"""Work before the selection, of the cross-validation of a model, and of conclusions, in simulations of all data."""
+SIMULATED, VALIDATED, COMPARED, CONCLUDED = 18.0, 4.0, 80.0, 25.0
+"""Work before the selection, of the cross-validation of a model, of the comparison of causes by predictions, and of
+conclusions, in simulations of all data."""
 
 
 def diagnose(
@@ -181,6 +192,7 @@ class _Selected:
         re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
         validation: of other fits.
         rest: what is missing beside all causes, or instead of them.
+        compared: causes by their predictions; None where the search found some, or where the simulation explains much.
     """
 
     found: Selection
@@ -190,6 +202,7 @@ class _Selected:
     re_estimated: HeldOut | None
     validation: CrossValidation
     rest: Remainder
+    compared: Compared | None
 
     @property
     def refused(self) -> tuple[Step, ...]:
@@ -218,7 +231,11 @@ def _select(
     comparable = found.steps and found.first.keys and within_stated_std(found.first)
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
-    rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
+    compared, rejected = None, [step.chosen.fit for step in found.steps[len(kept.steps) :]]
+    if not kept.steps and _explains_little(accuracy(ship, data[1]), windows):
+        short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
+        compared = compare_predictions(begun, short, seed, progress)
+        kept, held = (compared and found_by_predictions(kept, compared, data, ship, seed)) or (kept, held)
     rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])
     return _Selected(
@@ -229,6 +246,7 @@ def _select(
         re_estimated=re_estimated,
         validation=validation,
         rest=rest,
+        compared=compared,
     )
 
 
@@ -242,18 +260,29 @@ def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tupl
 
 def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
     """What the simulation does not explain, where that is much more than noise; None elsewhere."""
-    if not ((after.fit < LITTLE_FIT) & _more_than_noise(after, windows)).any():
+    if not _explains_little(after, windows):
         return None
-    base, leads = chosen.held[len(chosen.kept.steps)], []
-    for item in leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests):
-        held = chosen.validation.measured_like(base, item.fit)
-        leads.append(Lead(item.candidate.cause, *held_out_gain(base, held, seed)))
+    if chosen.compared is not None:
+        named = {step.chosen.candidate.cause for step in chosen.kept.steps}
+        causes = [item for item in chosen.compared.causes if item.cause not in named][: SELECTION_TUNING.leads]
+        leads = [Lead(item.cause, item.gain, item.gain_interval) for item in causes]
+    else:
+        base = chosen.held[len(chosen.kept.steps)]
+        fitted = leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests)
+        held = [chosen.validation.measured_like(base, item.fit) for item in fitted]
+        gains = [held_out_gain(base, one, seed) for one in held]
+        leads = [Lead(item.candidate.cause, *gain) for item, gain in zip(fitted, gains, strict=True)]
     return Unexplained(
         outputs=after.outputs,
         fit=after.fit,
         force_share=unmeasured_force_share(chosen.kept.last.linear, after.outputs),
         leads=tuple(sorted((lead for lead in leads if lead.gain > 0), key=lambda lead: -lead.gain)),
     )
+
+
+def _explains_little(after: Accuracy, windows: Windows) -> bool:
+    """Whether a simulation explains little of some output whose error is much more than noise."""
+    return bool(((after.fit < LITTLE_FIT) & _more_than_noise(after, windows)).any())
 
 
 def _more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
@@ -309,13 +338,17 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
 
 
 def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
-    notes = [
-        *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
-        *note_beside_the_same_fit(chosen.kept, chosen.held, chosen.re_estimated, seed),
-        *notes_on_rejected(chosen.found, chosen.rest.kept, unit),
-    ]
-    if chosen.kept.first.keys:
-        notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
+    rejected = notes_on_rejected(chosen.found, chosen.rest.kept, unit)
+    if chosen.compared is not None and chosen.kept.steps:
+        notes = [*note_on_predictions(chosen.before, chosen.held[1], chosen.kept, seed), *rejected]
+    else:
+        notes = [
+            *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
+            *note_beside_the_same_fit(chosen.kept, chosen.held, chosen.re_estimated, seed),
+            *rejected,
+        ]
+        if chosen.kept.first.keys:
+            notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))
 

@@ -13,18 +13,26 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import (
     AHEAD_S,
     CrossValidation,
+    Fit,
+    FitOptions,
     HeldOut,
     cluster_robust,
+    fit,
     held_out_gain,
     judged,
     leads_away,
+    log_likelihood_gain,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import simulate_from_measured
+from expdesign.diagnosis.motion import initial_states, simulate_from_measured
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
+    Compared,
+    ComparedCause,
+    FittedCandidate,
     Selection,
+    Step,
     fitted_ahead,
     improves_held_out,
     only_nuisance,
@@ -113,6 +121,68 @@ def _cross_validated(
     if fitted:
         results[:2] = [max(results[:2], key=lambda held: held.mean_fit)]
     return results
+
+
+def found_by_predictions(
+    kept: Selection, compared: Compared, data: tuple[Windows, Record], ship: ExtendedModel, seed: int
+) -> tuple[Selection, list[HeldOut]] | None:
+    """The cause that gains most for certain in predictions, and errors on held-out data without and with it.
+
+    None where no cause does with which the data are simulated no worse than by the model in use.
+
+    Args:
+        kept: a selection without causes.
+        compared: causes, by their predictions.
+        data: as compared, and as measured.
+        ship: the model in use.
+        seed: of the intervals.
+    """
+    windows, record = data
+    for item in compared.causes:
+        if not item.is_certain or harms(ship, item.fit.ship, record):
+            continue
+        chosen = _fitted_to_all(item, kept.first, windows)
+        if chosen is None:
+            continue
+        rivals = [
+            _fitted_to_all(other, kept.first, windows)
+            for other in compared.causes
+            if other is not item and other.is_certain and not _gains_for_certain([other.held, item.held], seed)
+        ]
+        step = Step(
+            chosen=chosen,
+            p_value=item.p_value,
+            alternatives=tuple(other for other in rivals if other is not None),
+            before=kept.first,
+            tests=compared.tests,
+        )
+        left = tuple(test for test in kept.last_tests if test.candidate.cause != item.cause)
+        found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left)
+        return found, [compared.without, item.held]
+    return None
+
+
+def _fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:
+    """A cause as it was fitted to short stretches, with the noise of the long windows; None where that diverges there.
+
+    Its standard errors are those of the scatter from stretch to stretch.
+    """
+    ahead = cluster_robust(item.fit, np.arange(float(len(item.fit.starts))))
+    free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
+    try:
+        found = fit(ahead.ship, windows, free, starts=starts, options=FitOptions(steps=0))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    gain = log_likelihood_gain(first, found)
+    point = item.point
+    return FittedCandidate(
+        candidate=point.test.candidate,
+        fit=replace(found, covariance=ahead.covariance),
+        likelihood_gain=gain,
+        penalised_gain=gain - SELECTION_TUNING.price * (len(point.keys) + (point.profiled is not None)),
+        keys=point.keys,
+        profiled=point.profiled,
+    )
 
 
 def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows) -> Array:

@@ -9,7 +9,12 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions.verdict import has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
-from expdesign.diagnosis.select import SELECTION_TUNING, Selection, gain_beside_the_same_fit
+from expdesign.diagnosis.select import (
+    SELECTION_TUNING,
+    Selection,
+    gain_beside_the_same_fit,
+    same_effects_as_any,
+)
 from expdesign.diagnosis.vessel_file import public_name
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
@@ -96,13 +101,13 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
         kept: what backward elimination left of it.
         unit: what gains are measured on.
     """
-    names = {id(step.chosen.candidate) for step in kept.steps}
+    named = [step.chosen.candidate for step in kept.steps]
     return tuple(
         f"The data show a sign of {missing_effect(step.chosen.candidate.cause)} (p = {step.p_value:.1g}). It is not "
         f"a finding: on {unit} held out of the fit it takes less than 1 % off any error or gains nothing significant, "
         "or its size may be zero."
         for step in found.steps
-        if id(step.chosen.candidate) not in names
+        if not same_effects_as_any(step.chosen.candidate, named)
     )
 
 
@@ -161,6 +166,25 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
         "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
         f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state, a fifth of every "
         "run held out at a time. In a stretch an error counts as no larger than that of the run's mean.",
+    )
+
+
+def note_on_predictions(as_stated: HeldOut, found: HeldOut, kept: Selection, seed: int) -> tuple[str, ...]:
+    """How a cause was found that a search by likelihood did not find, and its gain on the model in use as it is.
+
+    Args:
+        as_stated: errors of the model in use as its file states it, in stretches.
+        found: those with the cause, held out.
+        kept: the cause.
+        seed: of the interval.
+    """
+    gain, (low, high) = held_out_gain(as_stated, found, seed)
+    return (
+        "The search by likelihoods found no certain cause. So causes were compared by predictions in stretches of "
+        f"{AHEAD_S:g} s, a fifth of every run held out at a time, each with the same model re-estimated without it: "
+        "the parameters of the vessel file may have been fitted to these data too. On the model as its file states "
+        f"it, the gain of {missing_effect(kept.steps[0].chosen.candidate.cause)} with all parameters re-estimated is "
+        f"{gain:+.1f} points ({low:.1f} to {high:.1f}).",
     )
 
 

@@ -10,6 +10,7 @@ from expdesign.diagnosis.fit.cross_validation import (
     HeldOut,
     bootstrap_sums,
     cross_validate,
+    cross_validate_ahead,
     held_out_gain,
     judged,
     leads_away,
@@ -42,7 +43,7 @@ from expdesign.diagnosis.fit.linear_model import (
     in_groups,
     sensitivities_to,
 )
-from expdesign.diagnosis.fit.output_error import fit_ahead, with_longer_windows
+from expdesign.diagnosis.fit.output_error import fit_ahead, fit_output_error, with_longer_windows
 from expdesign.diagnosis.fit.prediction import prediction_gain
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
@@ -64,11 +65,13 @@ __all__ = [
     "cluster_robust",
     "continuing",
     "cross_validate",
+    "cross_validate_ahead",
     "deviations_of",
     "difference_step",
     "effect_disturbances",
     "fit",
     "fit_ahead",
+    "fit_output_error",
     "gram_matrices",
     "held_out_gain",
     "in_groups",

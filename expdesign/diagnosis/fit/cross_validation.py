@@ -194,6 +194,20 @@ def _stretch_folds(effects: _Effects | None, ship: ExtendedModel, windows: Windo
     )
 
 
+def cross_validate_ahead(found: Fit) -> HeldOut:
+    """Errors of a model fitted by output error in short stretches, without one part of every run at a time."""
+    short = found.linear.motion.windows
+    folds = _Folds(
+        ship=found.ship,
+        windows=short,
+        unit=_parts_of_runs(short),
+        part=np.arange(float(len(short.batch))),
+        fitted=partial(_fitted_to_stretches, _Effects.of(found)),
+        in_stretches=True,
+    )
+    return replace(_of_folds(folds), in_stretches=True, models=())
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Folds:
     """What is cross-validated.
@@ -327,6 +341,15 @@ def _fitted_ahead(
 ) -> ExtendedModel | None:
     """The same by output error in short stretches, with the units of the windows of the fit and of the stretches."""
     ship, free = effects.seen(np.isin(unit, of_short[train]))
+    try:
+        return fit_output_error(ship, short.selected(train), free).ship
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def _fitted_to_stretches(effects: _Effects, short: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
+    """The same, of effects that were fitted to stretches."""
+    ship, free = effects.seen(train)
     try:
         return fit_output_error(ship, short.selected(train), free).ship
     except (FloatingPointError, np.linalg.LinAlgError):

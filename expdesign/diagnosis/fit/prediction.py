@@ -35,6 +35,8 @@ def prediction_gain(
         windows: all data.
         noise: that both are whitened by.
     """
+    if not before.models or not after.models:
+        return np.nan, (np.nan, np.nan)
     lost, left = (np.concatenate([_squares(*one, windows, noise) for one in held.models]) for held in (before, after))
     if lost.shape != left.shape or len(lost) < 2:
         return np.nan, (np.nan, np.nan)

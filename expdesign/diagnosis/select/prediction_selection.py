@@ -1,0 +1,146 @@
+"""The cause that predicts best a short time ahead, where a search by likelihood finds none.
+
+Where the simulation explains little, the likelihood takes much of the error for slow noise, and tests beside such noise
+say little. Here models are fitted by output error in short stretches. Every cause is compared with the same model
+without it, fitted to the same other stretches: parameters of a file that were fitted to these data have seen what is
+held out, and would hide its gain.
+
+Sources: F. Wilcoxon, Biometrics Bulletin 1 (1945), 80-83, for the signed-rank test; L. Ljung, System Identification,
+2nd ed. (1999), section 16.6, for the choice of models by cross-validation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from expdesign.diagnosis.causes import Candidate
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate_ahead, fit_output_error, held_out_gain, on_common_units
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
+from expdesign.diagnosis.select.selection_round import open_candidates
+from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, starting_point
+from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.processes import in_order
+from expdesign.progress import Progress
+
+RE_ESTIMATED = "parameters"
+"""No cause here: all models have their uncertain parameters fitted."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ComparedCause:
+    """A cause compared with the same model without it.
+
+    Attributes:
+        point: where its fit began.
+        fit: to all short stretches.
+        held: errors on held-out stretches.
+        gain, gain_interval: on the model without it [points].
+        p_value: of the signed-rank test over stretches, times the number of causes that were compared.
+    """
+
+    point: StartingPoint
+    fit: Fit
+    held: HeldOut
+    gain: float
+    gain_interval: tuple[float, float]
+    p_value: float
+
+    @property
+    def cause(self) -> str:
+        """Its name in the catalogue."""
+        return self.point.test.candidate.cause
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
+        possible = self.point.test.candidate.is_possible(self.fit.value)
+        clear = self.gain > TUNING.clear_gain_points and self.gain_interval[0] > 0.0
+        return possible and clear and self.p_value <= TUNING.accepted_p_value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Compared:
+    """Causes compared by predictions.
+
+    Attributes:
+        without: errors on held-out stretches of the model without any of them, its uncertain parameters fitted.
+        causes: with the largest gain first.
+        tests: that chose them.
+    """
+
+    without: HeldOut
+    causes: tuple[ComparedCause, ...]
+    tests: tuple[ScoreTest, ...]
+
+
+def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress: Progress) -> Compared | None:
+    """The likeliest causes in short stretches, compared; None where the model cannot be fitted there.
+
+    Args:
+        ship: the model that the search for causes begins with.
+        short: data in short stretches.
+        seed: of the gains' intervals.
+        progress: of all of it.
+    """
+    activity = "comparing causes by predictions"
+    progress(activity, 0.0)
+    try:
+        base = fit_output_error(ship, short, ())
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    candidates = [item for item in open_candidates(base, short) if item.cause != RE_ESTIMATED]
+    tests = score_tests(base, candidates)
+    without = cross_validate_ahead(base)
+    shortlist = _best_of_each_cause(tests)
+    found = []
+    for number, fitted in enumerate(in_order(_fitted, (base,), [(test,) for test in shortlist])):
+        progress(activity, (1.0 + number) / (1.0 + len(shortlist)))
+        if fitted is not None:
+            found.append(_compared(*fitted, without, len(shortlist), seed))
+    return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests)
+
+
+def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:
+    """The likeliest candidate of each of the likeliest causes."""
+    found: dict[str, ScoreTest] = {}
+    for test in sorted(tests, key=lambda item: TUNING.price * item.candidate.size - item.statistic):
+        found.setdefault(_kind(test.candidate), test)
+    return [*found.values()][: TUNING.shortlist]
+
+
+def _kind(candidate: Candidate) -> str:
+    """Its entry in the catalogue, which holds any missing term."""
+    return candidate.cause.split(":")[0]
+
+
+def _fitted(base: Fit, test: ScoreTest) -> tuple[StartingPoint, Fit, HeldOut] | None:
+    """A candidate fitted to all stretches, and its errors on those held out; None where it cannot be fitted."""
+    point, short = starting_point(base, test), base.linear.motion.windows
+    try:
+        found = fit_output_error(base.ship.with_effects(point.effects), short, joint_keys(base, point.keys))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    return point, found, cross_validate_ahead(found)
+
+
+def _compared(
+    point: StartingPoint, found: Fit, held: HeldOut, without: HeldOut, count: int, seed: int
+) -> ComparedCause:
+    gain, interval = held_out_gain(without, held, seed)
+    p_value = min(1.0, count * _signed_rank_p_value(without, held))
+    return ComparedCause(point=point, fit=found, held=held, gain=gain, gain_interval=interval, p_value=p_value)
+
+
+def _signed_rank_p_value(without: HeldOut, held: HeldOut) -> float:
+    """That errors of stretches, as logarithms of squares averaged over outputs, are no less with a cause."""
+    pair = on_common_units(without, held)
+    lost, left = (np.log(np.maximum(item.squared_error, 1e-300)).mean(axis=1) for item in pair)
+    if len(lost) == 0 or not (lost - left).any():
+        return 1.0
+    return float(scipy.stats.wilcoxon(lost - left, alternative="greater").pvalue)
