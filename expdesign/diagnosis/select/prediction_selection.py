@@ -108,9 +108,11 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
 
 def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:
     """The likeliest candidate of each of the likeliest causes."""
+    least = TUNING.least_statistic_share * max((item.statistic for item in tests), default=0.0)
     found: dict[str, ScoreTest] = {}
     for test in sorted(tests, key=lambda item: TUNING.price * item.candidate.size - item.statistic):
-        found.setdefault(_kind(test.candidate), test)
+        if test.statistic >= least - TUNING.statistic_margin:
+            found.setdefault(_kind(test.candidate), test)
     return [*found.values()][: TUNING.shortlist]
 
 
