@@ -10,7 +10,7 @@ import pytest
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut
-from expdesign.diagnosis.select.prediction_selection import Compared, _signed_rank_p_value, compare_predictions
+from expdesign.diagnosis.prediction_comparison import Compared, _signed_rank_p_value, compare_predictions
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import silent
 from expdesign.signals import Record

@@ -162,7 +162,7 @@ def test_held_out_runs_show_an_effect_as_large_as_the_noise_and_not_one_lost_in_
 
     assert share(simulated(1.0)) == 1.0
     assert share(simulated(0.1, noise=1.0)) < 0.3
-    assert share(simulated(0.1, noise=0.1)) == 1.0  # simulations as accurate as the effect is large
+    assert share(simulated(0.1, noise=0.1)) > 0.9  # simulations as accurate as the effect is large
 
 
 def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float, float]:

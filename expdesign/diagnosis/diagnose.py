@@ -57,13 +57,12 @@ from expdesign.diagnosis.judgement import (
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
+from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
 from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
-    Compared,
     Selection,
     Step,
-    compare_predictions,
     eliminate_backward,
     leading_candidates,
     select_forward,

@@ -26,10 +26,9 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, simulate_from_measured
+from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
-    Compared,
-    ComparedCause,
     FittedCandidate,
     Selection,
     Step,

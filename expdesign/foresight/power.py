@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
-from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, simulates_better
+from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, falls_for_certain, simulates_better
 from expdesign.foresight.information import SimulatedUnits, beside_nuisance
 from expdesign.foresight.tuning import TUNING
 from expdesign.values import Array
@@ -194,7 +194,7 @@ def _are_shown(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, 
         _is_shown(
             HeldOut(squared_error=lost[n], squared_deviation=units.squared_deviation),
             HeldOut(squared_error=squared[n], squared_deviation=units.squared_deviation),
-            1.0 - float(whitened[n].sum() / whitened_lost[n].sum()),
+            np.log(whitened[n] / whitened_lost[n]),
         )
         for n in range(len(trials.truth))
     ]
@@ -230,12 +230,21 @@ def _errors(
     return np.maximum(squared, 0.0), whitened
 
 
-def _is_shown(before: HeldOut, after: HeldOut, predicted: float) -> bool:
-    """Whether simulations of held-out units, or at least predictions by a share, get better."""
+def _is_shown(before: HeldOut, after: HeldOut, ratios: Array) -> bool:
+    """Whether held-out units show a first cause, as a diagnosis asks for.
+
+    Args:
+        before: errors of simulating them without it; after: with it.
+        ratios: (k,) logarithms of the squared errors of predicting the samples of each, with it over without.
+    """
     gained = held_out_gain(before, after, 0)
-    if simulates_better(before, after, gained):
-        return True
-    return gained[1][1] >= 0.0 and predicted >= SELECTION_TUNING.least_predicted
+    middle, error = float(ratios.mean()), 1.96 * float(ratios.std(ddof=1)) / np.sqrt(len(ratios))
+    predicts, share = middle + error < 0.0, 1.0 - np.exp(middle)
+    better = simulates_better(before, after, gained)
+    if gained[1][0] > 0.0 or gained[1][1] < 0.0:
+        return better
+    shows = predicts or falls_for_certain(before, after, 0)
+    return bool((better and shows) or (predicts and share >= SELECTION_TUNING.least_predicted))
 
 
 def _root(A: Array) -> Array:

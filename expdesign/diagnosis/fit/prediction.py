@@ -40,7 +40,8 @@ def prediction_gain(
     lost, left = (np.concatenate([_squares(*one, windows, noise) for one in held.models]) for held in (before, after))
     if lost.shape != left.shape or len(lost) < 2:
         return np.nan, (np.nan, np.nan)
-    ratios = np.log(left / lost)
+    with np.errstate(invalid="ignore"):
+        ratios = np.log(left / lost)  # nan where both models run away
     middle, error = ratios.mean(), 1.96 * ratios.std(ddof=1) / np.sqrt(len(ratios))
     share, most, least = (1.0 - np.exp([middle, middle - error, middle + error])).tolist()
     return share, (least, most)

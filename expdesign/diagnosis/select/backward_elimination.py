@@ -137,7 +137,7 @@ def improves_held_out(
     _, (low, high) = gains[0] if gains else (0.0, (0.0, -np.inf))
     if high >= 0.0 and low <= 0.0:
         share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
-        shows = least > 0.0 or _falls_for_certain(held[0], held[1], seed)
+        shows = least > 0.0 or falls_for_certain(held[0], held[1], seed)
         shows = shows or (held[1].ahead is not None and _is_certain_ahead(held, 0, seed, gains[0]))
         if not shows:
             beside = gain_beside_the_same_fit(found, held, re_estimated, seed)
@@ -159,7 +159,7 @@ def gain_beside_the_same_fit(
     return held_out_gain(re_estimated.like(held[1]), held[1], seed)
 
 
-def _falls_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
+def falls_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
     """Whether the error of some output falls, by an interval that excludes zero."""
     one, other = on_common_units(before, after)
     lost, left = (held.squared_error for held in bootstrap_sums(one, other, seed))

@@ -21,10 +21,15 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate_ahead, fit_output_error, held_out_gain, on_common_units
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
-from expdesign.diagnosis.select.selection_round import open_candidates
-from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, starting_point
-from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.diagnosis.select import (
+    SELECTION_TUNING,
+    ScoreTest,
+    StartingPoint,
+    joint_keys,
+    open_candidates,
+    score_tests,
+    starting_point,
+)
 from expdesign.processes import in_order
 from expdesign.progress import Progress
 
@@ -60,8 +65,8 @@ class ComparedCause:
     def is_certain(self) -> bool:
         """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
         possible = self.point.test.candidate.is_possible(self.fit.value)
-        clear = self.gain > TUNING.clear_gain_points and self.gain_interval[0] > 0.0
-        return possible and clear and self.p_value <= TUNING.accepted_p_value
+        clear = self.gain > SELECTION_TUNING.clear_gain_points and self.gain_interval[0] > 0.0
+        return possible and clear and self.p_value <= SELECTION_TUNING.accepted_p_value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,12 +113,12 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
 
 def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:
     """The likeliest candidate of each of the likeliest causes."""
-    least = TUNING.least_statistic_share * max((item.statistic for item in tests), default=0.0)
+    least = SELECTION_TUNING.least_statistic_share * max((item.statistic for item in tests), default=0.0)
     found: dict[str, ScoreTest] = {}
-    for test in sorted(tests, key=lambda item: TUNING.price * item.candidate.size - item.statistic):
-        if test.statistic >= least - TUNING.statistic_margin:
+    for test in sorted(tests, key=lambda item: SELECTION_TUNING.price * item.candidate.size - item.statistic):
+        if test.statistic >= least - SELECTION_TUNING.statistic_margin:
             found.setdefault(_kind(test.candidate), test)
-    return [*found.values()][: TUNING.shortlist]
+    return [*found.values()][: SELECTION_TUNING.shortlist]
 
 
 def _kind(candidate: Candidate) -> str:
