@@ -291,11 +291,24 @@ class Guidance:
         return build_return_paths(self._water.narrowest_graph, self._followers.goal[:2])
 
     def _near(self, ships: np.ndarray, given: Array) -> Array:
-        """(k, m) commands to whose angles azimuths keep: those of the run for ships that approach it under way."""
+        """(k, m) commands to whose angles azimuths keep: those of the run for ships on their last stretch to it.
+
+        On a long leg they would push astern all the way where the run begins astern.
+        """
         if not self._moves:
             return given
         ready = self._inputs + whole_turns(given - self._inputs) * self._free
-        return np.where((self.doing[ships] == TRACKING)[:, None], ready, given)
+        near = (self.doing[ships] == TRACKING) & (self._end[ships] - self._at[ships] <= self._ready)
+        return np.where(near[:, None], ready, given)
+
+    @cached_property
+    def _ready(self) -> float:
+        """Samples of the reference before the start, from which on azimuths are near their angles: those of a run-up,
+        and of half a turn of an azimuth."""
+        vessel = self._helm.vessel
+        rates = [limit.rate for limit, free in zip(vessel.limits, vessel.turns_freely, strict=True) if free]
+        half_turn_s = np.pi / min(rates, default=np.inf)
+        return self._arrival - self._first + half_turn_s / vessel.sample_time_s
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) desired states of ships (k,) over the next sample; references advance."""
