@@ -172,6 +172,34 @@ def test_a_leg_too_short_to_return_to_is_sailed_beside_its_place_as_far_as_the_r
     assert (soon[2:] <= late[2:]).all()
 
 
+def test_a_long_leg_to_a_run_that_begins_sideways_takes_no_longer_than_one_to_a_run_ahead():
+    """Azimuths turn to the angles of the run on its last stretch.
+
+    Kept near 90 degrees on the whole leg, they would push ahead one sample and astern the next.
+    """
+    water = replace(leg_water(OPEN, clearance_m=5.0), environment=Environment(current_to=np.array([0.05, 0.1])))
+    end = np.array([300.0, 0.0, 0.0, 0.5, 0.0, 0.0])
+    task = LegTask(start=at_rest(0, 0, 0.0), end=end, start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1)
+    track = water.sail(task.start, find_leg(task, water))
+    took = {}
+    for angle in (0.0, -np.pi / 2):
+        rng = np.random.default_rng(0)
+        truths = draw_truths(water.vessel, water.environment, 20, rng)
+        fleet = Fleet(water.vessel, water.environment, truths, state=task.start, standing=np.zeros(4), rng=rng)
+        guidance = Guidance(
+            Helmsman(vessel=water.vessel, environment=water.environment, ship=water.ship),
+            water,
+            np.hstack([track.pose, track.velocity]),
+            within=tolerances(water),
+            sailing=np.ones(20, dtype=bool),
+            inputs=np.array([5.0, angle, 5.0, angle]),
+            last=False,
+        )
+        found = guidance.sail(fleet, np.zeros((20, 3)))
+        took[angle] = np.median(found.samples[found.begun])
+    assert took[-np.pi / 2] < 1.1 * took[0.0]
+
+
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
     legs = planned().legs
     reach = float(planned().trajectory.pose[legs[0].last, 0])

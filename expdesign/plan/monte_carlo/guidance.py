@@ -293,7 +293,7 @@ class Guidance:
     def _near(self, ships: np.ndarray, given: Array) -> Array:
         """(k, m) commands to whose angles azimuths keep: those of the run for ships on their last stretch to it.
 
-        On a long leg they would push astern all the way where the run begins astern.
+        On the whole leg to a run that begins sideways they would push ahead one sample and astern the next.
         """
         if not self._moves:
             return given
@@ -303,12 +303,10 @@ class Guidance:
 
     @cached_property
     def _ready(self) -> float:
-        """Samples of the reference before the start, from which on azimuths are near their angles: those of a run-up,
-        and of half a turn of an azimuth."""
+        """Samples of the reference before the start in which azimuths make half a turn."""
         vessel = self._helm.vessel
         rates = [limit.rate for limit, free in zip(vessel.limits, vessel.turns_freely, strict=True) if free]
-        half_turn_s = np.pi / min(rates, default=np.inf)
-        return self._arrival - self._first + half_turn_s / vessel.sample_time_s
+        return np.pi / min(rates, default=np.inf) / vessel.sample_time_s
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) desired states of ships (k,) over the next sample; references advance."""
