@@ -291,22 +291,25 @@ class Guidance:
         return build_return_paths(self._water.narrowest_graph, self._followers.goal[:2])
 
     def _near(self, ships: np.ndarray, given: Array) -> Array:
-        """(k, m) commands to whose angles azimuths keep: those of the run for ships on their last stretch to it.
-
-        On the whole leg to a run that begins sideways they would push ahead one sample and astern the next.
-        """
+        """(k, m) commands to whose angles azimuths keep: those of the run for ships on their last stretch to it."""
         if not self._moves:
             return given
         ready = self._inputs + whole_turns(given - self._inputs) * self._free
-        near = (self.doing[ships] == TRACKING) & (self._end[ships] - self._at[ships] <= self._ready)
-        return np.where(near[:, None], ready, given)
+        left = np.where(self.doing[ships] == TRACKING, self._end[ships] - self._at[ships], np.inf)
+        return np.where(left[:, None] <= self._ready, ready, given)
 
     @cached_property
-    def _ready(self) -> float:
-        """Samples of the reference before the start in which azimuths make half a turn."""
+    def _ready(self) -> Array:
+        """(m,) samples before the start from which on azimuths keep near their angles at it.
+
+        Those of half a turn, and those of a run-up too, unless the run begins with thrust to the side: near such an
+        angle they would push ahead one sample and astern the next.
+        """
         vessel = self._helm.vessel
         rates = [limit.rate for limit, free in zip(vessel.limits, vessel.turns_freely, strict=True) if free]
-        return np.pi / min(rates, default=np.inf) / vessel.sample_time_s
+        half_turn = np.pi / min(rates, default=np.inf) / vessel.sample_time_s
+        sideways = np.abs(np.cos(self._inputs)) < MONTE_CARLO.sideways_share
+        return half_turn + np.where(sideways, 0.0, self._arrival - self._first)
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
         """(k, 6) desired states of ships (k,) over the next sample; references advance."""

@@ -43,6 +43,7 @@ class Tuning:
         bend_speed: least speed at bends and while the bow points elsewhere, in transit speeds.
         braking: share of the mean acceleration that is used for slowing down on return paths.
         sideways_speed: sideways and astern, in transit speeds.
+        sideways_share: of an azimuth's thrust ahead or astern, below which it counts as to the side.
         look_ahead_hulls: of helm-steered ships on return paths (line of sight guidance).
         bend_hulls: distance from a bend at which a ship has reached it.
         nodes_radii: distances from the goal of the poses through which go-arounds lead, in turning radii.
@@ -84,6 +85,7 @@ class Tuning:
     bend_speed: float = 0.25
     braking: float = 0.5
     sideways_speed: float = 0.5
+    sideways_share: float = 0.5
     look_ahead_hulls: float = 1.5
     bend_hulls: float = 0.4
     nodes_radii: tuple[float, ...] = (2.0, 4.0, 7.0, 11.0)
