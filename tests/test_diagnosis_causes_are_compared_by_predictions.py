@@ -43,6 +43,18 @@ def test_where_nothing_is_hidden_nothing_is_certain():
     assert not [item.cause for seed in range(4) for item in compared(trial(seed)).causes if item.is_certain]
 
 
+def test_a_current_that_wanders_gains_and_is_no_certain_cause():
+    """Nothing is hidden but weather: a steady current predicts better by six points."""
+    record = hidden_record("tug", seed=103, batches=3, samples=240)
+    ship = extended_model(vessel_of("tug", relative_std=0.1), record)
+    found = compare_predictions(ship, cut_windows(ship.model, record, longest_s=AHEAD_S), 0, silent)
+    assert found is not None
+    first = found.causes[0]
+    assert first.cause == "current"
+    assert first.gain_interval[0] > 0.0
+    assert not first.is_certain
+
+
 def errors(squared: np.ndarray) -> HeldOut:
     return HeldOut(squared_error=squared, squared_deviation=np.ones_like(squared))
 

@@ -35,6 +35,8 @@ from expdesign.progress import Progress
 
 RE_ESTIMATED = "parameters"
 """No cause here: all models have their uncertain parameters fitted."""
+CURRENT = "current"
+"""Never certain here: fits in stretches do not allow for a current that wanders, which gains as a steady one does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,8 +65,12 @@ class ComparedCause:
 
     @property
     def is_certain(self) -> bool:
-        """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
-        possible = self.point.test.candidate.is_possible(self.fit.value)
+        """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches.
+
+        Slow weather is none of those, nor what imitates it.
+        """
+        candidate = self.point.test.candidate
+        possible = candidate.is_possible(self.fit.value) and candidate.cause != CURRENT and not candidate.imitates
         clear = self.gain > SELECTION_TUNING.clear_gain_points and self.gain_interval[0] > 0.0
         return possible and clear and self.p_value <= SELECTION_TUNING.accepted_p_value
 
