@@ -127,7 +127,8 @@ def found_by_predictions(
 ) -> tuple[Selection, list[HeldOut]] | None:
     """The cause that gains most for certain in predictions, and errors on held-out data without and with it.
 
-    None where no cause does with which the data are simulated no worse than by the model in use.
+    None where no cause does with which the data are simulated no worse than by the model in use, or where slow weather
+    that nobody measured predicts about as well.
 
     Args:
         kept: a selection without causes.
@@ -137,8 +138,11 @@ def found_by_predictions(
         seed: of the intervals.
     """
     windows, record = data
+    weather = [other.held for other in compared.causes if other.is_slow_weather]
     for item in compared.causes:
-        if not item.is_certain or harms(ship, item.fit.ship, record):
+        if not item.is_certain or not all(_gains_for_certain([held, item.held], seed) for held in weather):
+            continue
+        if harms(ship, item.fit.ship, record):
             continue
         chosen = _fitted_to_all(item, kept.first, windows)
         if chosen is None:

@@ -36,7 +36,7 @@ from expdesign.progress import Progress
 RE_ESTIMATED = "parameters"
 """No cause here: all models have their uncertain parameters fitted."""
 CURRENT = "current"
-"""Never certain here: fits in stretches do not allow for a current that wanders, which gains as a steady one does."""
+"""Never certain here: one that wanders gains as a steady one does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,13 +64,15 @@ class ComparedCause:
         return self.point.test.candidate.cause
 
     @property
-    def is_certain(self) -> bool:
-        """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches.
-
-        Slow weather is none of those, nor what imitates it.
-        """
+    def is_slow_weather(self) -> bool:
+        """Whether it may be slow weather that nobody measured, which fits in stretches do not allow for."""
         candidate = self.point.test.candidate
-        possible = candidate.is_possible(self.fit.value) and candidate.cause != CURRENT and not candidate.imitates
+        return candidate.cause == CURRENT or candidate.imitates
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
+        possible = self.point.test.candidate.is_possible(self.fit.value) and not self.is_slow_weather
         clear = self.gain > SELECTION_TUNING.clear_gain_points and self.gain_interval[0] > 0.0
         return possible and clear and self.p_value <= SELECTION_TUNING.accepted_p_value
 
