@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -72,14 +73,17 @@ def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeyp
     """The finding carries its gain on the model without it that is fitted in the same way, and says so."""
 
     def nothing(found, _windows, cross_validated, *_):
-        none = found.with_steps(())
-        return cross_validated(none)
+        kept, held = cross_validated(found.with_steps(()))
+        return replace(kept, beside_stated=True), held
 
     monkeypatch.setattr(diagnosing, "eliminate_backward", nothing)
     record = trial(2, faults={"heading_bias": BIAS_RAD})
-    found = diagnosing.diagnose(vessel_of("coaster", relative_std=0.1), record)
+    vessel = vessel_of("coaster", relative_std=0.1)
+    found = diagnosing.diagnose(vessel, record)
     assert [item.cause for item in found.findings] == ["heading_bias"]
     (item,) = found.findings
+    assert (found.extended.model.parameters != vessel.model.parameters).any()  # re-estimated, with their new errors
+    assert (found.extended.model.parameter_std < vessel.model.parameter_std).any()
     assert item.gain_interval[0] > 0.0
     assert item.p_value < 0.025
     assert abs(item.estimates[0].value - BIAS_RAD) < 3.5 * item.estimates[0].std

@@ -160,7 +160,7 @@ def found_by_predictions(
             tests=compared.tests,
         )
         left = tuple(test for test in kept.last_tests if test.candidate.cause != item.cause)
-        found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left)
+        found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left, beside_stated=False)
         return found, [compared.without, item.held]
     return None
 

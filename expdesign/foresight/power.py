@@ -25,6 +25,8 @@ from expdesign.values import Array
 
 SHAPES = ("roll:period", "roll:damping")
 """Fixed effects of a candidate that its fit estimates too."""
+TINY = 1e-300
+"""Least squared error that has a logarithm."""
 
 
 def level_of(multiplicity: float) -> float:
@@ -194,7 +196,7 @@ def _are_shown(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, 
         _is_shown(
             HeldOut(squared_error=lost[n], squared_deviation=units.squared_deviation),
             HeldOut(squared_error=squared[n], squared_deviation=units.squared_deviation),
-            np.log(whitened[n] / whitened_lost[n]),
+            np.log(np.maximum(whitened[n], TINY) / np.maximum(whitened_lost[n], TINY)),
         )
         for n in range(len(trials.truth))
     ]
@@ -238,7 +240,8 @@ def _is_shown(before: HeldOut, after: HeldOut, ratios: Array) -> bool:
         ratios: (k,) logarithms of the squared errors of predicting the samples of each, with it over without.
     """
     gained = held_out_gain(before, after, 0)
-    middle, error = float(ratios.mean()), 1.96 * float(ratios.std(ddof=1)) / np.sqrt(len(ratios))
+    scatter = float(ratios.std(ddof=1)) if len(ratios) > 1 else np.inf
+    middle, error = float(ratios.mean()), 1.96 * scatter / np.sqrt(len(ratios))
     predicts, share = middle + error < 0.0, 1.0 - np.exp(middle)
     better = simulates_better(before, after, gained)
     if gained[1][0] > 0.0 or gained[1][1] < 0.0:

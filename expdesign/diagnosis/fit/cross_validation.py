@@ -202,7 +202,7 @@ def cross_validate_ahead(found: Fit) -> HeldOut:
         windows=short,
         unit=_parts_of_runs(short),
         part=np.arange(float(len(short.batch))),
-        fitted=partial(_fitted_to_stretches, _Effects.of(found)),
+        fitted=partial(_refitted_ahead, _Effects.of(found)),
         in_stretches=True,
     )
     return replace(_of_folds(folds), in_stretches=True, models=())
@@ -340,16 +340,17 @@ def _fitted_ahead(
     unit: Array, of_short: Array, effects: _Effects, short: Windows, train: NDArray[np.bool_]
 ) -> ExtendedModel | None:
     """The same by output error in short stretches, with the units of the windows of the fit and of the stretches."""
-    ship, free = effects.seen(np.isin(unit, of_short[train]))
-    try:
-        return fit_output_error(ship, short.selected(train), free).ship
-    except (FloatingPointError, np.linalg.LinAlgError):
-        return None
+    return _fitted_to_stretches(*effects.seen(np.isin(unit, of_short[train])), short, train)
 
 
-def _fitted_to_stretches(effects: _Effects, short: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
-    """The same, of effects that were fitted to stretches."""
-    ship, free = effects.seen(train)
+def _refitted_ahead(effects: _Effects, short: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
+    """The same of effects that were fitted to stretches."""
+    return _fitted_to_stretches(*effects.seen(train), short, train)
+
+
+def _fitted_to_stretches(
+    ship: ExtendedModel, free: tuple[str, ...], short: Windows, train: NDArray[np.bool_]
+) -> ExtendedModel | None:
     try:
         return fit_output_error(ship, short.selected(train), free).ship
     except (FloatingPointError, np.linalg.LinAlgError):
