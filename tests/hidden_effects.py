@@ -266,6 +266,7 @@ def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):
     du = th["X_vr"] * vr * r + (damp * dx + gain * (fx + kx) + extra["X"]) / (1 + e["load_u"]) / heavy
     dv = th["Y_ur"] * ur * r + (damp * dy + gain * fy + extra["Y"]) / (1 + e["load_v"]) / heavy
     dr = (damp * dn + gain * fn + extra["N"]) / (1 + e["load_r"]) / heavy
+    du, dv = du + r * (v - vr), dv - r * (u - ur)  # velocities over ground: the water's turn in the ship's axes
     if "roll_period_s" not in present:
         return u * c - v * s, u * s + v * c, r, du, dv, dr, p, 0.0
     on = e["roll_period_s"] > 0

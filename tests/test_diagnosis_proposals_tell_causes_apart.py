@@ -48,11 +48,18 @@ def test_the_wind_of_the_data_blows():
 
 
 def test_a_current_and_a_misaligned_sensor_part_where_the_ship_turns():
-    """On a straight run either is a constant sideways speed; in a circle the current comes from all sides."""
+    """On one straight course either is a constant sideways speed; in a circle the current comes from all sides."""
     ship, like = case("barge")
     current, bias = ship.with_effects({"current:east": 0.1}), ship.with_effects({"heading_bias": 0.05})
-    proposals = {one.name: one for one in standard_proposals(like, ship.model.inputs, 1.0)}
-    pair = [proposals["straight"], proposals["turning_circle"]]
+    pair = [
+        Proposal(
+            name=name,
+            inputs=np.tile([12.0, 0.0, moment], (240, 1)),
+            velocity=np.array([1.5, 0.0, 0.0]),
+            sample_time_s=1.0,
+        )
+        for name, moment in (("straight", 0.0), ("turning_circle", 50.0))
+    ]
     assert most_discriminating(current, [bias], pair, STD, like) == "turning_circle"
     assert most_discriminating(current, [current], pair, STD, like) is None
 

@@ -22,6 +22,7 @@ from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import Estimated, silent
 from expdesign.signals import Record
+from hidden_effects import Weather
 
 PERIOD_S = 200.0
 
@@ -44,7 +45,7 @@ def with_slow_sway_force(record: Record, size: float) -> Record:
 
 
 def test_a_slow_force_takes_away_the_error_that_one_causes_and_no_white_noise():
-    calm = hidden_record("barge", seed=6, batches=4, samples=300)
+    calm = hidden_record("barge", seed=6, batches=4, samples=300, weather=Weather(current_std=0.0, wind_std=0.0))
     pushed = with_slow_sway_force(calm, np.abs(calm.batches[0].inputs[:, 1]).mean())
     noise, slow = shares(calm), shares(pushed)
     assert (noise < 0.1).all()

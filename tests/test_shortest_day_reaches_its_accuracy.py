@@ -44,10 +44,14 @@ def log_det_beside_current(vessel, motion, commands, parameters):
 
     table = np.zeros((len(commands), len(model.outputs), len(output) + 2))
     table[:, output, np.arange(len(output))] = rows()
+    heading, r = motion.pose[: len(commands), 2], motion.velocity[: len(commands), 2]
     for column, (north_mps, east_mps) in enumerate(STEP_MPS * np.eye(2), start=len(output)):
         change = (rows(north_mps, east_mps) - rows(-north_mps, -east_mps)) * model.parameters / (2 * STEP_MPS)
         for place in range(len(model.outputs)):
             table[:, place, column] = change[:, output == place].sum(axis=1)
+        towards = heading - np.arctan2(east_mps, north_mps)
+        table[:, 0, column] -= r * np.sin(towards) * model.time_scale_s  # as the ship turns in the current
+        table[:, 1, column] -= r * np.cos(towards) * model.time_scale_s
     table /= np.array([noise[name] for name in model.outputs])[:, None]
     table -= table.mean(axis=0)
     covariance = np.linalg.inv(np.einsum("kna,knb->ab", table, table))

@@ -66,7 +66,14 @@ def plain(ship: Vessel, commands: Commands, weather: np.ndarray, *, integrator: 
 
             def rates(x: tuple[float, ...], held: list[float] = held, sea: list[float] = sea) -> tuple[float, ...]:
                 return motion_rates(
-                    ship.model, x, held, current_to=sea[:2], wind_to=sea[2:], ops=SCALAR, parameters=theta
+                    ship.model,
+                    x,
+                    held,
+                    current_to=sea[:2],
+                    wind_to=sea[2:],
+                    ops=SCALAR,
+                    parameters=theta,
+                    turning=integrator == "rk4",
                 )
 
             state = step(rates, state, share * step_s)

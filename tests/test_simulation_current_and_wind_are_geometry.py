@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design_case import vessel
+from design_case import SCENARIOS, vessel
 from expdesign.conventions import rotation, to_n_frame
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, relative_velocity, simulate
 from expdesign.values import Array
-from expdesign.vessel import NUMPY
+from expdesign.vessel import NUMPY, Roll
 
 SHIP = vessel("azimuth-30m-true")
 
@@ -36,19 +36,33 @@ def test_a_ship_adrift_in_a_steady_current_goes_where_the_water_goes(heading: fl
     np.testing.assert_allclose(run.pose[:, :2], (5.0, 6.0) + run.time_s[:, None] * current, atol=1e-10)
 
 
-def test_a_straight_course_in_a_current_is_the_calm_one_displaced_by_the_current():
-    straight = commands(np.tile([10.0, 0.0, 10.0, 0.0], (100, 1)))
-    current = np.array([0.4, -0.3])
-    heading = 0.8
-    calm = simulate(SHIP, straight, pose=(0.0, 0.0, heading))
-    carried = simulate(
-        SHIP,
-        straight,
-        pose=(0.0, 0.0, heading),
-        velocity=np.append(rotation(heading).T @ current, 0.0),
-        environment=Environment(current_to=current, wind_to=current),
-    )
-    np.testing.assert_allclose(carried.pose[:, :2] - calm.pose[:, :2], calm.time_s[:, None] * current, atol=1e-10)
+@pytest.mark.parametrize("rolls", [False, True])
+@pytest.mark.parametrize("name", sorted(path.stem for path in (SCENARIOS / "vessels").glob("*.toml")))
+def test_a_motion_in_a_steady_current_is_that_of_still_water_displaced_by_the_current(name: str, *, rolls: bool):
+    """Turning, too: Galileo's principle, by which trials are corrected for a drift (IMO MSC/Circ.1053)."""
+    ship = vessel(name)
+    if rolls:
+        roll = Roll(period_s=9.0, damping_ratio=0.05, Y_phi=0.1, N_phi=0.001)
+        ship = replace(ship, model=replace(ship.model, roll=roll), pendulum=None)
+    rng, current, heading = np.random.default_rng(1), np.array([0.02, -0.015]) * np.sqrt(ship.length_m), 0.8
+    most = np.array([limit.high if np.isfinite(limit.high) else 1.0 for limit in ship.limits])
+    orders = np.repeat(rng.uniform(0.0, 0.6, (8, len(most))) * most, 20, axis=0)
+    runs = [
+        simulate(
+            ship,
+            Commands(sample_time_s=ship.sample_time_s, names=ship.model.inputs, values=orders),
+            pose=(0.0, 0.0, heading),
+            velocity=np.append(rotation(heading).T @ water, 0.3 / np.sqrt(ship.length_m)),
+            environment=Environment(current_to=water, wind_to=water),
+            substeps=8,
+        )
+        for water in (np.zeros(2), current)
+    ]
+    calm, carried = runs
+    assert np.ptp(calm.pose[:, 2]) > 0.1
+    np.testing.assert_allclose(carried.pose[:, 2], calm.pose[:, 2], atol=1e-6)
+    drift = carried.pose[:, :2] - calm.pose[:, :2]
+    np.testing.assert_allclose(drift, calm.time_s[:, None] * current, atol=1e-6 * ship.length_m)
 
 
 @pytest.mark.parametrize("angle", [0.5, np.pi / 2, -3.0])

@@ -46,6 +46,7 @@ def independent(commands: Commands, environment: Environment) -> np.ndarray:
         du += p["X_mu"] * tx + p["X_kappa"] * ur * tx
         dv += p["W_abs_v_v"] * abs(vq) * vq + p["Y_mu"] * ty
         dr += p["W_uv"] * uq * vq + p["N_mu"] * tpsi
+        du, dv = (du, dv) + r * np.array([v - vr, ur - u])  # the current's components as the ship turns
         return [c * u - s * v, s * u + c * v, r, du, dv, dr]
 
     states = [np.array([*START["pose"], *START["velocity"]])]

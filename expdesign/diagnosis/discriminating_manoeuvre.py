@@ -43,6 +43,7 @@ def most_discriminating(
 ) -> str | None:
     """Name of the proposal for which `one` and the nearest of the others disagree most per minute.
 
+    That is on the first heading on which they disagree least: nobody knows beforehand which it will be.
     Proposals of the same length and sample time are simulated together.
     """
     best: tuple[float, str] | None = None
@@ -52,7 +53,7 @@ def most_discriminating(
         alike = [proposal for proposal, own in zip(proposals, lengths, strict=True) if own == length]
         windows = _turning(one, _windows(alike, like, wind), alike, wind)
         first, *rest = (_by_proposal(_sailed(ship, windows, alike)) for ship in (one, *others))
-        apart = np.min([np.sum(((first - other) / std) ** 2, axis=(1, 2, 3)) for other in rest], axis=0)
+        apart = np.min([np.sum(((first - other) / std) ** 2, axis=(2, 3)).min(axis=1) for other in rest], axis=0)
         for proposal, distance in zip(alike, apart / (length[0] * length[1] / 60), strict=True):
             if distance > (best[0] if best else 0.0):
                 best = float(distance), proposal.name

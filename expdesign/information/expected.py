@@ -6,9 +6,9 @@
 w is 0 for Euler's map and 1/2 for the trapezoidal rule, by which parameters of continuous motion are estimated. Inputs
 are those held from k to k+1. e is the noise of the velocity sensors; it enters at both ends of a sample and, through
 J = d(Phi^T theta)/d nu, the regressors. a is the noise of the wind sensor and c the white part of the current, each
-with its own derivative. In the sum with instruments Z every noise sample is multiplied by a known matrix, so the
-covariance Omega of sum Z eps is exact to first order, without estimated autocorrelations. With G = sum Z Phi^T the
-estimate has covariance G^-1 Omega G^-T.
+with its own derivative; that of c counts how its components change along the axes of a ship that turns, too. In the sum
+with instruments Z every noise sample is multiplied by a known matrix, so the covariance Omega of sum Z eps is exact to
+first order, without estimated autocorrelations. With G = sum Z Phi^T the estimate has covariance G^-1 Omega G^-T.
 
 It is valid for noise small enough for a first-order expansion that changes no sign inside a modulus. Disturbances that
 are constant for a whole trial, such as a mean current, cause a bias, which is not included; a steady current may be
@@ -33,6 +33,7 @@ from expdesign.information.moments import regressor_rows
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate, to_body
+from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, VesselModel
@@ -175,7 +176,7 @@ def _rows(
         substeps=1 if integrator == "euler" else SUBSTEPS,
     )
     given = delivered(vessel, part.commands, standing=part.standing)
-    shares = (1.0, 0.0) if integrator == "euler" else (0.5, 0.5)
+    shares, turning = (1.0, 0.0) if integrator == "euler" else (0.5, 0.5), turns_current(integrator)
     ends = [(share, begin) for begin, share in enumerate(shares) if share]
     slopes = [_derivatives(model, _from(own, begin), given, environment) for begin in range(2)]
     by_water, by_air = (
@@ -188,7 +189,8 @@ def _rows(
         moved = _from(own, begin)
         block = _blocks(model, moved, given, environment, parameters)
         if unknown_current:
-            block = np.concatenate([block, _by_current(model, moved, given, environment)[..., chosen]], axis=1)
+            moving = _by_current(model, moved, given, environment, turning=turning)
+            block = np.concatenate([block, moving[..., chosen]], axis=1)
         regressors = regressors + share * block
     sensor = np.array([sensors.velocity_mps, sensors.velocity_mps, sensors.yaw_rate_radps])[chosen] ** 2
     return _Rows(
@@ -196,7 +198,7 @@ def _rows(
         instruments=regressors * (_weights(sensor) if unknown_current else 1.0),
         by_velocity=by_water[:, :, chosen][..., chosen],
         by_air=by_air[:, :, chosen],
-        by_current=slopes[0][0][:, chosen, :2],
+        by_current=_by_white_current(own, slopes[0][0], turning=turning)[:, chosen],
         sensor=sensor,
         air=sensors.wind_mps**2,
         current=environment.current_variation.std_mps**2,
@@ -241,12 +243,28 @@ def _blocks(
     return np.asarray(values[:, :, None] * member * (commands.sample_time_s / model.time_scale_s))
 
 
-def _by_current(model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
-    """(k, 2, 3) change of Phi^T theta with a steady current to north and to east, times the sample time."""
+def _by_current(
+    model: VesselModel, trajectory: Trajectory, commands: Commands, environment: Environment, *, turning: bool
+) -> Array:
+    """(k, 2, 3) change of velocity over ground in a sample with a steady current to north and to east."""
     by_velocity, _ = _derivatives(model, trajectory, commands, environment)
     heading = trajectory.pose[: len(commands), 2]
     moved = np.array([to_body(direction, heading, NUMPY) for direction in np.eye(2)])  # (2, 2, k), of the water
-    return np.asarray(-np.einsum("kod,cdk->kco", by_velocity[:, :, :2], moved))
+    through_water = -np.einsum("kod,cdk->kco", by_velocity[:, :, :2], moved)
+    if not turning:
+        return np.asarray(through_water)
+    still, (u_c, v_c) = np.zeros(moved[:, 0].shape), moved.swapaxes(0, 1)
+    turned = rates_over_ground((still, still, still), (u_c, v_c), trajectory.velocity[: len(commands), 2])
+    return np.asarray(through_water + commands.sample_time_s * np.stack(turned, axis=-1).swapaxes(0, 1))
+
+
+def _by_white_current(motion: Trajectory, by_velocity: Array, *, turning: bool) -> Array:
+    """(k, 3, 2) change of residuals with the b-frame components of a current, by its derivatives by velocity."""
+    by_current = -by_velocity[:, :, :2]
+    turned = turning * motion.sample_time_s * motion.velocity[: len(by_velocity), 2]
+    by_current[:, 0, 1] += turned
+    by_current[:, 1, 0] -= turned
+    return by_current
 
 
 def _weights(variance: Array) -> Array:

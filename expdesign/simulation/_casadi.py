@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from expdesign.simulation.actuation import step_times
-from expdesign.simulation.motion import State, integrator_step, motion_rates
+from expdesign.simulation.motion import State, integrator_step, motion_rates, turns_current
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Inertia, Operators, Roll, Term, VesselModel
 
@@ -196,7 +196,16 @@ def _step(structure: Structure, integrator: str) -> ca.Function:
     values = ca.vertsplit(theta)
 
     def rates(state: State) -> State:
-        return motion_rates(model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=values)
+        return motion_rates(
+            model,
+            state,
+            inputs,
+            current_to=current,
+            wind_to=wind,
+            ops=CASADI,
+            parameters=values,
+            turning=turns_current(integrator),
+        )
 
     after = integrator_step(integrator, model)(rates, tuple(ca.vertsplit(x)), step_s)
     return ca.Function("step", [x, drive, theta, step_s], [ca.densify(ca.cse(ca.vertcat(*after)))])

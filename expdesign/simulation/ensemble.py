@@ -22,7 +22,7 @@ from expdesign.signals import Batch
 from expdesign.simulation._numba import kernels
 from expdesign.simulation.actuation import deliver, step_shares, step_times
 from expdesign.simulation.environment import Environment, vary
-from expdesign.simulation.motion import begun, integrator_step
+from expdesign.simulation.motion import begun, integrator_step, turns_current
 from expdesign.simulation.program import STATES, RatesProgram, march
 from expdesign.simulation.sensors import ROWS, noise_std, observe, prompt
 from expdesign.values import Array
@@ -118,7 +118,9 @@ def simulate_ensemble(
     step = integrator_step(integrator, vessel.model)
     commands = _commands(vessel, inputs, runs)
     standing = None if standing is None else np.asarray(standing, dtype=float).reshape(commands.shape[2], 1)
-    program = RatesProgram(vessel.model, runs=runs, parameters=parameters, engine=engine)
+    program = RatesProgram(
+        vessel.model, runs=runs, parameters=parameters, engine=engine, turning=turns_current(integrator)
+    )
     shares: int | Array = substeps
     if integrator == "rk4":
         shares = step_shares(vessel.responses, sample_time_s=vessel.sample_time_s, substeps=substeps)

@@ -36,7 +36,13 @@ class RatesProgram:
     """
 
     def __init__(
-        self, model: VesselModel, *, runs: int, parameters: Array | None = None, engine: str = "numpy"
+        self,
+        model: VesselModel,
+        *,
+        runs: int,
+        parameters: Array | None = None,
+        engine: str = "numpy",
+        turning: bool = True,
     ) -> None:
         """Write the equations down and set memory aside.
 
@@ -45,6 +51,7 @@ class RatesProgram:
             runs: n.
             parameters: (p,) for all runs alike or (n, p), in the model's own form; None for the model's.
             engine: "numpy", or "numba" which does the calls of a step in compiled code.
+            turning: as of `motion_rates`.
         """
         theta = model.parameters if parameters is None else parameters
         self._tape, self._states = Tape(), model.states
@@ -57,7 +64,16 @@ class RatesProgram:
         given = iter(tape.given("parameter", int(own.sum())))
         known = np.atleast_2d(theta)[0].tolist()
         values = [next(given) if differs else value for differs, value in zip(own, known, strict=True)]
-        rates = motion_rates(model, state, inputs, current_to=sea[:2], wind_to=sea[2:], ops=SYMBOLIC, parameters=values)
+        rates = motion_rates(
+            model,
+            state,
+            inputs,
+            current_to=sea[:2],
+            wind_to=sea[2:],
+            ops=SYMBOLIC,
+            parameters=values,
+            turning=turning,
+        )
         _, air = relative_velocity(state, sea[:2], sea[2:], SYMBOLIC)
         results = [value if isinstance(value, Symbol) else tape.constant(value) for value in (*rates, *air)]
         self._places = tape.needed(results)

@@ -81,6 +81,10 @@ def shares(folder: Path) -> tuple[float, float]:
         (regressors(track, commands, (north, east)) - regressors(track, commands, (-north, -east))) @ theta
         for north, east in STEP_MPS * np.eye(2)
     ]
+    for slope, towards in zip(slopes, (0.0, np.pi / 2), strict=True):  # as the ship turns in the current
+        heading, step = track["heading_rad"] - towards, 2 * STEP_MPS * vessel["vessel"]["sample_time_s"]
+        slope[0] -= step * track["r_radps"] * np.sin(heading)
+        slope[1] -= step * track["r_radps"] * np.cos(heading)
     beside = np.concatenate([table, np.stack(slopes, axis=-1) / (2 * STEP_MPS)], axis=2) / noise[:, None, None]
     size = np.repeat(noise, 6)
     unknown = np.linalg.inv(information(beside))[:18, :18] / np.outer(size, size)

@@ -10,6 +10,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.simulation.motion import rates_over_ground
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel.structures import SHOAL
@@ -19,6 +20,8 @@ def state_rates(ship: ExtendedModel, state: tuple[Array, ...], exogenous: Exogen
     """d/dt of (u, v, r) or (u, v, r, roll, roll rate)."""
     u, v, r = state[:3]
     totals = _accelerations(ship, u, v, r, exogenous)
+    if "u_c" in exogenous:
+        totals = rates_over_ground(totals, (exogenous["u_c"], exogenous["v_c"]), r)
     if ship.roll is None:
         return totals
     return ship.roll.rates(totals, u * r, state[3:])
@@ -42,7 +45,7 @@ def rates_by_term(
 
 
 def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> tuple[Array, ...]:
-    """d/dt (u, v, r) without roll."""
+    """d/dt (u, v, r) through water, without roll."""
     signals = _signals(ship, u, v, r, exogenous)
     totals = dict.fromkeys(OUTPUTS, np.zeros_like(u))
     steady = dict(totals)

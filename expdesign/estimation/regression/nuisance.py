@@ -7,6 +7,9 @@ zero-mean instruments it is minus cos^2 psi.) For the manoeuvring model of 18 te
 regressors. Where a modulus stands over something negative its derivatives change sign; every batch takes the sign that
 its data have, so batches excited either way can be estimated together.
 
+The current's components also change along the axes of a ship that turns. This leaves r cos psi and r sin psi in surge
+and sway, which most models have by their own terms, too.
+
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.44), (5.22), (5.37), (5.68)-(5.70).
 """
 
@@ -86,7 +89,12 @@ class Nuisance:
 
 
 def nuisance_regressors(
-    model: VesselModel, terms: Sequence[str], batches: Sequence[SignalTable], *, wind_measured: bool
+    model: VesselModel,
+    terms: Sequence[str],
+    batches: Sequence[SignalTable],
+    *,
+    wind_measured: bool,
+    turning: bool,
 ) -> tuple[Nuisance, ...]:
     """The regressors that go with the named terms, without repetition.
 
@@ -95,6 +103,7 @@ def nuisance_regressors(
         terms: parameter names.
         batches: one table of measured signals per batch, for the signs of moduli.
         wind_measured: air velocities are data; otherwise the unknown wind acts on them as the current on the water's.
+        turning: a current is unknown, whose components change along the axes of a ship that turns.
 
     Raises:
         InputError: a term is not of second order in the velocities.
@@ -118,7 +127,15 @@ def nuisance_regressors(
                 name, weight = moment
                 share = Share(term.name, name, weight * whole.leading, air)
                 found[key] = replace(own, shares=(*own.shares, share))
+    for item in _of_turning(model, algebra) if found and turning else ():
+        found[item.equation, str(item.factor), item.heading] = item
     return tuple(sorted(found.values(), key=lambda item: "uvr".index(item.equation)))
+
+
+def _of_turning(model: VesselModel, algebra: Algebra) -> list[Nuisance]:
+    """Those of a current along the axes of a ship that turns."""
+    equations = [name for name in ("u", "v") if name in model.outputs and "r" in model.outputs]
+    return [Nuisance(equation, symbol("r"), heading, algebra) for equation in equations for heading in FIRST]
 
 
 def symbolic(expression: Expression, algebra: Algebra, *, wind_measured: bool) -> Polynomial:

@@ -30,13 +30,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from expdesign.errors import InputError, UnknownName
-from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes, through_water
+from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes, through_water, turned_with
 from expdesign.estimation.regression.nuisance import Nuisance, headings, nuisance_regressors, symbolic
 from expdesign.estimation.regression.polynomial import Algebra
 from expdesign.estimation.regression.regression import Integers
 from expdesign.estimation.regression.tables import AIR, VANE, Table, measured_table
 from expdesign.estimation.regression.vane import unbiased_value
 from expdesign.signals import Batch, Record
+from expdesign.simulation.motion import turns_current
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import MOTION_SIGNALS
@@ -168,7 +169,7 @@ class Layout:
         for index, (equation, values) in enumerate(columns):
             np.multiply(np.broadcast_to(values, table["psi"].shape)[used], scale, out=rows[:, row_of[equation], index])
         if self.guess is not None:
-            moved = slopes(self.model, self.guess.parameters, table)[:, used]  # (2, k, n)
+            moved = slopes(self.model, self.guess.parameters, table, turning=self._turning)[:, used]  # (2, k, n)
             np.multiply(moved.transpose(1, 2, 0), scale, out=rows[:, :, len(columns) :])
         return rows
 
@@ -176,7 +177,7 @@ class Layout:
         return table if self.guess is None else through_water(table, self.guess.to_mps)
 
     def known(self, table: Table, within: Within = HELD) -> Array:
-        """(k, n) part explained by the parameters held fixed."""
+        """(k, n) part explained by the parameters held fixed, and by turning in the current that is guessed."""
         return np.asarray(sum(share * self._known(part) for share, part in self._points(table, within)))
 
     def _known(self, table: Table) -> Array:
@@ -185,7 +186,14 @@ class Layout:
         for name in self.fixed:
             place = self.model.names.index(name)
             total[:, outputs.index(self._term(place))] += self.model.parameters[place] * self._values(place, table)
+        if self.guess is not None and self._turning:
+            total += turned_with(self.model, table, self.guess.to_mps)
         return total
+
+    @property
+    def _turning(self) -> bool:
+        """As of `simulation.motion_rates`: by the map that belongs to the quadrature."""
+        return turns_current(self.quadrature)
 
     def _term(self, place: int) -> str:
         return self.model.terms[place].equation
@@ -237,7 +245,13 @@ def build_layout(
     nuisance: tuple[Nuisance, ...] = ()
     if chosen.nuisance:
         disturbed = [name for name in model.names if (WIND if name in reads_air else CURRENT) in chosen.unknown]
-        nuisance = nuisance_regressors(model, disturbed, tables, wind_measured=chosen.wind)
+        nuisance = nuisance_regressors(
+            model,
+            disturbed,
+            tables,
+            wind_measured=chosen.wind,
+            turning=CURRENT in chosen.unknown and turns_current(quadrature),
+        )
         if not nuisance:
             raise InputError(f"predictor {predictor!r} needs terms of the velocity through the air, the model has none")
     partners = {name: partner for name in merged if (partner := _partner(model, name)) is not None}

@@ -17,6 +17,7 @@ from expdesign.estimation.regression import drive_width
 from expdesign.estimation.replay.stretches import INTEGRATORS, Called, Simulate, Stretches
 from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import motion_rates
+from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, VesselModel
@@ -42,11 +43,13 @@ def batch_simulator(
     """
     width = drive_width(len(model.inputs), parts) + 2 * windy + 2 * flowing
     x, theta, drive = ca.SX.sym("x", model.states), ca.SX.sym("p", len(model.terms)), ca.SX.sym("i", width)
-    current = (drive[width - 2], drive[width - 1]) if flowing else (0.0, 0.0)
+    current, turning = (drive[width - 2], drive[width - 1]) if flowing else (0.0, 0.0), turns_current(integrator)
     held, wind = _split(drive[: width - 2 * flowing], len(model.inputs), parts, windy)
 
     def rates(state: tuple[Any, ...], inputs: list[ca.SX]) -> tuple[Any, ...]:
-        return motion_rates(model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=theta)
+        return motion_rates(
+            model, state, inputs, current_to=current, wind_to=wind, ops=CASADI, parameters=theta, turning=turning
+        )
 
     after = _stepped(rates, x, held, sample_time_s, integrator, substeps)
     return _chained(ca.Function("step", [x, drive, theta], [after]), samples)
@@ -151,6 +154,8 @@ def velocity_step(problem: Stretches) -> ca.Function:
         water = (ground[0] - current[0], ground[1] - current[1], ground[2])
         air = (ground[0] - wind[0], ground[1] - wind[1])
         all_rates = model.accelerations(water, air, inputs, CASADI, theta)
+        if turns_current(problem.integrator):
+            all_rates = rates_over_ground(all_rates, current, ground[2])
         return tuple(all_rates[place] + values[p + index] for index, place in enumerate(problem.states))
 
     after = _stepped(rates, x, held, problem.sample_time_s, problem.integrator, problem.substeps)

@@ -146,16 +146,10 @@ class Helmsman:
             through=self._velocity_through_water(desired, states),
             states=states,
             moving=self._in_body(states),
-            unexplained=self._beyond_model(unexplained, states),
+            unexplained=np.zeros((len(states), 3)) if unexplained is None else unexplained,
             near=before if near is None else near,
         )
         return self._commanded(self.controller.commands(demand), before, delivered)
-
-    def _beyond_model(self, unexplained: Array | None, states: Array) -> Array:
-        """(n, 3) acceleration beyond that of still water: what is unexplained, and the turning mean current."""
-        if unexplained is None or self._current:
-            return np.asarray((0.0 if unexplained is None else unexplained) - self._turning_current(states))
-        return unexplained
 
     def _commanded(self, rows: Array, before: Array, delivered: Array | None) -> Array:
         """(n, m) commands within limits and rates for desired values (n, m); lagging actuators are commanded more."""
@@ -198,8 +192,6 @@ class Helmsman:
         known = np.empty((3, len(estimate))).T
         for column, part in enumerate(predicted):
             known[:, column] = part
-        if self._current:
-            known -= self._turning_current((before + states) / 2)
         share = min(1.0, self.vessel.sample_time_s / (CONTROL.learning * self.answer_s))
         return np.asarray(estimate + share * ((new - old) / self.vessel.sample_time_s - known - estimate))
 
@@ -226,16 +218,6 @@ class Helmsman:
         limit = np.where(speed > 1.001 * fastest, 1.02 * speed, fastest)
         through = steady + back
         return np.asarray(through * np.minimum(1.0, limit / np.maximum(lengths(through), 1e-12))[:, None])
-
-    def _turning_current(self, states: Array) -> Array:
-        """(n, 3) rate at which the mean current changes in the b-frames of turning ships (n, 6) [m/s2].
-
-        The model gives the rate of the velocity over ground: that through water has the opposite of this more.
-        """
-        if not self._current:
-            return np.zeros((len(states), 3))
-        u_c, v_c, _ = (states[:, 3:] - self._in_body(states)).T
-        return np.array([states[:, 5] * v_c, -states[:, 5] * u_c, 0.0 * u_c]).T
 
     def _in_body(self, states: Array) -> Array:
         """(n, 3) velocities through water from those over ground."""
