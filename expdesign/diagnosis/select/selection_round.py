@@ -164,20 +164,21 @@ def _best_on_held_out(
     that others with fewer numbers are about as likely as. Many numbers explain errors of the model's structure in the
     data that they are fitted to, and in no others. Where the simulation of whole units leads away from the ship,
     likelihoods tell little, and the best candidates of all other causes are compared. Where it does so only with
-    another cause, that one is no rival.
+    another cause, that one is no rival. Any other cause has to be much better.
     """
     astray = astray or leads_away(validation.of(first.fit))
-    rivals = _rivals(first, accepted, any_number=astray)
+    near, others = _rivals(first, accepted, any_number=astray), _rivals(first, accepted, any_number=True)
+    rivals = [*near, *(item for item in others if item.candidate.cause not in {one.candidate.cause for one in near})]
     rivals = [item for item in rivals if astray or not leads_away(validation.of(item.fit))]
     if not rivals:
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
-    own, *others = (item.mean_fit for item in held)
+    own, *means = (item.mean_fit for item in held)
     better: list[tuple[float, FittedCandidate]] = []
-    for mean, rival in zip(others, rivals, strict=True):
+    for mean, rival in zip(means, rivals, strict=True):
         simpler = rival.numbers < first.numbers and (first.candidate.imitates or _is_about_as_likely(rival, first))
-        margin = -1.0 if simpler and not astray else 1.0
-        if mean > own + margin * TUNING.clear_gain_points:
+        least = TUNING.clear_gain_points if rival in near else TUNING.much_better_points
+        if mean > own + (-TUNING.clear_gain_points if simpler and not astray else least):
             better.append((mean, rival))
     return max(better, key=lambda pair: pair[0])[1] if better else first
 
@@ -201,7 +202,11 @@ def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_
 
 
 def _rough_fit(base: Fit, windows: Windows, far: bool, point: StartingPoint) -> FittedCandidate | None:
-    return fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
+    """A fit of few steps; from where the base is, where one that begins far away ends worse than the base."""
+    found = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
+    if not far or (found is not None and found.likelihood_gain > 0):
+        return found
+    return fit_candidate(base, windows, starting_point(base, point.test), steps=TUNING.first_steps) or found
 
 
 def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
@@ -275,18 +280,19 @@ def _leading(rough: list[FittedCandidate]) -> list[FittedCandidate]:
 
 def _starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[list[StartingPoint], bool]:
     """Starting points, and whether the best candidate is a large effect; then they come from short windows."""
-    shortlist = [*_shortlist(tests), *_hidden_by_random_current(base, tests)]
+    shortlist = _shortlist(tests)
+    shortlist += _hidden_by_random_current(base, tests, shortlist)
     short_fit = fit_short_windows(base, windows)
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
         return [starting_point(base, test) for test in shortlist], False
-    best = _never_left_out(shortlist)
-    certain = [*best, *_hidden_by_random_current(base, tests)]
+    best, of_short = _never_left_out(shortlist), _shortlist(short_tests)
+    certain = [*best, *_hidden_by_random_current(base, tests, best, beside=of_short)]
     listed = {id(item.candidate) for item in certain}
     multiplicity = {id(item.candidate): item.multiplicity for item in tests}
     others = [
         replace(item, multiplicity=multiplicity[id(item.candidate)])
-        for item in _shortlist(short_tests)
+        for item in of_short
         if id(item.candidate) not in listed
     ]
     return start_in_short_windows(short_fit, [*certain, *others], len(certain)), True
@@ -311,17 +317,24 @@ def _explained_share(tests: tuple[ScoreTest, ...], base: Fit) -> float:
     return max((item.statistic for item in tests), default=0.0) / rows
 
 
-def _hidden_by_random_current(base: Fit, tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
+def _hidden_by_random_current(
+    base: Fit, tests: tuple[ScoreTest, ...], listed: Sequence[ScoreTest], *, beside: Sequence[ScoreTest] = ()
+) -> list[ScoreTest]:
     """A steady current that a large random current may have absorbed; few runs cannot distinguish the two.
 
     A wind that nobody measured needs more numbers for what such a current does, so a current is always tried beside it.
+
+    Args:
+        base: gives the random current.
+        tests: of all candidates.
+        listed: candidates that are fitted, to which a current is added.
+        beside: others that may be.
     """
-    shortlist = _shortlist(tests)
-    windy = any(item.candidate.imitates for item in shortlist)
+    windy = any(item.candidate.imitates for item in (*listed, *beside))
     if base.noise.current_std_mps < TUNING.large_current_mps and not windy:
         return []
-    listed = {id(item.candidate) for item in shortlist}
-    return [item for item in tests if item.candidate.cause == "current" and id(item.candidate) not in listed]
+    known = {id(item.candidate) for item in listed}
+    return [item for item in tests if item.candidate.cause == "current" and id(item.candidate) not in known]
 
 
 def listed_causes(tests: tuple[ScoreTest, ...]) -> int:

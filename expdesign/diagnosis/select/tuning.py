@@ -53,6 +53,8 @@ class Tuning:
         equivalent_values: this many equally likely values in a round end the search.
         least_gain_points: gain of fit on held-out data that causes after the first need, at least [points].
         clear_gain_points: gain that suffices even where its interval, of few runs perhaps, includes zero [points].
+        much_better_points: by which a candidate that is less likely, or has more numbers, has to simulate held-out data
+            better than the best for it to be the cause instead [points].
         leads: candidates that are named where a simulation explains little and no cause is certain.
         least_reduction: share by which the error of some output must fall on held-out data for a cause to be a finding.
         least_predicted: share of the squared error of predictions that a first cause may take away instead.
@@ -100,6 +102,7 @@ class Tuning:
     equivalent_values: int = 3
     least_gain_points: float = 0.1
     clear_gain_points: float = 1.0
+    much_better_points: float = 5.0
     leads: int = 3
     least_reduction: float = 0.01
     least_predicted: float = 0.05
