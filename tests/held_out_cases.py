@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from expdesign.diagnosis.causes.candidate import Candidate
-from expdesign.diagnosis.fit.cross_validation import HeldOut
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.select.selection import Selection
 
 DEVIATION = np.ones((6, 3))

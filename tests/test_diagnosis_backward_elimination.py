@@ -12,8 +12,9 @@ from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
 from expdesign.diagnosis.conclusions.notes import note_on_unconverged, notes_on_rejected
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.cross_validation import CrossValidation, HeldOut, _fitted, held_out_gain, judged
+from expdesign.diagnosis.fit.cross_validation import CrossValidation, _fitted
 from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain, judged
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
@@ -22,10 +23,10 @@ from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
     _best_on_held_out,
-    _starting_points,
     selection_round,
     simplest,
 )
+from expdesign.diagnosis.select.shortlist import starting_points
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
@@ -373,6 +374,6 @@ def test_p_values_of_a_large_effect_count_all_tests():
     base = fit_nuisance(ship, windows, initial_states(windows))
     situation = Situation(ship=base.ship, windows=windows)
     candidates = [item for cause in CAUSES for item in cause.candidates(situation)]
-    openings, far = _starting_points(base, windows, score_tests(base, candidates, np.random.default_rng(0)))
+    openings, far = starting_points(base, windows, score_tests(base, candidates, np.random.default_rng(0)))
     assert far
     assert all(one.test.multiplicity > 5.0 for one in openings)

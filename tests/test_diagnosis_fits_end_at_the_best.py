@@ -5,9 +5,8 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.fit import FitOptions
+from expdesign.diagnosis.fit.fit import FitOptions, after_step
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.model.terms import term_factors
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance

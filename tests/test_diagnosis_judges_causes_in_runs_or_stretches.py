@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from expdesign.diagnosis import judgement
-from expdesign.diagnosis.fit.cross_validation import HeldOut
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.judgement import _where_certain, errors_as_judged
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
 from expdesign.diagnosis.select.tuning import TUNING

@@ -12,7 +12,7 @@ from expdesign.diagnosis.conclusions.findings import error_reductions_of
 from expdesign.diagnosis.conclusions.notes import note_on_random_current
 from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
-from expdesign.diagnosis.fit.cross_validation import HeldOut
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend

@@ -7,14 +7,8 @@ compares two, `cluster_robust` corrects standard errors, `cross_validate` measur
 from expdesign.diagnosis.fit.cluster_robust import cluster_robust
 from expdesign.diagnosis.fit.cross_validation import (
     CrossValidation,
-    HeldOut,
-    bootstrap_sums,
     cross_validate,
     cross_validate_ahead,
-    held_out_gain,
-    judged,
-    leads_away,
-    on_common_units,
     validation_units,
 )
 from expdesign.diagnosis.fit.fit import (
@@ -35,6 +29,14 @@ from expdesign.diagnosis.fit.gram_matrices import (
     information,
     marginalised,
     window_information,
+)
+from expdesign.diagnosis.fit.held_out import (
+    HeldOut,
+    bootstrap_sums,
+    held_out_gain,
+    judged,
+    leads_away,
+    on_common_units,
 )
 from expdesign.diagnosis.fit.linear_model import (
     build_sensitivities,

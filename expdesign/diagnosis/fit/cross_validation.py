@@ -1,4 +1,4 @@
-"""Cross-validation: how well a model simulates data that it was not fitted to, with intervals by the bootstrap.
+"""Cross-validation: how well a model simulates data that it was not fitted to.
 
 Data are held out in units: batches, or windows where there are fewer than three batches. Effects are fitted without the
 units that they are evaluated on. Where such a fit does not improve on the fit to all units, the effects of the latter
@@ -18,9 +18,9 @@ Forecasting 8 (1992), 69-80).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -31,6 +31,7 @@ from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.fit.output_error import fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
@@ -39,47 +40,6 @@ from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HeldOut:
-    """Errors of one model on units that it was not fitted to.
-
-    Attributes:
-        squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
-        squared_deviation: (b, n) of the measurements from their mean, likewise.
-        unconverged: folds that kept the effects fitted to all units.
-        ahead: of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called.
-        in_stretches: whether these are such errors.
-        models: (mask of windows, model fitted without them) of every fold; None where it could not be fitted.
-    """
-
-    squared_error: Array
-    squared_deviation: Array
-    unconverged: int = 0
-    ahead: Callable[[], HeldOut] | None = None
-    in_stretches: bool = False
-    models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
-
-    @property
-    def fit(self) -> Array:
-        """(n,) [%] over all units that could be fitted."""
-        return _fit_percent(np.nansum(self.squared_error, axis=0), np.nansum(self.squared_deviation, axis=0))
-
-    def like(self, other: HeldOut) -> HeldOut:
-        """Errors of the same model measured as those of another are: of whole units or of short stretches."""
-        return self.ahead() if other.in_stretches and self.ahead is not None else self
-
-    @property
-    def mean_fit(self) -> float:
-        """Over outputs [%]; minus infinity where one has none."""
-        return float(np.nan_to_num(self.fit, nan=-np.inf).mean())
-
-
-def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        fit_percent = 100 * (1 - np.sqrt(squared_error / squared_deviation))
-        return np.asarray(np.where(squared_deviation > 0, fit_percent, np.nan))
 
 
 def validation_units(windows: Windows) -> Array:
@@ -278,25 +238,6 @@ def error_of_constants(measured: Array, batch: Array) -> Array:
     return np.asarray(seen.sum(axis=1) * total / np.maximum(seen.sum(axis=(0, 1)), 1))
 
 
-def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
-    """Errors by which models are compared: of whole units, or of short stretches.
-
-    Stretches count where a model simulates some output of whole units worse than a constant.
-
-    Args:
-        held: errors of the models.
-        first: the first whose simulation decides so; the model before any cause may be as bad as it is.
-    """
-    stretches = [item.ahead for item in held if item.ahead is not None]
-    astray = any(leads_away(item) for item in held[first:])
-    return [ahead() for ahead in stretches] if astray and len(stretches) == len(held) else [*held]
-
-
-def leads_away(held: HeldOut) -> bool:
-    """Whether a model simulates some output of whole units worse than a constant."""
-    return not (held.fit >= TUNING.least_fit).all()
-
-
 def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Record | None) -> tuple[Windows, Array]:
     """The data in short stretches, and the unit that each is a part of."""
     if record is not None and unit is windows.batch:
@@ -355,44 +296,3 @@ def _fitted_to_stretches(
         return fit_output_error(ship, short.selected(train), free).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return None
-
-
-def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
-    """Two models on the units that could be fitted for both."""
-    both = np.isfinite(before.squared_error).all(axis=1) & np.isfinite(after.squared_error).all(axis=1)
-    first, second = (
-        HeldOut(squared_error=item.squared_error[both], squared_deviation=item.squared_deviation[both])
-        for item in (before, after)
-    )
-    return first, second
-
-
-def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut, HeldOut]:
-    """Sums over units drawn with replacement, (draws, n), the same units for both models.
-
-    The same seed draws the same units, for decisions and for reports.
-    """
-    times = _times_drawn(len(before.squared_error), TUNING.bootstrap_draws, seed)
-    first, second = (
-        HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
-        for item in (before, after)
-    )
-    return first, second
-
-
-@lru_cache(maxsize=16)
-def _times_drawn(count: int, draws: int, seed: int) -> Array:
-    """(draws, count) how often each unit is drawn."""
-    drawn = np.random.default_rng(seed).integers(0, count, (draws, count))
-    places = drawn + count * np.arange(draws)[:, None]
-    return np.bincount(places.ravel(), minlength=draws * count).reshape(draws, count).astype(float)
-
-
-def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
-    """Mean gain of fit over outputs [points] and its 95 % interval; nan where no unit could be fitted for both."""
-    before, after = on_common_units(before, after)
-    if not len(before.squared_error):
-        return np.nan, (np.nan, np.nan)
-    fits = [_fit_percent(item.squared_error, item.squared_deviation) for item in bootstrap_sums(before, after, seed)]
-    low, high = np.nanquantile(np.nanmean(fits[1] - fits[0], axis=1), [0.025, 0.975])
-    return float(np.nanmean(after.fit - before.fit)), (float(low), float(high))

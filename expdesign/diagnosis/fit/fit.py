@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from expdesign.diagnosis.data import Noise
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities
-from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.fit.tuning import TUNING
-from expdesign.diagnosis.model import ExtendedModel, resisting
+from expdesign.diagnosis.model import ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import LinearisedMotion
 from expdesign.values import Array
 
@@ -22,6 +21,8 @@ POSITIVE = ("lag:", "delay:")
 """Effects that are times, from zero on."""
 LEAST_TIME_S = 1e-6
 """Taken for zero: derivatives are differences upward."""
+LITTLE = 1e-6
+"""Share of a step from which slopes of factors are taken."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,6 +207,42 @@ def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:
             break
         held |= outside
     return step, float(2.0 * score @ step - step @ A @ step)
+
+
+def after_step(ship: ExtendedModel, keys: Sequence[str], step: Array) -> dict[str, float]:
+    """Effects after a Gauss-Newton step.
+
+    Data determine only the product of a gain and the uncertain thrust parameters, so the cost has a narrow curved
+    valley. The products and the gain therefore take linear steps, and the parameters follow from both.
+    """
+    change = dict(zip(keys, step.tolist(), strict=True))
+    after = within_bounds(ship, {key: ship.get(key) + size for key, size in change.items()})
+    factors = [key for key in keys if key.split(":")[0] in ("gain", "inertia")]
+    if not factors:
+        return after
+    nudged = {key: ship.get(key) + LITTLE * change[key] for key in factors}
+    old, close, new = (term_factors(ship.model, {**ship.effects, **effects}) for effects in ({}, nudged, after))
+    for name, value in zip(ship.model.names, ship.model.parameters.tolist(), strict=True):
+        key = f"theta:{name}"
+        if key in change:
+            whole, slope = value + ship.get(key), (close[name] - old[name]) / LITTLE
+            after[key] = (whole * (old[name] + slope) + old[name] * change[key]) / new[name] - value
+    return after
+
+
+def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, float]:
+    """Times and widths stay positive and change by a limited ratio, but lags and dead times may vanish at once."""
+    result = {}
+    for key, value in effects.items():
+        kind = key.split(":")[0]
+        if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
+            before, ratio = ship.get(key), TUNING.largest_ratio
+            least = 0.0 if kind in ("lag", "delay") else before / ratio
+            value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
+        elif kind in ("inertia", "gain", "gyro", "scale"):
+            value = max(value, TUNING.smallest_factor_change)
+        result[key] = value
+    return result
 
 
 def nearest_possible(ship: ExtendedModel) -> ExtendedModel:

@@ -10,6 +10,7 @@ from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit.fit import (
     Fit,
     FitOptions,
+    after_step,
     best_step,
     deviations_of,
     prior_precision,
@@ -19,7 +20,6 @@ from expdesign.diagnosis.fit.fit import (
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, information, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities, sensitivities_beside, sensitivities_to
 from expdesign.diagnosis.fit.noise_estimation import Prior, estimate_noise
-from expdesign.diagnosis.fit.step_limits import after_step
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (

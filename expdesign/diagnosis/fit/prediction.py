@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.cross_validation import HeldOut
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, current_prior, gram_matrices, whitened_error
+from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.fit.linear_model import Sensitivities, build_sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel

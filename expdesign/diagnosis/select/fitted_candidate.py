@@ -11,8 +11,7 @@ import scipy
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, likeliest, log_likelihood_gain, profile_cost
-from expdesign.diagnosis.select.short_windows import start_nearer
-from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys
+from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, start_nearer
 from expdesign.diagnosis.select.tuning import TUNING
 
 

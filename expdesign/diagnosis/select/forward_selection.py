@@ -29,11 +29,11 @@ from expdesign.diagnosis.select.selection import Selection, Step, redundant_step
 from expdesign.diagnosis.select.selection_round import (
     best_step,
     has_rivals,
-    listed_causes,
     round_tests,
     same_effects_as_any,
     selection_round,
 )
+from expdesign.diagnosis.select.shortlist import listed_causes
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.progress import Estimated

@@ -1,16 +1,28 @@
-"""Starting points of fits: first guesses, and a grid search where the likelihood has corners."""
+"""Starting points of fits: first guesses, a grid search where the likelihood has corners, and fits in short windows.
+
+Large effects begin in short windows: long simulations are too far from the data there.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import Fit
+from expdesign.diagnosis.data import Windows, channel_std
+from expdesign.diagnosis.fit import Fit, FitOptions, fit, likeliest, profile_cost
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import initial_states, simulate_windows
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.processes import in_order
+from expdesign.values import Array
+
+FROM_NOTHING = FitOptions(steps=TUNING.short_steps)
+"""Noise of unknown size."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,3 +95,75 @@ def _at(candidate: Candidate, key: str, value: float) -> Candidate:
 
 def _value(candidate: Candidate, key: str) -> float:
     return candidate.free.get(key, candidate.fixed.get(key, 0.0))
+
+
+def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
+    """The same model fitted in short windows with white noise: imprecise, but a good start for large effects.
+
+    None where windows are short anyway, or where the model cannot be fitted in them.
+    """
+    samples = max(TUNING.fewest_samples, round(TUNING.short_s / windows.sample_s))
+    if 2 * samples > windows.measured.shape[1]:
+        return None
+    short = replace(windows.cut_shorter(samples), white_noise=True)
+    try:
+        return fit(base.ship, short, base.free_keys, starts=initial_states(short), options=FROM_NOTHING)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certain: int) -> list[StartingPoint]:
+    """Starting points from fits in short windows; candidates that gain much less than the best are left out.
+
+    Args:
+        short_fit: the model in use, by `fit_short_windows`.
+        shortlist: tests of the candidates.
+        certain: this many of the first are never left out.
+    """
+    points = list(in_order(starting_point, (short_fit,), [(test,) for test in shortlist]))
+    fits = list(in_order(_fit_in_short_windows, (short_fit,), [(point,) for point in points]))
+    noise = likeliest([short_fit, *(found for found in fits if found is not None)]).noise
+    without = profile_cost(short_fit, noise)
+    gains = [-np.inf if found is None else without - profile_cost(found, noise) for found in fits]
+    return [
+        point
+        if found is None
+        else replace(point, effects=point.effects | {key: found.value(key) for key in found.keys})
+        for number, (point, found, gain) in enumerate(zip(points, fits, gains, strict=True))
+        if number < certain or gain > TUNING.least_gain_share * max(gains)
+    ]
+
+
+def _fit_in_short_windows(short_fit: Fit, point: StartingPoint) -> Fit | None:
+    """None where the candidate cannot be fitted."""
+    options = replace(FROM_NOTHING, noise=short_fit.noise, warm_start=short_fit)
+    ship, windows = short_fit.ship.with_effects(point.effects), short_fit.linear.motion.windows
+    try:
+        return fit(ship, windows, joint_keys(short_fit, point.keys), starts=short_fit.starts, options=options)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+
+
+def start_nearer(base: Fit, windows: Windows, point: StartingPoint) -> tuple[ExtendedModel, Array]:
+    """Model and initial states to begin a fit with, by a fit in windows of middle length where that simulates better.
+
+    Raises:
+        FloatingPointError: the model cannot be simulated there.
+    """
+    guess = base.ship.with_effects(point.effects)
+    before, after = _squared_error(base, windows, base.ship), _squared_error(base, windows, guess)
+    middle = windows.cut_shorter(max(TUNING.fewest_samples, round(TUNING.middle_s / windows.sample_s)))
+    ship = guess
+    if after > 0.5 * before and middle.measured.shape[1] < windows.measured.shape[1]:
+        part, starts = replace(middle, white_noise=True), initial_states(middle, guess.states)
+        ship = fit(guess, part, joint_keys(base, point.keys), starts=starts, options=FROM_NOTHING).ship
+        after = _squared_error(base, windows, ship)
+    return (ship, initial_states(windows)) if after < before else (guess, base.starts)
+
+
+def _squared_error(base: Fit, windows: Windows, ship: ExtendedModel) -> float:
+    """Of a simulation from measured initial states, in units of the measured variances; infinite where it diverges."""
+    motion = simulate_windows(ship, windows, initial_states(windows, ship.states), warm_start=base.linear)
+    size = channel_std(windows.measured)
+    scale = np.where(size > 0, size, np.inf)
+    return np.inf if motion.diverged else float(np.nansum((motion.error / scale) ** 2))
