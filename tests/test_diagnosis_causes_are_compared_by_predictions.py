@@ -1,23 +1,29 @@
-"""Where a search by likelihoods finds nothing, causes are compared by predictions a short time ahead."""
+"""Where a search by likelihoods leaves much unexplained, causes are compared by predictions a short time ahead."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis import diagnose
+from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut
 from expdesign.diagnosis.prediction_comparison import Compared, _signed_rank_p_value, compare_predictions
+from expdesign.diagnosis.select import Selection, Step
+from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import silent
 from expdesign.signals import Record
 
 BIAS_RAD = 0.3
-diagnosing = import_module("expdesign.diagnosis.diagnose")
+selecting = import_module("expdesign.diagnosis.selected")
+judging = import_module("expdesign.diagnosis.judgement")
 
 
 def trial(seed: int, **hidden: object) -> Record:
@@ -54,10 +60,70 @@ def test_a_current_that_wanders_gains_and_is_no_certain_cause():
     assert first.cause == "current"
     assert first.gain_interval[0] > 0.0
     assert not first.is_certain
+    much = TUNING.much_better_points + np.array([0.1, 20.0])
+    assert replace(first, gain=10.0, gain_interval=tuple(much), p_value=0.001).is_certain
+    assert not replace(first, gain=10.0, gain_interval=tuple(much - 0.2), p_value=0.001).is_certain
 
 
 def errors(squared: np.ndarray) -> HeldOut:
     return HeldOut(squared_error=squared, squared_deviation=np.ones_like(squared))
+
+
+def of(cause: str, error: float, *, certain: bool = True, weather: bool = False) -> SimpleNamespace:
+    """A compared cause with this squared error in each of ten stretches."""
+    return SimpleNamespace(
+        cause=cause, held=errors(np.full((10, 3), error)), is_certain=certain, is_slow_weather=weather, p_value=0.001,
+        fit=SimpleNamespace(ship=cause),
+    )  # fmt: skip
+
+
+def judged(monkeypatch, *causes: SimpleNamespace, found: float | None) -> tuple[str, tuple[str, ...]] | None:
+    """The cause that is found by predictions, or kept from the search, with its alternatives.
+
+    `found` is the error with the cause "searched", which the search found; None where it found nothing.
+    """
+
+    def chosen(item, *_):
+        return SimpleNamespace(candidate=Candidate(cause=item.cause, free={}), fit=item.cause)
+
+    monkeypatch.setattr(judging, "harms", lambda *_: False)
+    monkeypatch.setattr(judging, "fitted_to_all", chosen)
+    steps = () if found is None else (Step(chosen=chosen(of("searched", 0.0)), p_value=0.0, alternatives=(),
+                                           before=None, tests=()),)  # fmt: skip
+    kept = Selection(steps=steps, first=None, last=None, last_tests=())  # type: ignore[arg-type]
+    compared = SimpleNamespace(
+        causes=causes, without=errors(np.ones((10, 3))), tests=(), of=lambda _: errors(np.full((10, 3), found))
+    )
+    by_predictions = judging.found_by_predictions(kept, compared, (None, None), None, 0)
+    kept = by_predictions[0] if by_predictions else judging.with_alternatives(kept, compared, None, 0)
+    return (
+        None
+        if not kept.steps
+        else (
+            kept.steps[0].chosen.candidate.cause,
+            tuple(other.candidate.cause for other in kept.steps[0].alternatives),
+        )
+    )
+
+
+def test_what_predicts_better_for_certain_takes_the_place_of_what_the_search_found(monkeypatch):
+    current, bias = of("current", 0.2, weather=True), of("heading_bias", 0.3)
+    assert judged(monkeypatch, current, bias, found=0.5) == ("current", ())
+    assert judged(monkeypatch, current, found=0.2) == ("searched", ("current",))
+    assert judged(monkeypatch, current, found=0.1) == ("searched", ())
+    small = of("current", 0.3, certain=False, weather=True)
+    assert judged(monkeypatch, bias, small, found=0.5) == ("searched", ("heading_bias",))
+    assert judged(monkeypatch, bias, found=0.5) == ("heading_bias", ())
+
+
+def test_what_slow_weather_predicts_as_well_is_no_certain_cause(monkeypatch):
+    bias = of("heading_bias", 0.3)
+    assert judged(monkeypatch, bias, of("current", 0.3, certain=False, weather=True), found=None) is None
+    assert judged(monkeypatch, bias, of("current", 0.4, certain=False, weather=True), found=None) == (
+        "heading_bias",
+        (),
+    )
+    assert judged(monkeypatch, of("current", 0.3, weather=True), bias, found=None) == ("current", ("heading_bias",))
 
 
 def test_the_signed_rank_test_counts_stretches_not_their_size():
@@ -76,10 +142,10 @@ def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeyp
         kept, held = cross_validated(found.with_steps(()))
         return replace(kept, beside_stated=True), held
 
-    monkeypatch.setattr(diagnosing, "eliminate_backward", nothing)
+    monkeypatch.setattr(selecting, "eliminate_backward", nothing)
     record = trial(2, faults={"heading_bias": BIAS_RAD})
     vessel = vessel_of("coaster", relative_std=0.1)
-    found = diagnosing.diagnose(vessel, record)
+    found = diagnose(vessel, record)
     assert [item.cause for item in found.findings] == ["heading_bias"]
     (item,) = found.findings
     extended = found.extended.model  # re-estimated, with their new errors and how these correlate
@@ -95,5 +161,5 @@ def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeyp
 
 
 def test_a_simulation_that_explains_much_is_left_to_the_search(monkeypatch):
-    monkeypatch.setattr(diagnosing, "compare_predictions", lambda *_: pytest.fail("causes were compared"))
-    diagnosing.diagnose(vessel_of("coaster", relative_std=0.1), trial(3))
+    monkeypatch.setattr(selecting, "compare_predictions", lambda *_: pytest.fail("causes were compared"))
+    diagnose(vessel_of("coaster", relative_std=0.1), trial(3))

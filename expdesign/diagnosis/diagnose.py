@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import (
     Accuracy,
     accuracy,
     check_excitation,
     constant_inputs,
     one_step_residuals,
-    white_noise_std,
 )
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
@@ -38,8 +35,6 @@ from expdesign.diagnosis.conclusions import (
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal, most_discriminating, standard_proposals
 from expdesign.diagnosis.fit import (
-    CrossValidation,
-    HeldOut,
     held_out_gain,
     judged,
     uncertain_keys,
@@ -48,25 +43,19 @@ from expdesign.diagnosis.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.judgement import (
-    LITTLE_FIT,
-    errors_as_judged,
-    found_by_predictions,
     harms,
     losses_without,
-    without_harm,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states, simulate_from_measured, stable_windows
-from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
-from expdesign.diagnosis.remainder import Missing, Remainder, with_unlisted_terms
+from expdesign.diagnosis.motion import simulate_from_measured, stable_windows
+from expdesign.diagnosis.remainder import Missing
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
-    eliminate_backward,
     leading_candidates,
-    select_forward,
 )
+from expdesign.diagnosis.selected import CONCLUDED, Selected, explains_little, more_than_noise, select_causes
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged, InputError
@@ -75,15 +64,12 @@ from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 
-MORE_THAN_NOISE = 2.0
-"""The simulation explains little of an output below `LITTLE_FIT`, if its error is so many times the noise."""
 LEAST_GAIN_WITHIN_STD = 1.0
 """Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
 MOST_SAMPLES = 400_000
 """Eleven hours at 10 Hz. 36,000 of 1 s take about 840 MiB of memory, the program's own included."""
-SIMULATED, VALIDATED, COMPARED, CONCLUDED = 18.0, 4.0, 80.0, 25.0
-"""Work before the selection, of the cross-validation of a model, of the comparison of causes by predictions, and of
-conclusions, in simulations of all data."""
+SIMULATED = 18.0
+"""Work before the selection, in simulations of all data."""
 
 
 def diagnose(
@@ -124,7 +110,7 @@ def diagnose(
     begun, windows = with_longer_windows(ship, record, windows)
     motion = simulate_from_measured(ship, windows)
     reported.done = SIMULATED
-    chosen = _select(ship, begun, (windows, record), seed, reported)
+    chosen = select_causes(ship, begun, (windows, record), seed, reported)
     concluding = reported.part(CONCLUDED, 0.0)
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
@@ -181,75 +167,7 @@ def diagnose(
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Selected:
-    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units.
-
-    Attributes:
-        as_stated: errors of the model in use as its file states it.
-        held: of the model before any cause, then after every one that was kept.
-        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
-        validation: of other fits.
-        rest: what is missing beside all causes, or instead of them.
-        compared: causes by their predictions; None where the search found some, or where the simulation explains much.
-    """
-
-    found: Selection
-    kept: Selection
-    as_stated: HeldOut
-    held: list[HeldOut]
-    re_estimated: HeldOut | None
-    validation: CrossValidation
-    rest: Remainder
-    compared: Compared | None
-
-    @property
-    def refused(self) -> tuple[Step, ...]:
-        """Causes that improve simulations of held-out units and harm those of the data as they are."""
-        return self.rest.kept.steps[len(self.kept.steps) :]
-
-    @property
-    def before(self) -> HeldOut:
-        """`as_stated` as `held` was measured: of whole units or of short stretches."""
-        return self.as_stated.like(self.held[0])
-
-
-def _select(
-    ship: ExtendedModel, begun: ExtendedModel, data: tuple[Windows, Record], seed: int, reported: Estimated
-) -> _Selected:
-    """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
-    rng, (windows, _) = np.random.default_rng(seed), data
-    validation = CrossValidation(*data)
-    found = select_forward(begun, windows, initial_states(windows), rng, reported, validation)
-    as_stated = validation.without(None, ship)
-
-    def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
-        progress = reported.part(VALIDATED * (1 + len(found.steps)), CONCLUDED)
-        return errors_as_judged(found, as_stated, validation, windows, progress, seed)
-
-    comparable = found.steps and found.first.keys and within_stated_std(found.first)
-    re_estimated = validation.of(found.first) if comparable else None
-    kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
-    compared, rejected = None, [step.chosen.fit for step in found.steps[len(kept.steps) :]]
-    if not kept.steps and _explains_little(accuracy(ship, data[1]), windows):
-        short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
-        compared = compare_predictions(begun, short, seed, progress)
-        kept, held = (compared and found_by_predictions(kept, compared, data, ship, seed)) or (kept, held)
-    rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
-    kept, held = without_harm(rest.kept, rest.held, ship, data[1])
-    return _Selected(
-        found=found,
-        kept=kept,
-        as_stated=as_stated,
-        held=held,
-        re_estimated=re_estimated,
-        validation=validation,
-        rest=rest,
-        compared=compared,
-    )
-
-
-def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
+def _gains_within_std(chosen: Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
     """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear."""
     gain, (low, _) = held_out_gain(chosen.before, chosen.held[0], seed)
     if not within_stated_std(chosen.kept.first) or not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
@@ -257,13 +175,12 @@ def _gains_within_std(chosen: _Selected, ship: ExtendedModel, seed: int) -> tupl
     return error_reductions_of(ship.model.outputs, chosen.before, chosen.held[0], seed)
 
 
-def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
+def _unexplained(chosen: Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
     """What the simulation does not explain, where that is much more than noise; None elsewhere."""
-    if not _explains_little(after, windows):
+    if not explains_little(after, windows):
         return None
-    if chosen.compared is not None:
-        named = {step.chosen.candidate.cause for step in chosen.kept.steps}
-        causes = [item for item in chosen.compared.causes if item.cause not in named][: SELECTION_TUNING.leads]
+    if chosen.compared is not None:  # each was compared alone, which tells nothing of it beside one that was found
+        causes = () if chosen.kept.steps else chosen.compared.causes[: SELECTION_TUNING.leads]
         leads = [Lead(item.cause, item.gain, item.gain_interval) for item in causes]
     else:
         base = chosen.held[len(chosen.kept.steps)]
@@ -279,25 +196,14 @@ def _unexplained(chosen: _Selected, after: Accuracy, windows: Windows, seed: int
     )
 
 
-def _explains_little(after: Accuracy, windows: Windows) -> bool:
-    """Whether a simulation explains little of some output whose error is much more than noise."""
-    return bool(((after.fit < LITTLE_FIT) & _more_than_noise(after, windows)).any())
-
-
-def _more_than_noise(after: Accuracy, windows: Windows) -> NDArray[np.bool_]:
-    """(n,) whether the error of an output is much more than its noise."""
-    columns = [OUTPUTS.index(name) for name in after.outputs]
-    return np.asarray(after.rmse > MORE_THAN_NOISE * white_noise_std(windows.measured[..., columns]))
-
-
-def _signs(chosen: _Selected, after: Accuracy, windows: Windows, seed: int) -> tuple[Lead, ...]:
+def _signs(chosen: Selected, after: Accuracy, windows: Windows, seed: int) -> tuple[Lead, ...]:
     """Causes that are significant in a test and no findings, surest first; none where little but noise is left.
 
     Their gain is against the same model without them, fitted as they are.
     """
     kept = {id(step.chosen.candidate) for step in chosen.rest.kept.steps}
     rejected = [step for step in chosen.found.steps if id(step.chosen.candidate) not in kept]
-    if not _more_than_noise(after, windows).any():
+    if not more_than_noise(after, windows).any():
         return ()
     found: dict[str, Lead] = {}
     for step in rejected:
@@ -312,7 +218,7 @@ def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:
     return tuple(f"{item.words} ({rounded(item.value, item.std)} {item.unit}".rstrip() + ")" for item in found)
 
 
-def _findings(chosen: _Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
+def _findings(chosen: Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
     """Findings in the order of the selection."""
     return tuple(
         finding_of(
@@ -336,10 +242,13 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
     return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
 
 
-def _notes_on_selection(chosen: _Selected, unit: str, seed: int) -> tuple[str, ...]:
-    rejected = notes_on_rejected(chosen.found, chosen.rest.kept, unit)
+def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ...]:
+    replaced = {id(step.chosen.candidate) for step in chosen.replaced}
+    others = tuple(step for step in chosen.found.steps if id(step.chosen.candidate) not in replaced)
+    rejected = notes_on_rejected(replace(chosen.found, steps=others), chosen.rest.kept, unit)
     if chosen.compared is not None and chosen.kept.steps:
-        notes = [*note_on_predictions(chosen.before, chosen.held[1], chosen.kept, seed), *rejected]
+        how = note_on_predictions(chosen.before, chosen.held[1], chosen.kept, chosen.replaced, seed)
+        notes = [*how, *rejected]
     else:
         notes = [
             *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),

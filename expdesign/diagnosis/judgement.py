@@ -14,19 +14,16 @@ from expdesign.diagnosis.fit import (
     AHEAD_S,
     CrossValidation,
     Fit,
-    FitOptions,
     HeldOut,
     cluster_robust,
-    fit,
     held_out_gain,
     judged,
     leads_away,
-    log_likelihood_gain,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states, simulate_from_measured
-from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause
+from expdesign.diagnosis.motion import simulate_from_measured
+from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause, fitted_to_all
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     FittedCandidate,
@@ -128,10 +125,11 @@ def found_by_predictions(
     """The cause that gains most for certain in predictions, and errors on held-out data without and with it.
 
     None where no cause does with which the data are simulated no worse than by the model in use, or where slow weather
-    that nobody measured predicts about as well.
+    that nobody measured predicts about as well. Where a search found causes, one has to predict better than the model
+    with all of them, to take their place.
 
     Args:
-        kept: a selection without causes.
+        kept: the causes that the search found.
         compared: causes, by their predictions.
         data: as compared, and as measured.
         ship: the model in use.
@@ -139,23 +137,19 @@ def found_by_predictions(
     """
     windows, record = data
     weather = [other.held for other in compared.causes if other.is_slow_weather]
-    for item in compared.causes:
-        if not item.is_certain or not all(_gains_for_certain([held, item.held], seed) for held in weather):
+    known = compared.of(kept.last) if kept.steps else None
+    for item in _certain_besides(kept, compared):
+        better_than = [*([] if known is None else [known]), *([] if item.is_slow_weather else weather)]
+        if not all(_gains_for_certain([held, item.held], seed) for held in better_than):
             continue
-        if harms(ship, item.fit.ship, record):
-            continue
-        chosen = _fitted_to_all(item, kept.first, windows)
+        chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, kept.first, windows)
         if chosen is None:
             continue
-        rivals = [
-            _fitted_to_all(other, kept.first, windows)
-            for other in compared.causes
-            if other is not item and other.is_certain and not _gains_for_certain([other.held, item.held], seed)
-        ]
+        others = [other for other in compared.causes if other is not item and other.is_certain]
         step = Step(
             chosen=chosen,
             p_value=item.p_value,
-            alternatives=tuple(other for other in rivals if other is not None),
+            alternatives=_no_worse(others, item.held, kept.first, windows, seed),
             before=kept.first,
             tests=compared.tests,
         )
@@ -165,27 +159,30 @@ def found_by_predictions(
     return None
 
 
-def _fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:
-    """A cause as it was fitted to short stretches, with the noise of the long windows; None where that diverges there.
+def with_alternatives(kept: Selection, compared: Compared, windows: Windows, seed: int) -> Selection:
+    """A single cause that a search found, with alternatives: those that predict about as well."""
+    known = compared.of(kept.last) if len(kept.steps) == 1 else None
+    if known is None:
+        return kept
+    (step,) = kept.steps
+    likely = {other.candidate.cause for other in step.alternatives}
+    others = [item for item in _certain_besides(kept, compared) if item.cause not in likely]
+    more = _no_worse(others, known, kept.first, windows, seed)
+    return replace(kept, steps=(replace(step, alternatives=(*step.alternatives, *more)),))
 
-    Its standard errors are those of the scatter from stretch to stretch.
-    """
-    ahead = cluster_robust(item.fit, np.arange(float(len(item.fit.starts))))
-    free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
-    try:
-        found = fit(ahead.ship, windows, free, starts=starts, options=FitOptions(steps=0))
-    except (FloatingPointError, np.linalg.LinAlgError):
-        return None
-    gain = log_likelihood_gain(first, found)
-    point = item.point
-    return FittedCandidate(
-        candidate=point.test.candidate,
-        fit=replace(found, covariance=ahead.covariance),
-        likelihood_gain=gain,
-        penalised_gain=gain - SELECTION_TUNING.price * (len(point.keys) + (point.profiled is not None)),
-        keys=point.keys,
-        profiled=point.profiled,
-    )
+
+def _certain_besides(kept: Selection, compared: Compared) -> list[ComparedCause]:
+    """Causes that are certain by their predictions and that the selection does not have."""
+    named = {step.chosen.candidate.cause for step in kept.steps}
+    return [item for item in compared.causes if item.is_certain and item.cause not in named]
+
+
+def _no_worse(
+    causes: Sequence[ComparedCause], held: HeldOut, first: Fit, windows: Windows, seed: int
+) -> tuple[FittedCandidate, ...]:
+    """Causes that do not predict worse for certain than a model with these errors."""
+    fitted = [fitted_to_all(item, first, windows) for item in causes if not _gains_for_certain([item.held, held], seed)]
+    return tuple(item for item in fitted if item is not None)
 
 
 def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows) -> Array:

@@ -1,4 +1,4 @@
-"""The cause that predicts best a short time ahead, where a search by likelihood finds none.
+"""The cause that predicts best a short time ahead, where a search by likelihood leaves much unexplained.
 
 Where the simulation explains little, the likelihood takes much of the error for slow noise, and tests beside such noise
 say little. Here models are fitted by output error in short stretches. Every cause is compared with the same model
@@ -12,17 +12,30 @@ Sources: F. Wilcoxon, Biometrics Bulletin 1 (1945), 80-83, for the signed-rank t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, HeldOut, cross_validate_ahead, fit_output_error, held_out_gain, on_common_units
+from expdesign.diagnosis.fit import (
+    Fit,
+    FitOptions,
+    HeldOut,
+    cluster_robust,
+    cross_validate_ahead,
+    fit,
+    fit_output_error,
+    held_out_gain,
+    log_likelihood_gain,
+    on_common_units,
+)
 from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import initial_states
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
+    FittedCandidate,
     ScoreTest,
     StartingPoint,
     joint_keys,
@@ -36,7 +49,7 @@ from expdesign.progress import Progress
 RE_ESTIMATED = "parameters"
 """No cause here: all models have their uncertain parameters fitted."""
 CURRENT = "current"
-"""Never certain here: one that wanders gains as a steady one does."""
+"""Certain here only where it gains much: one that wanders gains as a steady one does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,9 +85,10 @@ class ComparedCause:
     @property
     def is_certain(self) -> bool:
         """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
-        possible = self.point.test.candidate.is_possible(self.fit.value) and not self.is_slow_weather
+        possible = self.point.test.candidate.is_possible(self.fit.value) and not self.point.test.candidate.imitates
         clear = self.gain > SELECTION_TUNING.clear_gain_points and self.gain_interval[0] > 0.0
-        return possible and clear and self.p_value <= SELECTION_TUNING.accepted_p_value
+        much = self.cause != CURRENT or self.gain_interval[0] > SELECTION_TUNING.much_better_points
+        return possible and clear and much and self.p_value <= SELECTION_TUNING.accepted_p_value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,11 +99,20 @@ class Compared:
         without: errors on held-out stretches of the model without any of them, its uncertain parameters fitted.
         causes: with the largest gain first.
         tests: that chose them.
+        short: data in short stretches.
     """
 
     without: HeldOut
     causes: tuple[ComparedCause, ...]
     tests: tuple[ScoreTest, ...]
+    short: Windows
+
+    def of(self, found: Fit) -> HeldOut | None:
+        """Errors on held-out stretches of another model, fitted in the same way; None where it cannot be fitted."""
+        try:
+            return cross_validate_ahead(fit_output_error(found.ship, self.short, found.free_keys))
+        except (FloatingPointError, np.linalg.LinAlgError):
+            return None
 
 
 def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress: Progress) -> Compared | None:
@@ -116,7 +139,30 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
         progress(activity, (1.0 + number) / (1.0 + len(shortlist)))
         if fitted is not None:
             found.append(_compared(*fitted, without, len(shortlist), seed))
-    return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests)
+    return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests, short=short)
+
+
+def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:
+    """A cause as it was fitted to short stretches, with the noise of the long windows; None where that diverges there.
+
+    Its standard errors are those of the scatter from stretch to stretch.
+    """
+    ahead = cluster_robust(item.fit, np.arange(float(len(item.fit.starts))))
+    free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
+    try:
+        found = fit(ahead.ship, windows, free, starts=starts, options=FitOptions(steps=0))
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return None
+    gain = log_likelihood_gain(first, found)
+    point = item.point
+    return FittedCandidate(
+        candidate=point.test.candidate,
+        fit=replace(found, covariance=ahead.covariance),
+        likelihood_gain=gain,
+        penalised_gain=gain - SELECTION_TUNING.price * (len(point.keys) + (point.profiled is not None)),
+        keys=point.keys,
+        profiled=point.profiled,
+    )
 
 
 def _best_of_each_cause(tests: Sequence[ScoreTest]) -> list[ScoreTest]:

@@ -12,6 +12,7 @@ from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
+    Step,
     gain_beside_the_same_fit,
     same_effects_as_any,
 )
@@ -169,22 +170,28 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
     )
 
 
-def note_on_predictions(as_stated: HeldOut, found: HeldOut, kept: Selection, seed: int) -> tuple[str, ...]:
+def note_on_predictions(
+    as_stated: HeldOut, found: HeldOut, kept: Selection, replaced: Sequence[Step], seed: int
+) -> tuple[str, ...]:
     """How a cause was found that a search by likelihood did not find, and its gain on the model in use as it is.
 
     Args:
         as_stated: errors of the model in use as its file states it, in stretches.
         found: those with the cause, held out.
         kept: the cause.
+        replaced: what the search had found.
         seed: of the interval.
     """
     gain, (low, high) = held_out_gain(as_stated, found, seed)
+    names = " and ".join(missing_effect(step.chosen.candidate.cause) for step in replaced)
+    left = f"found {names}, which leaves much unexplained" if names else "found no certain cause"
     return (
-        "The search by likelihoods found no certain cause. So causes were compared by predictions in stretches of "
-        f"{AHEAD_S:g} s, a fifth of every run held out at a time, each with the same model re-estimated without it: "
-        "the parameters of the vessel file may have been fitted to these data too. On the model as its file states "
-        f"it, the gain of {missing_effect(kept.steps[0].chosen.candidate.cause)} with all parameters re-estimated is "
-        f"{gain:+.1f} points ({low:.1f} to {high:.1f}).",
+        f"The search by likelihoods {left}. So causes were compared by predictions in stretches of {AHEAD_S:g} s, a "
+        "fifth of every run held out at a time, each with the same model re-estimated without it: the parameters of "
+        "the vessel file may have been fitted to these data too. "
+        f"{f'The model with {names} predicts worse for certain. ' if names else ''}"
+        f"On the model as its file states it, the gain of {missing_effect(kept.steps[0].chosen.candidate.cause)} with "
+        f"all parameters re-estimated is {gain:+.1f} points ({low:.1f} to {high:.1f}).",
     )
 
 
