@@ -59,6 +59,7 @@ FLOORS = {
         ("select",),
         ("remainder", "prediction_comparison"),
         ("judgement",),
+        ("selected",),
         ("values",),
         ("conclusions",),
         ("diagnose",),

@@ -160,13 +160,20 @@ def found_by_predictions(
 
 
 def with_alternatives(kept: Selection, compared: Compared, windows: Windows, seed: int) -> Selection:
-    """A single cause that a search found, with alternatives: those that predict about as well."""
+    """A single cause that a search found, with alternatives: those that predict about as well.
+
+    Beside one that may imitate others, they need not gain for certain on the model without it.
+    """
     known = compared.of(kept.last) if len(kept.steps) == 1 else None
     if known is None:
         return kept
     (step,) = kept.steps
     likely = {other.candidate.cause for other in step.alternatives}
-    others = [item for item in _certain_besides(kept, compared) if item.cause not in likely]
+    if step.chosen.candidate.imitates:
+        others = [item for item in compared.causes if item.p_value <= SELECTION_TUNING.accepted_p_value]
+    else:
+        others = _certain_besides(kept, compared)
+    others = [item for item in others if item.cause not in {*likely, step.chosen.candidate.cause}]
     more = _no_worse(others, known, kept.first, windows, seed)
     return replace(kept, steps=(replace(step, alternatives=(*step.alternatives, *more)),))
 

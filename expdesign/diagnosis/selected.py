@@ -84,16 +84,12 @@ def select_causes(
     comparable = found.steps and found.first.keys and within_stated_std(found.first)
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
-    compared, replaced, rejected = (
-        None,
-        tuple[Step, ...](),
-        [step.chosen.fit for step in found.steps[len(kept.steps) :]],
-    )
-    if explains_little(accuracy(kept.last.ship if kept.steps else ship, data[1]), windows):
+    rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
+    searched, compared = kept, None
+    if explains_little(accuracy(kept.last.ship if kept.steps else ship, data[1]), windows) or _imitates(kept):
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
-        replaced = kept.steps if by_predictions else ()
         if compared and kept.steps and not by_predictions:
             kept, compared = with_alternatives(kept, compared, windows, seed), None
         kept, held = by_predictions or (kept, held)
@@ -108,8 +104,13 @@ def select_causes(
         validation=validation,
         rest=rest,
         compared=compared,
-        replaced=replaced,
+        replaced=() if compared is None else searched.steps,
     )
+
+
+def _imitates(kept: Selection) -> bool:
+    """Whether a cause may imitate others."""
+    return any(step.chosen.candidate.imitates for step in kept.steps)
 
 
 def explains_little(after: Accuracy, windows: Windows) -> bool:

@@ -1,13 +1,12 @@
 """The accuracy of a shortest day by the standard trials of IMO MSC.137(76): how much longer does it take?
 
-``python tests/benchmarks/imo_trials.py``: on the story's water, with seed 1; with ``--near`` the goal is 100 m east of the
-start. One set is turning circles with 35 degrees
-of helm, zig-zags 10/10 and 20/20, each to both sides, and a crash stop, from the approach speed given. The same planner
-places it, run-ups and repositioning included. The accuracy asked for is that of the optimal durations in `total_s`, as
-for the shortest day: by the criterion, or for each parameter by itself, which asks both for the same standard
-deviations. A set tells so much, and is repeated until it is enough: information of sets adds up, and each
-takes what the first takes beyond the way to the goal. "runs" counts what the runs tell, as such trials are evaluated;
-"track" counts what legs between them tell, too.
+``python tests/benchmarks/imo_trials.py``: on the story's water, with seed 1; with ``--near`` the goal is 100 m east of
+the start. One set is turning circles with 35 degrees of helm, zig-zags 10/10 and 20/20, each to both sides, and a crash
+stop, from the approach speed given. The same planner places it, run-ups and repositioning included. The accuracy asked
+for is that of the optimal durations in `total_s`, as for the shortest day: by the criterion, or for each parameter by
+itself, which asks both for the same standard deviations. A set tells so much, and is repeated until it is enough:
+information of sets adds up, and each takes what the first takes beyond the way to the goal. "runs" counts what the runs
+tell, as such trials are evaluated; "track" counts what legs between them tell, too.
 """
 
 from __future__ import annotations

@@ -164,11 +164,14 @@ def _best_on_held_out(
     that others with fewer numbers are about as likely as. Many numbers explain errors of the model's structure in the
     data that they are fitted to, and in no others. Where the simulation of whole units leads away from the ship,
     likelihoods tell little, and the best candidates of all other causes are compared. Where it does so only with
-    another cause, that one is no rival. Any other cause has to be much better.
+    another cause, that one is no rival. Any other cause has to be much better. One that imitates many causes is a rival
+    only of another such one.
     """
     astray = astray or leads_away(validation.of(first.fit))
-    near, others = _rivals(first, accepted, any_number=astray), _rivals(first, accepted, any_number=True)
-    rivals = [*near, *(item for item in others if item.candidate.cause not in {one.candidate.cause for one in near})]
+    alike = [item for item in accepted if first.candidate.imitates or not item.candidate.imitates]
+    near, every = _rivals(first, alike, any_number=astray), _rivals(first, alike, any_number=True)
+    taken = {item.candidate.cause for item in near}
+    rivals = [*near, *(item for item in every if item.candidate.cause not in taken)]
     rivals = [item for item in rivals if astray or not leads_away(validation.of(item.fit))]
     if not rivals:
         return first
