@@ -63,6 +63,17 @@ def test_a_cause_that_imitates_others_costs_no_output_more_than_it_gains_on_aver
         assert improves_held_out(replace(found, steps=(step,)), held, 0) == [kept]
 
 
+def test_a_first_cause_that_imitates_others_needs_a_gain():
+    """A point, or less in an interval that excludes zero."""
+    found = steps_of("wind")
+    windy = Candidate(cause="wind", free={"effect": 0.0}, imitates=True)
+    step = SimpleNamespace(chosen=SimpleNamespace(keys=("wind",), fit="wind", candidate=windy))
+    for change, kept in (([2.4, 2.2, 0.9, -0.6, -0.6, 0.9], False), (np.full(6, 0.9), True)):
+        held = [errors(50.0), errors(50.0 + np.array(change)[:, None])]
+        assert improves_held_out(found, held, 0) == [True]
+        assert improves_held_out(replace(found, steps=(step,)), held, 0) == [kept]
+
+
 def test_a_cause_that_imitates_others_does_not_make_a_simpler_one_redundant():
     """Unless it gains much more than the simpler one: then that was an approximation."""
 

@@ -101,16 +101,17 @@ def improves_held_out(
     The test of the first cause is more sensitive than a simulated fit. So the first cause stays, unless it makes the
     simulation worse, or some output is worse on average and the interval allows a larger loss. (Varying currents make
     the intervals of few runs wide.) Later causes need a gain, because no model of a real ship is exact: once a large
-    error is explained, small differences between model and ship become significant. A small gain counts if its
-    interval excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause
-    that imitates others may make no output worse by more than it gains on average. Where whole simulations lead away,
-    the interval of a later cause must exclude zero, and so must that of any cause beside the parameters of the file, as
-    tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off every error is a remark,
-    whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause whose gain is not certain has
-    to show for certain in the error of some output, in predictions from one sample to the next, in short stretches, as
-    one of many runs may be all that shows it, or beside the model that is fitted as it is but for the cause. Parameters
-    of a file that were fitted to the same data have seen what is held out, those fitted with a cause have not: a loss
-    by fitting them hides the gain. A cause may show in predictions alone, if it makes simulations no worse for certain.
+    error is explained, small differences between model and ship become significant. A small gain counts if its interval
+    excludes zero. Uncertain parameters are estimated in any case, so as a cause they need no gain. A cause that
+    imitates others needs a gain even as the first, and may make no output worse by more than that. Where whole
+    simulations lead away, the interval of a later cause must exclude zero, and so must that of any cause beside the
+    parameters of the file, as tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off
+    every error is a remark, whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause
+    whose gain is not certain has to show for certain in the error of some output, in predictions from one sample to the
+    next, in short stretches, as one of many runs may be all that shows it, or beside the model that is fitted as it is
+    but for the cause. Parameters of a file that were fitted to the same data have seen what is held out, those fitted
+    with a cause have not: a loss by fitting them hides the gain. A cause that imitates none may show in predictions
+    alone, if it makes simulations no worse for certain.
 
     Args:
         found: the selection.
@@ -142,7 +143,8 @@ def improves_held_out(
         if not shows:
             beside = gain_beside_the_same_fit(found, held, re_estimated, seed)
             shows = beside is not None and beside[1][0] > 0.0
-        simulated[0] = (simulated[0] and shows) or (share >= TUNING.least_predicted and least > 0.0)
+        alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
+        simulated[0] = (simulated[0] and shows) or (alone and least > 0.0)
     return simulated
 
 
@@ -203,7 +205,7 @@ def simulates_better(
     """
     (gain, interval), least = gained, _least_change(before, after)
     possible = _matters(before, after) and (not imitates or least >= -gain)
-    return possible and _improves(certain, least >= 0.0, gain, interval)
+    return possible and _improves(certain and not imitates, least >= 0.0, gain, interval)
 
 
 def _matters(before: HeldOut, after: HeldOut) -> bool:
