@@ -1,9 +1,12 @@
 """The manoeuvre proposed is the one where two explanations part, sailed on every heading, in the model's own inputs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnosis_case import hidden_record, vessel_of
+from expdesign.diagnosis.causes import CAUSES, Situation, wind_can_be_told
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.discriminating_manoeuvre import (
     Proposal,
@@ -80,3 +83,15 @@ def test_without_thrust_a_wrong_thrust_is_not_seen():
     ship, like = case("barge")
     still = Proposal(name="drifting", inputs=np.zeros((60, 3)), velocity=np.zeros(3), sample_time_s=1.0)
     assert most_discriminating(ship, [ship.with_effects({"gain": 0.2})], [still], STD, like) is None
+
+
+def test_a_wind_that_nobody_measured_is_tested_only_where_courses_differ():
+    """On one course it is a constant force and moment, whatever its direction: many causes are that."""
+    ship, like = case("barge")
+    still = replace(like, has_wind=False)
+    for turned_rad, told in ((0.7, False), (0.9, True)):
+        heading = np.linspace(-turned_rad, turned_rad, like.heading.size).reshape(like.heading.shape) + np.pi
+        windows = replace(still, heading=heading)
+        assert wind_can_be_told(windows) == told
+        candidates = [cause.candidates(Situation(ship=ship, windows=windows)) for cause in CAUSES]
+        assert any(item.imitates for some in candidates for item in some) == told

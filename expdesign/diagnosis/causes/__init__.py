@@ -10,7 +10,7 @@ from expdesign.diagnosis.causes.actuators import (
     THRUSTER_ASYMMETRY,
 )
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
-from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND
+from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND, wind_can_be_told
 from expdesign.diagnosis.causes.hull import (
     CHANGE_POINT,
     LOAD_CHANGE,
@@ -44,4 +44,4 @@ CAUSES: tuple[Cause, ...] = (
     CHANGE_POINT,
 )
 
-__all__ = ["CAUSES", "UNLISTED_TERM", "Candidate", "Cause", "Situation", "Values", "rounded"]
+__all__ = ["CAUSES", "UNLISTED_TERM", "Candidate", "Cause", "Situation", "Values", "rounded", "wind_can_be_told"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from expdesign.diagnosis.accuracy import Accuracy
-from expdesign.diagnosis.causes import rounded
+from expdesign.diagnosis.causes import rounded, wind_can_be_told
 from expdesign.diagnosis.conclusions.verdict import has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut, held_out_gain
@@ -39,6 +39,11 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
         weather = vessel.environment
         if weather.current_to.any() or (weather.wind_to.any() and not windows.has_wind):
             notes.append("The current and wind of the vessel file were left out, because they need a heading.")
+    elif not (windows.has_wind or vessel.environment.wind_to.any() or wind_can_be_told(windows)):
+        notes.append(
+            "All headings are within 45 degrees of their mean. A wind that nobody measured was not tested: on such "
+            "courses it is a constant force and moment, as several causes with fewer numbers are."
+        )
     missing = missing_wind_share(record)
     if windows.has_wind and missing > FEW:
         notes.append(f"The wind is missing in {100 * missing:.0f} % of the samples. Its last value was used there.")

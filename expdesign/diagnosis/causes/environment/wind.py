@@ -10,11 +10,15 @@ import numpy as np
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
 from expdesign.diagnosis.causes.hull import absent_terms
 from expdesign.diagnosis.causes.words import listed, rounded
+from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel, own_air_terms
 
 ASSUMED_MPS, SECTORS, FINER = 10.0, 8, 7
 """For a wind that is not measured: assumed speed, number of directions tried, and steps within each sector."""
 AHEAD, ASIDE, TURNING = "term:W_abs_u_u", "term:W_abs_v_v", "term:W_uv"
+LEAST_TURN_RAD = math.pi / 4
+"""Greatest turn from the mean heading, at least, for a wind that is not measured: on one course it is a constant force
+and a constant moment, as an offset of the rudder, a bias of the compass and a current are, with fewer numbers."""
 MOST_AHEAD = 2.0
 """Drag coefficient ahead over the one aside, at most: no ship shows the air more of her front than of her side, and her
 inertia ahead is at least half of that aside."""
@@ -50,6 +54,13 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
+def wind_can_be_told(windows: Windows) -> bool:
+    """Whether headings differ enough to tell a wind that is not measured from causes with fewer numbers."""
+    mean = math.atan2(float(np.sin(windows.heading).sum()), float(np.cos(windows.heading).sum()))
+    turned = np.angle(np.exp(1j * (windows.heading - mean)))
+    return bool(np.abs(turned).max() >= LEAST_TURN_RAD)
+
+
 def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
     """Air drag in the mean wind that the vessel file states, or in one of unknown direction.
 
@@ -59,7 +70,7 @@ def _of_unknown_wind(situation: Situation, terms: list[str]) -> list[Candidate]:
     free = {f"term:{name}": 0.0 for name in terms}
     if situation.has("wind:north") or situation.has("wind:east"):
         return [Candidate(cause="wind", free=free)]
-    if situation.has("wind:toward"):
+    if situation.has("wind:toward") or not wind_can_be_told(situation.windows):
         return []
     turns = 2 * math.pi * np.arange(SECTORS) / SECTORS
     around = np.linspace(-1, 1, FINER) * math.pi / SECTORS
