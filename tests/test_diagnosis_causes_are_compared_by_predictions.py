@@ -92,7 +92,10 @@ def judged(monkeypatch, *causes: SimpleNamespace, found: float | None) -> tuple[
                                            before=None, tests=()),)  # fmt: skip
     kept = Selection(steps=steps, first=None, last=None, last_tests=())  # type: ignore[arg-type]
     compared = SimpleNamespace(
-        causes=causes, without=errors(np.ones((10, 3))), tests=(), of=lambda _: errors(np.full((10, 3), found))
+        causes=causes,
+        without=errors(np.ones((10, 3))),
+        tests=(),
+        of=lambda _: None if np.isnan(found) else errors(np.full((10, 3), found)),
     )
     by_predictions = judging.found_by_predictions(kept, compared, (None, None), None, 0)
     kept = by_predictions[0] if by_predictions else judging.with_alternatives(kept, compared, None, 0)
@@ -114,6 +117,7 @@ def test_what_predicts_better_for_certain_takes_the_place_of_what_the_search_fou
     small = of("current", 0.3, certain=False, weather=True)
     assert judged(monkeypatch, bias, small, found=0.5) == ("searched", ("heading_bias",))
     assert judged(monkeypatch, bias, found=0.5) == ("heading_bias", ())
+    assert judged(monkeypatch, bias, found=np.nan) == ("searched", ())  # which cannot be fitted in stretches
 
 
 def test_what_slow_weather_predicts_as_well_is_no_certain_cause(monkeypatch):

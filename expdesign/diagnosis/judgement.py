@@ -137,10 +137,10 @@ def found_by_predictions(
     """
     windows, record = data
     weather = [other.held for other in compared.causes if other.is_slow_weather]
-    known = compared.of(kept.last) if kept.steps else None
+    known = [compared.of(kept.last)] if kept.steps else []
     for item in _certain_besides(kept, compared):
-        better_than = [*([] if known is None else [known]), *([] if item.is_slow_weather else weather)]
-        if not all(_gains_for_certain([held, item.held], seed) for held in better_than):
+        better_than = [*known, *([] if item.is_slow_weather else weather)]
+        if not all(held is not None and _gains_for_certain([held, item.held], seed) for held in better_than):
             continue
         chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, kept.first, windows)
         if chosen is None:

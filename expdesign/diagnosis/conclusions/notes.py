@@ -189,7 +189,11 @@ def note_on_predictions(
     """
     gain, (low, high) = held_out_gain(as_stated, found, seed)
     names = " and ".join(missing_effect(step.chosen.candidate.cause) for step in replaced)
-    left = f"found {names}, which leaves much unexplained" if names else "found no certain cause"
+    left = (
+        f"found {names}, which leaves much unexplained or may imitate other causes"
+        if names
+        else "found no certain cause"
+    )
     return (
         f"The search by likelihoods {left}. So causes were compared by predictions in stretches of {AHEAD_S:g} s, a "
         "fifth of every run held out at a time, each with the same model re-estimated without it: the parameters of "
