@@ -97,6 +97,31 @@ def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.Monkey
     assert found.untried == ("further causes",)
 
 
+def test_a_cause_stays_that_is_found_with_the_last_of_the_work(monkeypatch: pytest.MonkeyPatch):
+    """The one before it becomes redundant, and no work is left to begin again without that."""
+
+    def first_of_two(steps, search):
+        if len(steps) < 2:
+            return None
+        search.work.spend(TUNING.most_simulations)
+        return 0
+
+    monkeypatch.setattr(forward_selection, "_to_reject", first_of_two)
+    hidden = {"effects": {"gain": -0.3}, "faults": {"heading_bias": 0.1}}
+    record = hidden_record("barge", seed=6, batches=3, samples=200, **hidden)
+    ship = extended_model(vessel_of("barge"), record)
+    windows = cut_windows(ship.model, record)
+    arguments = np.random.default_rng(0), Estimated(silent), CrossValidation(windows)
+    found = forward_selection.select_forward(ship, windows, initial_states(windows), *arguments)
+    (step,) = found.steps
+    assert found.last is step.chosen.fit
+    (cause,) = {"thrust_gain", "heading_bias"} & {step.chosen.candidate.cause}
+    kept, dropped = ("gain", "heading_bias") if cause == "thrust_gain" else ("heading_bias", "gain")
+    assert abs(found.last.value(kept)) > 3 * found.last.std(kept)
+    assert dropped not in found.last.free_keys
+    assert found.untried[0] == "further causes"
+
+
 def test_a_second_round_from_the_same_fit_costs_no_simulations():
     record = hidden_record("barge", seed=6, batches=2, samples=120, effects={"gain": -0.3})
     ship = extended_model(vessel_of("barge"), record)

@@ -27,6 +27,7 @@ from expdesign.diagnosis.select.profile_likelihood import profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import (
+    FURTHER,
     best_step,
     has_rivals,
     round_tests,
@@ -51,12 +52,13 @@ def select_forward(
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
     A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
-    step where it was added and continues without it, so that no later finding depends on it. Many parameters at once
-    explain nearly any data. So before such a block is added, causes with fewer effects are tried one after the other.
-    Many numbers may also make a right cause redundant that simulates held-out data better; then they are taken out
-    themselves. At the end, causes are compared once more with their best replacement, where another one beside them
-    improves the simulation of held-out data too. The search ends where a cause after the first improves nothing on
-    held-out data: no model of a real ship is exact, and tests always find more.
+    step where it was added and continues without it, so that no later finding depends on it. Where no work is left for
+    that, later causes stay, fitted without it. Many parameters at once explain nearly any data. So before such a block
+    is added, causes with fewer effects are tried one after the other. Many numbers may also make a right cause
+    redundant that simulates held-out data better; then they are taken out themselves. At the end, causes are compared
+    once more with their best replacement, where another one beside them improves the simulation of held-out data too.
+    The search ends where a cause after the first improves nothing on held-out data: no model of a real ship is exact,
+    and tests always find more.
     """
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
@@ -89,8 +91,10 @@ def select_forward(
         redundant = _to_reject(steps, search) if len(rejected) < TUNING.most_rejected else None
         if redundant is not None:
             rejected.append(steps[redundant].chosen.candidate)
-            base = steps[redundant].before
-            del steps[redundant:]
+            without = None if work.allows(FURTHER) else without_step(steps, redundant, windows)
+            before = steps[redundant].before
+            steps = steps[:redundant] if without is None else without
+            base = steps[-1].chosen.fit if steps else before
 
 
 def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:

@@ -26,6 +26,9 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work, work_of_simulation
 from expdesign.processes import in_order
 
+FURTHER = "further causes"
+"""What is left untried once no round is allowed any more."""
+
 
 def selection_round(
     base: Fit,
@@ -100,7 +103,7 @@ def best_step(
     base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], work: Work, validation: CrossValidation
 ) -> Step | None:
     """The best candidate of a round's tests, fitted; None where none is significant."""
-    if not work.allows("further causes"):
+    if not work.allows(FURTHER):
         return None
     points, far = starting_points(base, windows, tests)
     rough = _rough_fits(base, windows, points, work, far=far)
