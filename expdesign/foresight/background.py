@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import Fit
-from expdesign.diagnosis.motion import initial_states, stable_windows
+from expdesign.diagnosis.motion import Motion, initial_states, simulate_from_measured, stable_windows
 from expdesign.diagnosis.select import ScoreTest, fit_nuisance, open_candidates, score_tests
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.foresight.trial import TrialRun, simulated_record, weather_without_causes
+from expdesign.foresight.tuning import TUNING
 from expdesign.simulation import Environment
 from expdesign.vessel import Vessel
 
@@ -39,12 +40,14 @@ class Background:
     Attributes:
         base: the fit of uncertain parameters and of the noise.
         windows: the data.
+        again: the same runs with other noise, simulated by the model in use as it is and cut like the data.
         candidates: of the catalogue.
         tests: of those candidates that differ from everything in the fit.
     """
 
     base: Fit
     windows: Windows
+    again: tuple[Motion, ...]
     candidates: tuple[Candidate, ...]
     tests: tuple[ScoreTest, ...]
 
@@ -59,10 +62,14 @@ def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *
         seed: of sensor noise, weather and the null distribution of the tests.
     """
     rng = np.random.default_rng(seed)
-    record = simulated_record(vessel, runs, weather_without_causes(vessel, weather), rng)
+    calm = weather_without_causes(vessel, weather)
+    record = simulated_record(vessel, runs, calm, rng)
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
     base = fit_nuisance(ship, windows, initial_states(windows))
     candidates = tuple(open_candidates(base, windows))
     tests = score_tests(base, candidates, rng)
-    return Background(base=base, windows=windows, candidates=candidates, tests=tests)
+    records = [simulated_record(vessel, runs, calm, rng) for _ in range(TUNING.records)]
+    long_s = windows.steps * windows.step_s
+    again = [simulate_from_measured(ship, cut_windows(ship.model, item, longest_s=long_s)) for item in records]
+    return Background(base=base, windows=windows, again=tuple(again), candidates=candidates, tests=tests)

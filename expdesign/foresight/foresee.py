@@ -202,7 +202,7 @@ def _foreseen(
 ) -> tuple[Foreseen, ...]:
     rivals = rivals_of(known.tests, joint.rows, joint.beside, rng)
     own_rows = [disturbance_at(known.base.linear, *pair) for pair in zip(joint.directions, joint.sizes, strict=True)]
-    units = simulated_units(known.base, known.windows, own_rows)
+    units = simulated_units(known.base, known.windows, known.again, own_rows)
     return tuple(
         _one(effect, own, index, joint.beside, rivals, known, units)
         for effect, own, index in zip(hidden, sizes, joint.blocks, strict=True)
@@ -290,7 +290,10 @@ def _one(
     name, factor, unit = described(effect.directions[place], known.base.ship)
     found = power(noncentrality, freedom, level) if known_size else np.array(math.nan)
     limit = float(chi2.isf(level, freedom))
-    shown = share_shown(units, index, mixture, limit, np.random.default_rng(0)) if known_size else math.nan
+    seldom = known_size and float(found) < TUNING.least_power
+    shown = 1.0 if seldom else math.nan
+    if known_size and not seldom:
+        shown = share_shown(units, index, mixture, limit, np.random.default_rng(0))
     change = factor * (sizes[place].value if len(sizes) == 1 else _length(sizes, mixture))
     least = math.sqrt(needed_noncentrality(TUNING.wanted_power, freedom, level) / max(noncentrality, 1e-300))
     shift, drawn = mixture @ A[index], rivals.noise[:, index] @ mixture

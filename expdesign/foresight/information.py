@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,6 +11,7 @@ import numpy as np
 from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit import (
+    BLOCK_S,
     Fit,
     build_sensitivities,
     effect_disturbances,
@@ -17,7 +19,7 @@ from expdesign.diagnosis.fit import (
     marginalised,
     validation_units,
 )
-from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, simulate_from_measured
+from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, Motion
 from expdesign.values import Array
 
 
@@ -64,14 +66,17 @@ class SimulatedUnits:
     """How simulated errors of u, v, r over k units of the data change with c nuisance effects and m others.
 
     Attributes:
-        information: (k, c + m, c + m) of each unit, whitened.
-        samples: (k,) measured numbers.
-        products: (k, 3, c + m, c + m) inner products of the sensitivities; with_error: (k, 3, c + m) with the error
-            where nothing is hidden; squared_error, squared_deviation: (k, 3).
+        information: (k, c + m, c + m) of each unit, whitened; predicted: of its u, v, r alone, whose predictions are
+            compared, in so many blocks of time that tell as much.
+        samples: (k,) measured numbers of u, v, r.
+        products: (k, 3, c + m, c + m) inner products of the sensitivities; with_error: (n, k, 3, c + m) with the errors
+            of n records where nothing is hidden; squared_error, squared_deviation: (n, k, 3).
         precision: (c, c) prior precision of the nuisance.
     """
 
     information: Array
+    predicted: Array
+    blocks: int
     samples: Array
     products: Array
     with_error: Array
@@ -80,22 +85,34 @@ class SimulatedUnits:
     precision: Array
 
 
-def simulated_units(base: Fit, windows: Windows, disturbances: Sequence[Disturbance]) -> SimulatedUnits:
-    """Simulated data of a trial with nothing hidden, in the units by which a diagnosis cross-validates."""
+def simulated_units(
+    base: Fit, windows: Windows, again: Sequence[Motion], disturbances: Sequence[Disturbance]
+) -> SimulatedUnits:
+    """Simulated data of a trial with nothing hidden, in the units by which a diagnosis cross-validates.
+
+    Args:
+        base: the fit to a record.
+        windows: its data.
+        again: other records of the same runs, simulated by the model that they come from.
+        disturbances: of hidden effects.
+    """
     unit = validation_units(windows)
     own = effect_disturbances(base.linear, base.keys)
-    values = build_sensitivities(base.linear, [*own, *disturbances], random_current=False).values[..., :3]
-    measured = windows.measured[..., :3]
-    error = simulate_from_measured(base.ship, windows).error[..., :3]
-    seen = np.isfinite(error)
-    values, error = np.where(seen, values, 0.0), np.where(seen, error, 0.0)
+    found = build_sensitivities(base.linear, [*own, *disturbances], random_current=False).values[..., :3]
     member = (unit == np.unique(unit)[:, None]).astype(float)
-    lost, deviation = squared_sums(error, measured)
+    measured = np.stack([item.windows.measured[..., :3] for item in again])
+    error = np.stack([item.error[..., :3] for item in again])
+    values = np.where(np.isfinite(windows.measured[..., :3]), found, 0.0)
+    lost, deviation = (np.stack(part) for part in zip(*map(squared_sums, error, measured), strict=True))
+    without_heading = replace(base.noise, std=np.append(base.noise.std[:3], np.inf))
+    known = (base.linear, base.keys, disturbances)
     return SimulatedUnits(
-        information=unit_information(base.linear, base.keys, disturbances, base.noise, unit),
-        samples=member @ np.isfinite(windows.measured).sum(axis=(1, 2)),
+        information=unit_information(*known, base.noise, unit),
+        predicted=unit_information(*known, without_heading, unit),
+        blocks=max(1, math.ceil(windows.duration_s / len(member) / BLOCK_S)),
+        samples=member @ np.isfinite(windows.measured[..., :3]).sum(axis=(1, 2)),
         products=np.stack([np.einsum("cwso,dwso->ocd", *[values[:, row > 0]] * 2, optimize=True) for row in member]),
-        with_error=np.einsum("kw,cwso,wso->koc", member, values, error, optimize=True),
+        with_error=np.einsum("kw,cwso,nwso->nkoc", member, values, np.nan_to_num(error), optimize=True),
         squared_error=member @ lost,
         squared_deviation=member @ deviation,
         precision=base.precision,

@@ -162,16 +162,17 @@ def share_shown(
     count, prior, every = len(A), np.zeros((len(kept), len(kept))), A.sum(axis=0)
     prior[:c, :c] = units.precision
     root, whole = _root(A), beside_nuisance(every, units.precision)
+    of_blocks = _root(units.predicted[:, kept[:, None], kept] / units.blocks)
     spread = np.linalg.pinv(_root(units.precision).T)
-    drawn: list[tuple[float, tuple[Array, Array, Array]]] = []
-    for _ in range(TUNING.held_out_draws):
+    drawn: list[tuple[float, tuple[Array, Array, Array, int]]] = []
+    for number in range(TUNING.held_out_draws):
         truth = np.concatenate([spread @ rng.standard_normal(c), mixture])
-        noise = np.einsum("kij,kj->ki", root, rng.standard_normal((count, len(kept))))
-        score = A @ truth + noise
+        score = A @ truth + np.einsum("kij,kj->ki", root, rng.standard_normal((count, len(kept))))
         total = score.sum(axis=0)
         left = total[c:] - every[c:, :c] @ np.linalg.lstsq((every + prior)[:c, :c], total[:c], rcond=None)[0]
         statistic = float(left @ np.linalg.lstsq(whole, left, rcond=None)[0])
-        drawn.append((statistic, (truth, noise, score)))
+        blocks = np.einsum("kij,kbj->kbi", of_blocks, rng.standard_normal((count, units.blocks, len(kept))))
+        drawn.append((statistic, (truth, score, blocks, number % len(units.squared_error))))
     drawn.sort(key=lambda item: -item[0])
     accepted = [item for item in drawn if item[0] > limit] or drawn[: max(1, len(drawn) // 4)]
     trials = _Trials(*(np.stack(parts) for parts in zip(*(trial for _, trial in accepted), strict=True)))
@@ -179,27 +180,34 @@ def share_shown(
 
 
 class _Trials(NamedTuple):
-    """Drawn trials: (n, r) true numbers, (n, k, r) noise of the scores of each unit, and these scores."""
+    """Drawn trials.
+
+    Attributes:
+        truth: (n, r) numbers.
+        score: (n, k, r) of each unit.
+        noise: (n, k, b, r) of the scores of blocks of each unit, when its samples are predicted.
+        record: (n,) whose errors are those of its units.
+    """
 
     truth: Array
-    noise: Array
     score: Array
+    noise: Array
+    record: NDArray[np.int64]
 
 
 def _are_shown(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, prior: Array, A: Array) -> list[bool]:
-    """Whether held-out units show the effect, for each trial."""
-    c = len(units.precision)
-    (lost, whitened_lost), (squared, whitened) = (
-        _errors(units, kept, trials, _errors_of_folds(trials, slice(free), prior, A), A) for free in (c, len(kept))
-    )
-    return [
-        _is_shown(
-            HeldOut(squared_error=lost[n], squared_deviation=units.squared_deviation),
-            HeldOut(squared_error=squared[n], squared_deviation=units.squared_deviation),
-            np.log(np.maximum(whitened[n], TINY) / np.maximum(whitened_lost[n], TINY)),
-        )
-        for n in range(len(trials.truth))
-    ]
+    """Whether held-out units show the effect, for each trial; without it the stated or the fitted model counts."""
+    c, deviation = len(units.precision), units.squared_deviation[trials.record]
+    off = [_errors_of_folds(trials, slice(free), prior, A) for free in (0, c, len(kept))]
+    squared = [_simulated(units, kept, trials, item) for item in off]
+    whitened = [_predicted(units, kept, trials, item) for item in off]
+    found = []
+    for n in range(len(trials.truth)):
+        stated, fitted, whole = (HeldOut(squared_error=item[n], squared_deviation=deviation[n]) for item in squared)
+        as_stated = stated.mean_fit > fitted.mean_fit
+        ratios = np.log(whitened[2][n] / whitened[0 if as_stated else 1][n])
+        found.append(_is_shown(stated if as_stated else fitted, whole, fitted, ratios.ravel()))
+    return found
 
 
 def _errors_of_folds(trials: _Trials, free: slice, prior: Array, A: Array) -> Array:
@@ -214,30 +222,34 @@ def _errors_of_folds(trials: _Trials, free: slice, prior: Array, A: Array) -> Ar
     return off
 
 
-def _errors(
-    units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, off: Array, A: Array
-) -> tuple[Array, Array]:
-    """(n, k, o) squared errors of simulating each unit and output, and (n, k) of predicting its samples, whitened."""
+def _simulated(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, off: Array) -> Array:
+    """(n, k, o) squared errors of simulating each unit and output with errors (n, k, r) of the numbers."""
     products = units.products[:, :, kept[:, None], kept]
     squared = (
-        units.squared_error
-        + 2.0 * np.einsum("koc,nkc->nko", units.with_error[..., kept], off)
+        units.squared_error[trials.record]
+        + 2.0 * np.einsum("nkoc,nkc->nko", units.with_error[trials.record][..., kept], off)
         + np.einsum("nkc,kocd,nkd->nko", off, products, off, optimize=True)
     )
+    return np.asarray(np.maximum(squared, 0.0))
+
+
+def _predicted(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, off: Array) -> Array:
+    """(n, k, b) whitened squared errors of predicting the blocks of each unit, likewise."""
+    each = units.predicted[:, kept[:, None], kept] / units.blocks
     whitened = (
-        units.samples
-        + 2.0 * (trials.noise * off).sum(axis=2)
-        + np.einsum("nkc,kcd,nkd->nk", off, A, off, optimize=True)
+        (units.samples / units.blocks)[:, None]
+        + 2.0 * np.einsum("nkbc,nkc->nkb", trials.noise, off)
+        + np.einsum("nkc,kcd,nkd->nk", off, each, off, optimize=True)[..., None]
     )
-    return np.maximum(squared, 0.0), whitened
+    return np.asarray(np.maximum(whitened, TINY))
 
 
-def _is_shown(before: HeldOut, after: HeldOut, ratios: Array) -> bool:
+def _is_shown(before: HeldOut, after: HeldOut, re_estimated: HeldOut, ratios: Array) -> bool:
     """Whether held-out units show a first cause, as a diagnosis asks for.
 
     Args:
-        before: errors of simulating them without it; after: with it.
-        ratios: (k,) logarithms of the squared errors of predicting the samples of each, with it over without.
+        before: errors of simulating them without it; after: with it; re_estimated: without it, parameters fitted.
+        ratios: (k b,) logarithms of the squared errors of predicting the blocks of each, with it over without.
     """
     gained = held_out_gain(before, after, 0)
     scatter = float(ratios.std(ddof=1)) if len(ratios) > 1 else np.inf
@@ -246,7 +258,7 @@ def _is_shown(before: HeldOut, after: HeldOut, ratios: Array) -> bool:
     better = simulates_better(before, after, gained)
     if gained[1][0] > 0.0 or gained[1][1] < 0.0:
         return better
-    shows = predicts or falls_for_certain(before, after, 0)
+    shows = predicts or falls_for_certain(before, after, 0) or held_out_gain(re_estimated, after, 0)[1][0] > 0.0
     return bool((better and shows) or (predicts and share >= SELECTION_TUNING.least_predicted))
 
 

@@ -19,6 +19,8 @@ class Tuning:
         wanted_power: of a cause that counts as revealed.
         told_apart: probability below which two causes count as not told apart.
         draws: of score vectors, for the probability that one cause comes before another.
+        least_power: of a test, below which held-out runs are not asked, as the effect is hardly ever found.
+        records: of a trial with nothing hidden, from which the errors of held-out runs are drawn.
         held_out_draws: of trials, for the share in which held-out runs show what the test accepts.
         most_added_s: longest time of added runs [s].
         most_added_runs: of one manoeuvre.
@@ -34,6 +36,8 @@ class Tuning:
     wanted_power: float = 0.9
     told_apart: float = 0.5
     draws: int = 2000
+    least_power: float = 0.01
+    records: int = 12
     held_out_draws: int = 60
     most_added_s: float = 14400.0
     most_added_runs: int = 200

@@ -51,11 +51,14 @@ from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
 AHEAD_S = TUNING.ahead_s
-FOLDS = TUNING.folds
 """Length of the stretches that held-out data are also simulated in [s]."""
+BLOCK_S = TUNING.block_s
+"""Length of the blocks that predictions are compared in [s]."""
+FOLDS = TUNING.folds
 
 __all__ = [
     "AHEAD_S",
+    "BLOCK_S",
     "FOLDS",
     "CrossValidation",
     "Fit",
