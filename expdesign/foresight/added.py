@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 from expdesign.diagnosis.fit import Fit
 from expdesign.diagnosis.motion import linearise, simulate_from_measured, stable_windows
 from expdesign.dictionary import Primitive
+from expdesign.foresight.background import Background
 from expdesign.foresight.effects import Direction, disturbance_at, lasting
-from expdesign.foresight.information import batch_information, beside_nuisance
+from expdesign.foresight.information import JointInformation, allowed_by_prior, batch_information, beside_nuisance
+from expdesign.foresight.power import needed_noncentrality, power
 from expdesign.foresight.trial import exact_record, run_of, weather_without_causes
 from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import AddedRuns
+from expdesign.foresight.values import AddedRuns, Foreseen
 from expdesign.simulation import Environment, simulate
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+ENDLESS = 1e5
+"""Number of runs of every manoeuvre that stands for unlimited data."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,3 +155,44 @@ def together(offers: Offers, needed: Array) -> AddedRuns | None:
             runs = runs - units[q]
     chosen = tuple((name, int(count)) for name, count in zip(offers.names, runs, strict=True) if count)
     return AddedRuns(runs=chosen, time_s=float(runs @ offers.run_s))
+
+
+def with_added_runs(
+    vessel: Vessel,
+    known: Background,
+    joint: JointInformation,
+    found: tuple[Foreseen, ...],
+    primitives: Sequence[Primitive],
+    weather: Environment,
+) -> tuple[tuple[Foreseen, ...], AddedRuns | None]:
+    """Effects that lack power with the runs that give it to them, and the runs that do so for all of these."""
+    lacking = [number for number, item in enumerate(found) if item.needs_runs]
+    if not primitives or not lacking:
+        return found, None
+    own = len(joint.directions) + len(known.base.keys)
+    offers = Offers(
+        names=tuple(item.name for item in primitives),
+        run_s=np.array([item.duration_s for item in primitives]),
+        known=joint.whole[:own, :own],
+        each=information_of_runs(vessel, known.base, primitives, weather, joint.directions, joint.sizes),
+        precision=known.base.precision,
+        blocks=tuple(joint.blocks[number] for number in lacking),
+    )
+    items = [found[number] for number in lacking]
+    needed = np.array([needed_noncentrality(TUNING.wanted_power, item.freedom, item.level) for item in items])
+    single = of_one_manoeuvre(offers, needed)
+    best = [float(power(largest, item.freedom, item.level)) for item, (_, largest) in zip(items, single, strict=True)]
+    c, ever = len(known.base.keys), offers.known + ENDLESS * offers.each.sum(axis=0)
+    places = [np.r_[np.arange(c), c + index] for index in offers.blocks]
+    within = [
+        allowed_by_prior(ever[np.ix_(place, place)], offers.precision, goal)
+        for place, goal in zip(places, needed.tolist(), strict=True)
+    ]
+    changed = {
+        number: replace(found[number], added=runs, best_power=most, within_std=is_within)
+        for number, (runs, _), most, is_within in zip(lacking, single, best, within, strict=True)
+    }
+    kept = [place for place, (runs, _) in enumerate(single) if runs is not None]
+    some = replace(offers, blocks=tuple(offers.blocks[place] for place in kept))
+    more = together(some, needed[kept]) if kept else None
+    return tuple(changed.get(number, item) for number, item in enumerate(found)), more

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +11,17 @@ from scipy.stats import chi2
 
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.model import group_columns, turns_by_force
-from expdesign.diagnosis.motion import Disturbance
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
-    candidate_disturbances,
 )
 from expdesign.dictionary import Primitive
-from expdesign.foresight.added import Offers, information_of_runs, of_one_manoeuvre, together
+from expdesign.foresight.added import with_added_runs
 from expdesign.foresight.background import UNSEEN, Background, background
-from expdesign.foresight.effects import Direction, HiddenEffect, described, disturbance_at, hidden_effects, joined
+from expdesign.foresight.effects import HiddenEffect, described, disturbance_at, hidden_effects, joined
 from expdesign.foresight.information import (
+    JointInformation,
     SimulatedUnits,
-    allowed_by_prior,
-    batch_information,
-    beside_nuisance,
+    joint_information,
     simulated_units,
 )
 from expdesign.foresight.power import (
@@ -43,14 +39,11 @@ from expdesign.foresight.power import (
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
 from expdesign.foresight.trial import TrialRun
 from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import AddedRuns, Confusion, Foreseen, Foresight
+from expdesign.foresight.values import Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-
-ENDLESS = 1e5
-"""Number of runs of every manoeuvre that stands for unlimited data."""
 
 
 def foresee(
@@ -84,10 +77,10 @@ def foresee(
     hidden = tuple(sorted(hidden, key=lambda item: _place(item.cause)))
     own_sizes = sizes_of(vessel, hidden, known, weather, stated=sizes, progress=second)
     third("power of the tests", 0.0)
-    joint = _joint(known, hidden, own_sizes)
+    joint = joint_information(known, hidden, own_sizes)
     found = _foreseen(known, hidden, own_sizes, joint, np.random.default_rng(seed))
     third("runs that may be added", 0.7)
-    found, more = _with_added_runs(vessel, known, joint, found, offers, weather)
+    found, more = with_added_runs(vessel, known, joint, found, offers, weather)
     names = {item.cause.split(":")[0] for item in known.candidates}
     return Foresight(
         effects=found,
@@ -157,47 +150,11 @@ def _defaults(vessel: Vessel, known: Background, speed_mps: float) -> dict[str, 
     return usual | {f"deadband:{group}": 0.05 * float(largest[group_columns(group, inputs)].max()) for group in groups}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Joint:
-    """Information of a trial about hidden effects at their sizes, then about all tested candidates.
-
-    Attributes:
-        whole: (c + m, c + m) nuisance first; beside: (m, m) beside nuisance.
-        directions, sizes: of the effects' own rows.
-        blocks: per effect, its rows among the m; rows: per tested candidate.
-    """
-
-    whole: Array
-    beside: Array
-    directions: tuple[Direction, ...]
-    sizes: tuple[float, ...]
-    blocks: tuple[NDArray[np.int64], ...]
-    rows: tuple[NDArray[np.int64], ...]
-
-
-def _joint(known: Background, hidden: Sequence[HiddenEffect], sizes: Sequence[tuple[Size, ...]]) -> _Joint:
-    base = known.base
-    directions = tuple(item for effect in hidden for item in effect.directions)
-    values = tuple(size.value if math.isfinite(size.value) else 1.0 for own in sizes for size in own)
-    ends = np.cumsum([len(own) for own in sizes])
-    disturbances = [disturbance_at(base.linear, item, size) for item, size in zip(directions, values, strict=True)]
-    rows = _candidate_rows(known, disturbances)
-    whole = batch_information(base.linear, base.keys, disturbances, base.noise).sum(axis=0)
-    return _Joint(
-        whole=whole,
-        beside=beside_nuisance(whole, base.precision),
-        directions=directions,
-        sizes=values,
-        blocks=tuple(np.arange(end - len(own), end) for end, own in zip(ends.tolist(), sizes, strict=True)),
-        rows=tuple(rows),
-    )
-
-
 def _foreseen(
     known: Background,
     hidden: Sequence[HiddenEffect],
     sizes: Sequence[tuple[Size, ...]],
-    joint: _Joint,
+    joint: JointInformation,
     rng: np.random.Generator,
 ) -> tuple[Foreseen, ...]:
     rivals = rivals_of(known.tests, joint.rows, joint.beside, rng)
@@ -207,62 +164,6 @@ def _foreseen(
         _one(effect, own, index, joint.beside, rivals, known, units)
         for effect, own, index in zip(hidden, sizes, joint.blocks, strict=True)
     )
-
-
-def _with_added_runs(
-    vessel: Vessel,
-    known: Background,
-    joint: _Joint,
-    found: tuple[Foreseen, ...],
-    primitives: Sequence[Primitive],
-    weather: Environment,
-) -> tuple[tuple[Foreseen, ...], AddedRuns | None]:
-    """Effects that lack power with the runs that give it to them, and the runs that do so for all of these."""
-    lacking = [number for number, item in enumerate(found) if item.needs_runs]
-    if not primitives or not lacking:
-        return found, None
-    own = len(joint.directions) + len(known.base.keys)
-    offers = Offers(
-        names=tuple(item.name for item in primitives),
-        run_s=np.array([item.duration_s for item in primitives]),
-        known=joint.whole[:own, :own],
-        each=information_of_runs(vessel, known.base, primitives, weather, joint.directions, joint.sizes),
-        precision=known.base.precision,
-        blocks=tuple(joint.blocks[number] for number in lacking),
-    )
-    items = [found[number] for number in lacking]
-    needed = np.array([needed_noncentrality(TUNING.wanted_power, item.freedom, item.level) for item in items])
-    single = of_one_manoeuvre(offers, needed)
-    best = [float(power(largest, item.freedom, item.level)) for item, (_, largest) in zip(items, single, strict=True)]
-    c, ever = len(known.base.keys), offers.known + ENDLESS * offers.each.sum(axis=0)
-    places = [np.r_[np.arange(c), c + index] for index in offers.blocks]
-    within = [
-        allowed_by_prior(ever[np.ix_(place, place)], offers.precision, goal)
-        for place, goal in zip(places, needed.tolist(), strict=True)
-    ]
-    changed = {
-        number: replace(found[number], added=runs, best_power=most, within_std=is_within)
-        for number, (runs, _), most, is_within in zip(lacking, single, best, within, strict=True)
-    }
-    kept = [place for place, (runs, _) in enumerate(single) if runs is not None]
-    some = replace(offers, blocks=tuple(offers.blocks[place] for place in kept))
-    more = together(some, needed[kept]) if kept else None
-    return tuple(changed.get(number, item) for number, item in enumerate(found)), more
-
-
-def _candidate_rows(known: Background, disturbances: list[Disturbance]) -> list[NDArray[np.int64]]:
-    """Per tested candidate, its rows; appends the disturbances of all of them, shared ones once."""
-    shared: dict[object, int] = {}
-    rows = []
-    for test in known.tests:
-        index = []
-        for tag, disturbance in candidate_disturbances(known.base.linear, test.candidate):
-            if tag not in shared:
-                shared[tag] = len(disturbances)
-                disturbances.append(disturbance())
-            index.append(shared[tag])
-        rows.append(np.array(index))
-    return rows
 
 
 def worst_mixture(block: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Noise, Windows
@@ -20,6 +21,10 @@ from expdesign.diagnosis.fit import (
     validation_units,
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, Motion
+from expdesign.diagnosis.select import candidate_disturbances
+from expdesign.foresight.background import Background
+from expdesign.foresight.effects import Direction, HiddenEffect, disturbance_at
+from expdesign.foresight.sizes import Size
 from expdesign.values import Array
 
 
@@ -147,3 +152,63 @@ def beside_nuisance(whole: Array, precision: Array) -> Array:
     scaled = own / (size[..., :, None] * size[..., None, :])
     solved = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True) @ (cross / size[..., None])
     return np.asarray(whole[..., c:, c:] - np.swapaxes(cross / size[..., None], -1, -2) @ solved)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointInformation:
+    """Information of a trial about hidden effects at their sizes, then about all tested candidates.
+
+    Attributes:
+        whole: (c + m, c + m) nuisance first; beside: (m, m) beside nuisance.
+        directions, sizes: of the effects' own rows.
+        blocks: per effect, its rows among the m; rows: per tested candidate.
+    """
+
+    whole: Array
+    beside: Array
+    directions: tuple[Direction, ...]
+    sizes: tuple[float, ...]
+    blocks: tuple[NDArray[np.int64], ...]
+    rows: tuple[NDArray[np.int64], ...]
+
+
+def joint_information(
+    known: Background, hidden: Sequence[HiddenEffect], sizes: Sequence[tuple[Size, ...]]
+) -> JointInformation:
+    """Information of a trial about hidden effects and tested candidates.
+
+    Args:
+        known: the trial with nothing hidden.
+        hidden: effects.
+        sizes: of the directions of each; where one is not finite, the effect is taken as it is.
+    """
+    base = known.base
+    directions = tuple(item for effect in hidden for item in effect.directions)
+    values = tuple(size.value if math.isfinite(size.value) else 1.0 for own in sizes for size in own)
+    ends = np.cumsum([len(own) for own in sizes])
+    disturbances = [disturbance_at(base.linear, item, size) for item, size in zip(directions, values, strict=True)]
+    rows = _candidate_rows(known, disturbances)
+    whole = batch_information(base.linear, base.keys, disturbances, base.noise).sum(axis=0)
+    return JointInformation(
+        whole=whole,
+        beside=beside_nuisance(whole, base.precision),
+        directions=directions,
+        sizes=values,
+        blocks=tuple(np.arange(end - len(own), end) for end, own in zip(ends.tolist(), sizes, strict=True)),
+        rows=tuple(rows),
+    )
+
+
+def _candidate_rows(known: Background, disturbances: list[Disturbance]) -> list[NDArray[np.int64]]:
+    """Per tested candidate, its rows; appends the disturbances of all of them, shared ones once."""
+    shared: dict[object, int] = {}
+    rows = []
+    for test in known.tests:
+        index = []
+        for tag, disturbance in candidate_disturbances(known.base.linear, test.candidate):
+            if tag not in shared:
+                shared[tag] = len(disturbances)
+                disturbances.append(disturbance())
+            index.append(shared[tag])
+        rows.append(np.array(index))
+    return rows

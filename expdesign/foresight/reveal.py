@@ -23,10 +23,10 @@ from expdesign.diagnosis.model import term_library
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoAnswer
-from expdesign.foresight.added import information_of_runs
+from expdesign.foresight.added import ENDLESS, information_of_runs
 from expdesign.foresight.background import UNSEEN, Background, background
 from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
-from expdesign.foresight.foresee import ENDLESS, effect_name, sizes_of
+from expdesign.foresight.foresee import effect_name, sizes_of
 from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
 from expdesign.foresight.trial import design_runs
