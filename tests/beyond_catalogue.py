@@ -98,7 +98,7 @@ CASES: dict[str, Callable[[int], tuple[Vessel, Record]]] = {
 }
 """Name -> model in use and data, by seed."""
 SAYS: dict[str, tuple[str, ...]] = {
-    "cubic damping": ("v*v*v", "r*r*r"),
+    "cubic damping": ("the term Y_vvv", "the term N_rrr"),
     "governor hysteresis": ("play (hysteresis) of n",),
     "propeller ventilation": ("less effect of n above",),
     "stuck thruster": ("a1 stuck",),

@@ -161,7 +161,7 @@ def test_whole_diagnoses_say_what_is_missing(name: str):
     found = diagnose(*CASES[name](0))
     expected = {
         "nothing": "no error of the model", "bank": "a steady",
-        "drifting time stamps": "time stamps of the sensors that drift", "cubic damping": "r*r*r",
+        "drifting time stamps": "time stamps of the sensors that drift", "cubic damping": "the term N_rrr",
         "speed-dependent lag": "a lag of rudder that changes with speed",
     }  # fmt: skip
     assert expected[name] in found.verdict

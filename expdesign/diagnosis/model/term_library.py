@@ -20,8 +20,14 @@ MORE_TERMS = (
     Term("r", "N_v", "v"),
     Term("r", "N_ur", "u*r"),
     Term("r", "N_abs_r_r", "abs(r)*r"),
+    Term("u", "X_uuu", "u*u*u"),
+    Term("v", "Y_vvv", "v*v*v"),
+    Term("r", "N_rrr", "r*r*r"),
 )
-"""Second-order modulus terms that manoeuvring models often have beside the built-in ones."""
+"""Second-order modulus terms that manoeuvring models often have beside the built-in ones, and cubic damping.
+
+Source: M. A. Abkowitz, Lectures on ship hydrodynamics (1964), for the cubic terms.
+"""
 ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
 """Terms of the thrust loss with advance speed."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
