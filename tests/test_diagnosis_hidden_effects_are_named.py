@@ -23,8 +23,9 @@ CASES = (
     ("tug", "thruster_asymmetry", {"angle_offset": 0.06}, {}, "angle_offset_a_rad", 0.06),
     ("coaster", "actuator_scale", {"rudder_scale": -0.1}, {}, "angle_factor_rudder", 0.9),
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
+    ("barge", "missing_term:N_rrr", {"N_rrr": -60.0}, {}, "N_rrr", -60.0),
 )
-DEFAULT = (0, 7, 12)
+DEFAULT = (0, 7, 12, 13)
 """Tried in every run of the tests; the others take minutes."""
 
 
@@ -49,6 +50,10 @@ def check(case, *, seed, relative_std=0.0, **size):
 def test_a_hidden_effect_is_named_estimated_and_mended(case):
     found = check(case, seed=11, batches=3, samples=150)
     assert found.findings[0].cause == case[1]
+    kind, _, term = case[1].partition(":")
+    if kind == "missing_term":
+        assert f"which multiplies {found.extended.model.terms[-1].expression}." in found.findings[0].explanation
+        assert found.extended.model.terms[-1].name == term
 
 
 @pytest.mark.slow

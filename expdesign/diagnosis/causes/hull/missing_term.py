@@ -23,9 +23,11 @@ def _candidates(situation: Situation) -> tuple[Candidate, ...]:
     )
 
 
-def _explain(values: Values, _ship: ExtendedModel) -> str:
+def _explain(values: Values, ship: ExtendedModel) -> str:
     ((key, (value, std)),) = values.items()
-    return f"The error is correlated with a regressor that the model lacks: the term {key[5:]} = {rounded(value, std)}."
+    name = key[5:]
+    term = f"the term {name} = {rounded(value, std)}, which multiplies {ship.library[name].expression}"
+    return f"The error is correlated with a regressor that the model lacks: {term}."
 
 
 MISSING_TERM = Cause(name="missing_term", candidates=_candidates, explain=_explain)
