@@ -1,4 +1,4 @@
-"""A term of the library that the model lacks."""
+"""A term of the library that the model lacks: linear, a product or modulus of speeds, or cubic damping."""
 
 from __future__ import annotations
 
