@@ -80,3 +80,21 @@ def test_noise_of_differences_is_no_speed():
         data = Record(batches=tuple(from_pose(batch) for batch in record.batches))
         state_rates.append(fastest_rate(extended_model(vessel_of("tug", sample_time_s=0.05), data).model, data))
     assert state_rates[1] < 1.5 * state_rates[0]
+
+
+@pytest.mark.parametrize("step_s", [0.2, 1.0])
+@pytest.mark.parametrize("factors", [(1.0, 100.0), (100.0, 1.0)])
+def test_another_record_is_cut_like_the_first_whatever_step_its_own_speeds_ask_for(step_s, factors):
+    """The damping of a faster ship is faster, which shortens averages and integrator steps."""
+    one, other = (
+        Record(batches=tuple(replace(batch, velocity=factor * batch.velocity) for batch in quiet(step_s).batches))
+        for factor in factors
+    )
+    model = extended_model(vessel_of("barge", sample_time_s=step_s), one).model
+    windows, own = cut_windows(model, one), cut_windows(model, other)
+    assert own.step_s != windows.step_s
+    like = cut_windows(model, other, longest_s=windows.steps * windows.step_s, step_s=windows.step_s)
+    assert like.step_s == pytest.approx(windows.step_s)
+    assert (like.rows_per_step, like.steps_per_sample) == (windows.rows_per_step, windows.steps_per_sample)
+    assert like.measured.shape == windows.measured.shape
+    assert like.heading.shape == windows.heading.shape

@@ -70,6 +70,6 @@ def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *
     candidates = tuple(open_candidates(base, windows))
     tests = score_tests(base, candidates, rng)
     records = [simulated_record(vessel, runs, calm, rng) for _ in range(TUNING.records)]
-    long_s = windows.steps * windows.step_s
-    again = [simulate_from_measured(ship, cut_windows(ship.model, item, longest_s=long_s)) for item in records]
+    like = {"longest_s": windows.steps * windows.step_s, "step_s": windows.step_s}
+    again = [simulate_from_measured(ship, cut_windows(ship.model, item, **like)) for item in records]
     return Background(base=base, windows=windows, again=tuple(again), candidates=candidates, tests=tests)

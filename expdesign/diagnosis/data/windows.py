@@ -160,14 +160,23 @@ def _slowly(batch: Batch) -> Array:
     return np.asarray(batch.velocity[:whole].reshape(-1, count, 3).mean(axis=1))
 
 
-def cut_windows(model: VesselModel, record: Record, *, longest_s: float | None = None) -> Windows:
+def cut_windows(
+    model: VesselModel, record: Record, *, longest_s: float | None = None, step_s: float | None = None
+) -> Windows:
     """Windows of a record for a model driven by its inputs (`estimation.tables.model_for`).
+
+    Args:
+        model: what is simulated.
+        record: data.
+        longest_s: of a window; None for the longest that there may be.
+        step_s: of the integrator, that of other windows; None for what the model needs at the measured speeds.
 
     Raises:
         InputError: batches of different sample times.
     """
     sample_s = _sample_time(record)
-    step_s = min(TUNING.coarsest_step_s, TUNING.step_share / fastest_rate(model, record))
+    if step_s is None:
+        step_s = min(TUNING.coarsest_step_s, TUNING.step_share / fastest_rate(model, record))
     merged = max(1, int(step_s / sample_s + 1e-9))
     between = max(1, int(np.ceil(merged * sample_s / step_s - 1e-9)))
     parts = [SampledBatch(model, batch, merged, between) for batch in record.batches]
