@@ -158,6 +158,8 @@ class Batch:
         steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
             data do not say.
         planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
+        reached: names of inputs that are positions which actuators reached, as measured, not commands: means over each
+            sample of the readings at its ends.
         auxiliary: (k, 8) of `AUXILIARY`, as measured, nan where a column is not; None where none is.
     """
 
@@ -177,6 +179,7 @@ class Batch:
     delivered: Delivered | None = None
     steered: Array | None = None
     planned: Array | None = None
+    reached: tuple[str, ...] = ()
     auxiliary: Array | None = None
 
     def __post_init__(self) -> None:

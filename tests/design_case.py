@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -15,7 +16,7 @@ from expdesign.durations import DurationProblem
 from expdesign.information import PrimitiveInformation, score_primitives
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.simulation import CALM, Environment
-from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, structure_terms
+from expdesign.vessel import Actuator, Limit, Response, Vessel, VesselModel, structure_terms
 
 SCENARIOS = Path(__file__).resolve().parent.parent / "scenarios"
 FREE = Limit()
@@ -49,9 +50,9 @@ def spec(family_name: str, /, name: str = "", **settings: float) -> PrimitiveSpe
     return PrimitiveSpec(name=name or family_name, family=family_name, settings=complete)
 
 
-def force_actuator(limit: Limit = FREE) -> Actuator:
-    """Plain generalised forces, the same limit on all three."""
-    return Actuator(kind="force", number=1, limits=(limit, limit, limit))
+def force_actuator(limit: Limit = FREE, rate: float = math.inf) -> Actuator:
+    """Plain generalised forces, the same limit and slew rate on all three."""
+    return Actuator(kind="force", number=1, limits=(limit,) * 3, responses=(Response(rate=rate),) * 3)
 
 
 def azimuth(
@@ -72,9 +73,9 @@ def structured(structure: str, parameters: Array, actuators: tuple[Actuator, ...
     return VesselModel(terms=structure_terms(structure), parameters=parameters, actuators=actuators, **given)
 
 
-def with_limit(ship: Vessel, limit: Limit) -> Vessel:
-    """The same vessel moved by plain forces with one limit on all of them."""
-    return replace(ship, model=replace(ship.model, actuators=(force_actuator(limit),)))
+def with_limit(ship: Vessel, limit: Limit, rate: float = math.inf) -> Vessel:
+    """The same vessel moved by plain forces with one limit and one slew rate on all of them."""
+    return replace(ship, model=replace(ship.model, actuators=(force_actuator(limit, rate),)))
 
 
 def resampled(ship: Vessel, sample_time_s: float) -> Vessel:

@@ -22,7 +22,7 @@ from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, simulate
-from expdesign.vessel import Actuator, Limit, Vessel, VesselModel, allocate, required_force, structure_terms
+from expdesign.vessel import Actuator, Limit, Response, Vessel, VesselModel, allocate, required_force, structure_terms
 
 PARAMETERS = (-0.05, -0.05, 1.0, 0.02, -0.2, -0.65, 0.02, -0.1, -0.0015, 0.0003)
 CLEARANCE_M = 20.0
@@ -32,14 +32,15 @@ START = np.array([0.0, 0.0, 0.0])
 
 def tug(*, sample_time_s: float = 1.0) -> Vessel:
     """A 30 m ship that takes generalised forces."""
-    limits = (Limit(low=-30, high=30, rate=10), Limit(low=-20, high=20, rate=10), Limit(low=-120, high=120, rate=60))
+    limits = (Limit(low=-30, high=30), Limit(low=-20, high=20), Limit(low=-120, high=120))
+    responses = (Response(rate=10), Response(rate=10), Response(rate=60))
     model = VesselModel(
         terms=structure_terms("manoeuvring-10"),
         parameters=np.array(PARAMETERS),
         parameter_std=0.2 * np.abs(PARAMETERS),
         form="discrete",
         sample_time_s=1.0,
-        actuators=(Actuator(kind="force", number=1, limits=limits),),
+        actuators=(Actuator(kind="force", number=1, limits=limits, responses=responses),),
     )
     return Vessel(name="Test tug", length_m=30.0, beam_m=10.0, draught_m=3.0, sample_time_s=sample_time_s, model=model)
 

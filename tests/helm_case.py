@@ -13,7 +13,7 @@ from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegWater
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
-from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 from plan_case import VESSELS, area
 
 
@@ -51,9 +51,9 @@ def catamaran() -> Vessel:
         Term("r", "N_uv", "u*v"): -0.1,
         Term("r", "N_nn", "abs(n1)*n1-abs(n2)*n2"): 0.004,
     }
-    limit = Limit(low=-15.0, high=15.0, rate=30.0)
+    limit = Limit(low=-15.0, high=15.0)
     actuators = tuple(
-        Actuator(kind="propeller", number=number, starboard_m=side, limits=(limit,))
+        Actuator(kind="propeller", number=number, starboard_m=side, limits=(limit,), responses=(Response(rate=30.0),))
         for number, side in ((1, -0.4), (2, 0.4))
     )
     model = VesselModel(

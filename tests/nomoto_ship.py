@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 GAIN, LAG = 0.08, 9.0
 
@@ -19,8 +19,14 @@ def nomoto_ship(
         Term("r", "N_0", "1"): sense * GAIN / LAG * bias,
     }
     actuators = (
-        Actuator(kind="propeller", number=1, limits=(Limit(low=-6, high=10, rate=2),)),
-        Actuator(kind="rudder", number=1, forward_m=-50, limits=(Limit(low=-0.7, high=0.7, rate=helm_rate),)),
+        Actuator(kind="propeller", number=1, limits=(Limit(low=-6, high=10),), responses=(Response(rate=2),)),
+        Actuator(
+            kind="rudder",
+            number=1,
+            forward_m=-50,
+            limits=(Limit(low=-0.7, high=0.7),),
+            responses=(Response(rate=helm_rate),),
+        ),
     )
     model = VesselModel(
         terms=tuple(rows),

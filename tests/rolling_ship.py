@@ -36,7 +36,7 @@ def orders(vessel: Vessel, samples: int, rng: np.random.Generator, *, hold_s: fl
     """Steady propeller, and a rudder that goes to one of three angles at random, as fast as it can, for so long."""
     hold = round(hold_s / vessel.sample_time_s)
     wished = np.repeat(rng.choice([-0.5, 0.0, 0.5], samples // hold + 1), hold)[:samples]
-    rudder, most = np.zeros(samples), vessel.limits[1].rate * vessel.sample_time_s
+    rudder, most = np.zeros(samples), vessel.rates[1] * vessel.sample_time_s
     for k in range(1, samples):
         rudder[k] = rudder[k - 1] + np.clip(wished[k] - rudder[k - 1], -most, most)
     values = np.column_stack([np.full(samples, 10.0), rudder])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 TERMS = {
     Term("u", "X_uu", "abs(u)*u"): -0.004,
@@ -21,8 +21,20 @@ TERMS = {
 
 def rudder_ship() -> Vessel:
     """Propeller and rudder."""
-    propeller = Actuator(kind="propeller", number=1, forward_m=-40.0, limits=(Limit(low=-3.0, high=4.0, rate=0.5),))
-    rudder = Actuator(kind="rudder", number=1, forward_m=-40.0, limits=(Limit(low=-0.7, high=0.7, rate=0.05),))
+    propeller = Actuator(
+        kind="propeller",
+        number=1,
+        forward_m=-40.0,
+        limits=(Limit(low=-3.0, high=4.0),),
+        responses=(Response(rate=0.5),),
+    )
+    rudder = Actuator(
+        kind="rudder",
+        number=1,
+        forward_m=-40.0,
+        limits=(Limit(low=-0.7, high=0.7),),
+        responses=(Response(rate=0.05),),
+    )
     model = VesselModel(
         terms=tuple(TERMS),
         parameters=np.array(list(TERMS.values())),

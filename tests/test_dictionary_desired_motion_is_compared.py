@@ -58,7 +58,7 @@ def test_offsets_lie_beneath_the_wave_and_begin_and_end_at_zero(name: str, more:
 def test_a_ship_with_slow_actuators_deviates_and_a_ship_without_limits_does_not():
     request = spec("sway_zigzag", duration_s=60, sway_mps=0.3, period_s=30)
     free, slow = (
-        build_primitive(with_limit(vessel("azimuth-30m"), Limit(low=-40, high=40, rate=rate)), request)
+        build_primitive(with_limit(vessel("azimuth-30m"), Limit(low=-40, high=40), rate), request)
         for rate in (1e6, 0.5)
     )
     assert deviation(free) < 0.05

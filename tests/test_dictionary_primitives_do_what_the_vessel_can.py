@@ -61,7 +61,7 @@ def test_commands_of_the_examples_keep_limits_and_rates(ship: str, dictionary: s
 def test_commands_keep_limits_and_rates_however_little_there_is(draw: int):
     rng = np.random.default_rng(draw)
     high, rate = rng.uniform(24.1, 60.0), rng.uniform(0.5, 20.0)  # 24 hold the fastest entry
-    ship = with_limit(vessel("azimuth-30m"), Limit(low=-high, high=high, rate=rate))
+    ship = with_limit(vessel("azimuth-30m"), Limit(low=-high, high=high), rate)
     for request in REQUESTS:
         primitive = build_primitive(ship, request)
         commands, *_ = commanded(ship, primitive)

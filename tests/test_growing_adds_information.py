@@ -83,7 +83,7 @@ def test_the_gains_add_up_to_the_certified_optimum():
 def test_additions_keep_to_the_velocities_and_to_the_actuators_limits(free_form: bool):
     growth, ship = grown(free_form=free_form), vessel("model-ship")
     span = np.diff(growth.limits, axis=1)[:, 0]
-    rate = np.array([limit.rate for limit in ship.limits]) * ship.sample_time_s
+    rate = ship.rates * ship.sample_time_s
     for item in growth.information[-len(growth.rounds) :]:
         velocity = item.primitive.trajectory.velocity
         assert (velocity >= growth.limits[:, 0] - 1e-6 * span).all()

@@ -71,7 +71,7 @@ def test_the_stop_is_that_of_quadratic_resistance_and_constant_thrust() -> None:
 
 
 def replace_rate(actuator: object, rate: float) -> object:
-    return replace(actuator, limits=tuple(replace(limit, rate=rate) for limit in actuator.limits))
+    return replace(actuator, responses=tuple(replace(response, rate=rate) for response in actuator.responses))
 
 
 def test_a_uniform_current_is_found_and_taken_out() -> None:

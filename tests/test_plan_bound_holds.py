@@ -286,7 +286,7 @@ def test_no_random_change_of_speed_is_faster_than_the_limit():
 
 def test_simulated_ships_with_rate_limited_commands_stay_between_the_speed_bounds():
     vessel, rng = ship(), np.random.default_rng(2)
-    rates = np.array([limit.rate for limit in vessel.limits])
+    rates = vessel.rates
     for standing, speed in ((np.array([8.0, 0.0, 8.0, 0.0]), 0.8), (np.array([-3.0, 1.5, 2.0, -0.5]), 0.3)):
         told = leg_end(vessel, CALM, speed, standing, top_mps=1.36, yaw_rate_radps=0.4).changes
         most, least = told.most(speed, 0.1 * np.arange(301)), told.least(speed, 0.1 * np.arange(301))
@@ -306,7 +306,7 @@ def test_simulated_ships_with_rate_limited_commands_stay_between_the_speed_bound
 
 def test_ships_with_stopped_engines_accelerate_no_faster_than_the_limit_at_any_angles():
     vessel, rng = ship(), np.random.default_rng(3)
-    rates = np.array([limit.rate for limit in vessel.limits])
+    rates = vessel.rates
     stopped = np.array([0.0, np.nan, 0.0, np.nan])
     told = leg_end(vessel, CALM, 0.0, stopped, top_mps=1.36, yaw_rate_radps=0.4).changes
     free = leg_end(vessel, CALM, 0.0, None, top_mps=1.36, yaw_rate_radps=0.4).changes

@@ -95,7 +95,7 @@ def test_commands_take_the_vessel_to_the_desired_state_within_limits_and_rates(s
     assert np.allclose(track.velocity[-1], end[3:], atol=2e-3)
     low = [limit.low for limit in water.vessel.limits]
     high = [limit.high for limit in water.vessel.limits]
-    rate = [limit.rate for limit in water.vessel.limits]
+    rate = water.vessel.rates.tolist()
     assert (values >= np.array(low) - 1e-6).all()
     assert (values <= np.array(high) + 1e-6).all()
     steps = np.abs(np.diff(np.vstack([begin, values]), axis=0))

@@ -89,7 +89,7 @@ def test_limits_and_rates_hold_from_the_commands_before_to_those_after(ship, cas
     for index, limit in enumerate(water.vessel.limits):
         assert values[:, index].min() >= limit.low - 1e-6
         assert values[:, index].max() <= limit.high + 1e-6
-        assert np.abs(steps[:, index]).max() <= limit.rate * water.vessel.sample_time_s * (1 + 1e-6)
+        assert np.abs(steps[:, index]).max() <= water.vessel.rates[index] * water.vessel.sample_time_s * (1 + 1e-6)
     np.testing.assert_allclose(values[-1], task.end_inputs, atol=1e-6)
 
 

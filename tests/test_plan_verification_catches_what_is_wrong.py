@@ -65,7 +65,7 @@ def changed(commands: Commands, row: int, column: int, by: float) -> Commands:
 def ramped(vessel, commands: Commands) -> Commands:
     """The first signal, raised from sample 60 on as fast as it may until it is beyond its limit."""
     limit, values = vessel.limits[0], commands.values.copy()
-    climb = values[60, 0] + limit.rate * commands.sample_time_s * np.arange(len(values) - 60)
+    climb = values[60, 0] + vessel.rates[0] * commands.sample_time_s * np.arange(len(values) - 60)
     values[60:, 0] = np.minimum(climb, 1.1 * limit.high)
     return replace(commands, values=values)
 

@@ -1,5 +1,6 @@
 """What the vessel file states of actuators and sensors is undone before parameters are estimated."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +15,9 @@ from expdesign.estimation.settings import Settings
 from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
 from expdesign.reduction.readings import readings
 from expdesign.signals import Batch, Commands, Record
-from expdesign.simulation import CALM, Environment, measure, simulate, simulate_ensemble
+from expdesign.simulation import CALM, Environment, deliver, measure, simulate, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.vessel import SCALAR, Mounting, Response, Sensors, Vessel
+from expdesign.vessel import SCALAR, SENSORS, Mounting, Response, Sensors, Vessel, response_values, std_keys
 from expdesign.vessel.expressions import parse_expression
 from measured_trials import tug_commands
 
@@ -33,6 +34,7 @@ def ship(*responses: Response, **sensors: object) -> Vessel:
 
 LAG = Response(lag_s=3.0), Response(lag_s=2.0)
 FAULTS = {
+    "slew rate": ship(Response(rate=0.5), Response(rate=0.1)),
     "lag": ship(*LAG),
     "dead time": ship(Response(delay_s=2.0), Response(delay_s=1.3)),
     "dead band and offset": ship(Response(), Response(deadband=0.5, offset=0.05)),
@@ -45,9 +47,10 @@ FAULTS = {
 }
 HELD = ship(*LAG, velocity=TWICE, yaw_rate=Mounting(interval_s=2.0))
 ALL = ship(
-    Response(lag_s=3.0, delay_s=1.0), Response(lag_s=2.0, deadband=0.3, offset=0.03),
-    heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1, position=Mounting(forward_m=5.0, delay_s=1.0),
-    heading=Mounting(delay_s=1.0), velocity=replace(TWICE, forward_m=6.0, starboard_m=2.0),
+    Response(rate=0.5, lag_s=3.0, delay_s=1.0), Response(rate=0.1, lag_s=2.0, deadband=0.3, offset=0.03),
+    heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1,
+    position=Mounting(forward_m=5.0, starboard_m=-1.5, delay_s=1.0), heading=Mounting(delay_s=1.0),
+    velocity=replace(TWICE, forward_m=6.0, starboard_m=2.0),
     yaw_rate=Mounting(delay_s=1.0), wind=replace(TIMED, forward_m=8.0),
 )  # fmt: skip
 
@@ -117,8 +120,42 @@ def test_what_actuators_deliver_has_the_mean_of_its_parts():
 
 
 def test_what_is_not_stated_is_not_touched():
-    record = Record(batches=(sailed(TRUE),))
-    assert reduced(record, TRUE) is record
+    record = Record(batches=(sailed(ship()),))
+    assert reduced(record, ship()) is record
+
+
+def test_whatever_a_vessel_file_may_state_of_actuators_and_sensors_is_among_these_faults():
+    ships = (*FAULTS.values(), HELD, ALL)
+    stated = {quantity(name) for one in ships for name in std_keys(one.actuators) if states(one, name)}
+    assert {quantity(name) for name in std_keys(TRUE.actuators)} - stated == set()
+
+
+def quantity(name: str) -> str:
+    """What a key of `std_keys` is about, without the number of its signal."""
+    return re.sub(r"^[na]\d+_", "", name)
+
+
+def states(vessel: Vessel, name: str) -> bool:
+    """Whether a vessel differs from one that states nothing, in a quantity of `std_keys`."""
+    plain, own = ship(), response_values(vessel.actuators)
+    if name in own:
+        return own[name] != response_values(plain.actuators)[name]
+    mountings = {one: getattr(vessel.sensors, one) for one in SENSORS}
+    found = max((one for one in mountings if name.startswith(one + "_")), key=len, default="")
+    if found and hasattr(mountings[found], name.removeprefix(found + "_")):
+        return getattr(mountings[found], name.removeprefix(found + "_")) != 0.0
+    return getattr(vessel.sensors, name) != getattr(plain.sensors, name)
+
+
+def test_positions_that_were_measured_act_as_they_are():
+    """Beside rates, lags and dead times, which only commands pass through, a misalignment acts on positions too."""
+    slow = ship(Response(rate=0.5, lag_s=3.0), Response(rate=0.1, delay_s=2.0, offset=0.03))
+    batch = sailed(slow)
+    given = deliver(slow.responses, batch.inputs, sample_time_s=1.0)
+    reached = given.mean(axis=1) - [response.offset for response in slow.responses]
+    told = replace(batch, inputs=reached, reached=batch.input_names)
+    (seen,) = reduced(Record(batches=(told,)), slow).batches
+    np.testing.assert_allclose(seen.inputs, given.mean(axis=1), atol=1e-12)
 
 
 def test_a_signal_between_readings_is_within_the_stated_error():
@@ -268,8 +305,8 @@ def test_a_stated_wind_stands_for_one_that_is_not_measured(method: str):
 
 
 def test_a_stated_current_is_said_not_to_be_taken_off():
-    vessel = replace(TRUE, environment=Environment(current_to=np.array([0.2, 0.0])))
-    (note,) = reduced(Record(batches=(sailed(TRUE),)), vessel).notes
+    vessel = replace(ship(), environment=Environment(current_to=np.array([0.2, 0.0])))
+    (note,) = reduced(Record(batches=(sailed(ship()),)), vessel).notes
     assert "is not taken off" in note
 
 

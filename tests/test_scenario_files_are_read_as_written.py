@@ -61,7 +61,7 @@ def test_signal_names_never_clash(tmp_path):
     assert vessel.model.inputs == ("n1", "a1", "n2", "rudder1", "n3", "a3")
     assert [column_name(name) for name in vessel.model.inputs][3:5] == ["rudder1_rad", "n3_rps"]
     assert [limit.low for limit in vessel.limits] == [-15.0, -math.inf, -10.0, -0.6, 0.0, -1.0]
-    assert [limit.rate for limit in vessel.limits][:3] == [1.5, 0.25, math.inf]
+    assert vessel.rates.tolist()[:3] == [1.5, 0.25, math.inf]
 
 
 def test_parameters_go_by_name_not_by_order(tmp_path):

@@ -1,4 +1,4 @@
-"""Lag, dead time, dead band and misalignment: closed forms, a fine independent integration, one answer everywhere."""
+"""What actuators deliver: closed forms, a fine independent integration, one answer everywhere."""
 
 from dataclasses import replace
 
@@ -16,6 +16,7 @@ from expdesign.simulation import (
     deliver,
     delivered,
     delivered_at_samples,
+    keeps_to,
     sample_map,
     simulate,
     simulate_ensemble,
@@ -25,6 +26,8 @@ from expdesign.vessel import IDEAL, Response, Sensors, Vessel
 
 SHIP = replace(vessel("azimuth-30m-true"), sensors=Sensors())
 SPEED = Response(lag_s=3.0, delay_s=1.4, deadband=0.5)
+SLEWING = Response(rate=0.8)
+ALL = Response(rate=0.5, lag_s=1.2, delay_s=0.3, deadband=0.2, offset=0.04)
 ANGLE = Response(lag_s=1.2, delay_s=0.3, offset=0.04)
 SEA = Environment(current_to=np.array([0.2, -0.1]), wind_to=np.array([-3.0, 5.0]))
 STANDING = np.array([4.0, 0.2, 6.0, -0.1])
@@ -54,6 +57,46 @@ def test_a_step_is_answered_by_the_exponential():
     begins = step_s / 5 * np.arange(5 * count)
     integral = begins[1] + lag * np.exp(-begins / lag) * np.expm1(-begins[1] / lag)
     np.testing.assert_allclose(means, integral / begins[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("order", [0.6, 0.35, -0.61])
+def test_an_order_is_approached_at_the_slew_rate_from_where_the_actuator_stands(order: float):
+    """Means and ends are integrals of clip(rate t), also after an order that comes before the last one is reached."""
+    rate, step_s = 0.05, 1.0
+    values = np.r_[np.full(5, order), np.full(30, -order)][:, None]
+    time_s = (np.arange(35 * 1000) + 0.5) / 1000
+    turned = np.sign(order) * np.minimum(rate * time_s, abs(order))
+    at_5 = np.sign(order) * min(rate * 5, abs(order))
+    back = at_5 - np.sign(order) * np.minimum(rate * (time_s - 5), abs(order) + abs(at_5))
+    expected = np.where(time_s < 5, turned, back).reshape(35, 1000)
+    given = deliver((Response(rate=rate),), values, sample_time_s=step_s, standing=np.zeros(1))[:, 0, 0]
+    np.testing.assert_allclose(given, expected.mean(axis=1), atol=1e-5)
+    ends = delivered_at_samples((Response(rate=rate),), values, sample_time_s=step_s, standing=np.zeros(1))[1:, 0]
+    np.testing.assert_allclose(ends, expected[:, -1], atol=1e-4)
+
+
+def test_commands_that_keep_to_the_rate_pass_to_the_last_bit_and_so_does_what_was_slewed():
+    rng = np.random.default_rng(8)
+    smooth = np.cumsum(rng.uniform(-0.8, 0.8, (200, 4)), axis=0)
+    given = deliver((SLEWING,) * 4, smooth, sample_time_s=1.0)[:, 0]
+    assert given.tobytes() == smooth.tobytes()
+    jumping = rng.choice([-3.0, 0.0, 3.0], (60, 4)).repeat(5, axis=0)
+    once = deliver((SLEWING,) * 4, jumping, sample_time_s=1.0)[:, 0]
+    assert np.abs(np.diff(once, axis=0)).max() <= 0.8 + 1e-12
+    assert np.abs(once - jumping).max() > 1.0
+    np.testing.assert_array_equal(deliver((SLEWING,) * 4, once, sample_time_s=1.0)[:, 0], once)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_orders_are_told_from_recorded_positions(noise: float):
+    """At 1 Hz and 10 Hz, with noise or in steps of half a degree; the first order is half of the others."""
+    for step_s, rounding in ((1.0, 1e-6), (0.1, 1e-6), (0.1, np.radians(0.5))):
+        orders = np.repeat([0.0, 0.17, -0.17, 0.17, -0.17, 0.0], round(20 / step_s))
+        reached = deliver((Response(rate=0.05),), orders[:, None], sample_time_s=step_s)[:, 0, 0]
+        read = reached + noise * np.random.default_rng(1).standard_normal(len(reached))
+        read = np.round(read / rounding) * rounding
+        assert not keeps_to(0.05, orders, sample_time_s=step_s)
+        assert keeps_to(0.05, read, sample_time_s=step_s)
 
 
 @pytest.mark.parametrize("delay", [0.3, 1.0, 2.75])
@@ -110,10 +153,10 @@ def test_shares_of_what_is_delivered_sum_to_one_and_steps_make_up_the_sample():
 
 
 def test_ideal_actuators_change_no_bit():
-    commands = random_commands(50)
-    assert deliver(SHIP.responses, commands.values, sample_time_s=1.0)[:, 0].tobytes() == commands.values.tobytes()
+    commands, ideal = random_commands(50), sluggish(IDEAL, IDEAL, IDEAL, IDEAL)
+    assert deliver(ideal.responses, commands.values, sample_time_s=1.0)[:, 0].tobytes() == commands.values.tobytes()
     same = sluggish(IDEAL, IDEAL, IDEAL, Response(lag_s=0.0))
-    plain, again = (simulate(ship, commands, environment=SEA, standing=STANDING) for ship in (SHIP, same))
+    plain, again = (simulate(ship, commands, environment=SEA, standing=STANDING) for ship in (ideal, same))
     assert plain.pose.tobytes() == again.pose.tobytes()
     mixed = sluggish(SPEED, IDEAL, SPEED, IDEAL)
     given = deliver(mixed.responses, commands.values, sample_time_s=1.0, substeps=2)
@@ -150,7 +193,7 @@ def test_a_run_is_that_of_the_ship_with_its_lags_as_states():
 
 
 @pytest.mark.parametrize(("integrator", "substeps"), [("rk4", 2), ("rk4", 1), ("euler", 1), ("euler", 3)])
-@pytest.mark.parametrize("responses", [(IDEAL,) * 4, (SPEED, ANGLE, IDEAL, ANGLE)])
+@pytest.mark.parametrize("responses", [(IDEAL,) * 4, (SPEED, ANGLE, IDEAL, ANGLE), (SLEWING, ALL, IDEAL, SLEWING)])
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=pytest.mark.optional)])
 def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: tuple[Response, ...], engine: str):
     ship = sluggish(*responses)
@@ -167,7 +210,7 @@ def test_one_run_and_many_runs_agree(integrator: str, substeps: int, responses: 
 
 
 def test_truths_and_commands_of_their_own_are_delivered_alike():
-    ship = sluggish(SPEED, ANGLE, IDEAL, ANGLE)
+    ship = sluggish(SPEED, ANGLE, SLEWING, ALL)
     runs, still = [random_commands(40, seed) for seed in range(3)], np.zeros((3, 2))
     rest = {"pose": np.zeros((3, 3)), "velocity": np.tile([1.0, 0.0, 0.0], (3, 1)), "current_to": still,
             "wind_to": still, "parameters": np.tile(SHIP.model.parameters, (3, 1))}  # fmt: skip
@@ -179,7 +222,9 @@ def test_truths_and_commands_of_their_own_are_delivered_alike():
     np.testing.assert_allclose(shared[:, 0], own[:, 1], rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize("responses", [(SPEED, ANGLE), (IDEAL, ANGLE), (IDEAL, IDEAL)])
+@pytest.mark.parametrize(
+    "responses", [(SPEED, ANGLE), (IDEAL, ANGLE), (IDEAL, IDEAL), (SLEWING, IDEAL), (SLEWING, ALL)]
+)
 def test_stepping_sample_by_sample_delivers_what_is_delivered_to_commands_known_beforehand(
     responses: tuple[Response, ...],
 ):
@@ -200,7 +245,9 @@ def test_what_is_delivered_can_be_asked_for():
     np.testing.assert_allclose(given.values, fine.mean(axis=1), atol=1e-12)
 
 
-@pytest.mark.parametrize("wrong", [{"lag_s": -1.0}, {"delay_s": np.inf}, {"deadband": np.nan}, {"offset": np.nan}])
+@pytest.mark.parametrize(
+    "wrong", [{"rate": 0.0}, {"lag_s": -1.0}, {"delay_s": np.inf}, {"deadband": np.nan}, {"offset": np.nan}]
+)
 def test_responses_that_mean_nothing_are_refused(wrong: dict[str, float]):
     with pytest.raises(InputError, match=r"response\."):
         Response(**wrong)

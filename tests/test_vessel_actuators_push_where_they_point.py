@@ -13,6 +13,7 @@ from expdesign.vessel import (
     SCALAR,
     Actuator,
     Limit,
+    Response,
     Term,
     allocate,
     column_name,
@@ -131,17 +132,24 @@ def test_fewer_thrusters_come_as_close_as_they_can():
     assert (ahead, side) == pytest.approx((3.0, 1.0))
 
 
+def slewing(actuator: Actuator, *rates: float) -> Actuator:
+    return replace(actuator, responses=tuple(Response(rate=rate) for rate in rates))
+
+
 @pytest.mark.parametrize("draw", range(5))
 def test_limits_and_rates_hold_whatever_is_desired(draw: int):
     rng = np.random.default_rng(draw)
     actuators = (
-        azimuth(1, speed=Limit(low=-3, high=15, rate=1.5), angle=Limit(rate=0.25), forward_m=9.0),
-        azimuth(2, speed=Limit(low=0, high=15), angle=Limit(low=-2.0, high=2.0, rate=0.5), forward_m=-9.0),
-        tunnel(3, speed=Limit(low=-4, high=4, rate=0.3), forward_m=3.0),
+        slewing(azimuth(1, speed=Limit(low=-3, high=15), forward_m=9.0), 1.5, 0.25),
+        slewing(
+            azimuth(2, speed=Limit(low=0, high=15), angle=Limit(low=-2.0, high=2.0), forward_m=-9.0), math.inf, 0.5
+        ),
+        slewing(tunnel(3, speed=Limit(low=-4, high=4), forward_m=3.0), 0.3),
         Actuator(kind="rudder", number=1, limits=(Limit(low=-0.6, high=0.6),)),
     )
     limits = [limit for actuator in actuators for limit in actuator.limits]
-    low, high, rate = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high", "rate"))
+    low, high = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high"))
+    rate = np.array([response.rate for actuator in actuators for response in actuator.responses])
     before = np.zeros(len(limits))
     commands = allocate(actuators, 100 * rng.standard_normal((200, 3)), sample_time_s=0.5, before=before)
     steps = np.abs(np.diff(np.vstack([before, commands]), axis=0))
@@ -217,7 +225,7 @@ def test_an_azimuth_without_stops_finds_what_trying_all_half_turns_finds(low: fl
 
 
 def test_limits_that_hold_nothing_are_refused():
-    for wrong in ({"low": 1.0, "high": 1.0}, {"low": 2.0, "high": 1.0}, {"rate": 0.0}, {"low": math.nan}):
+    for wrong in ({"low": 1.0, "high": 1.0}, {"low": 2.0, "high": 1.0}, {"low": math.nan}):
         with pytest.raises(InputError):
             Limit(**wrong)
 

@@ -1,4 +1,4 @@
-"""Dead times and lags of actuators that are not known exactly.
+"""Dead times, lags and slew rates of actuators that are not known exactly; called times here.
 
 Output error estimates them beside the parameters, with what the vessel file states of them as one more measurement. It
 is linear in them around the values that inputs are delivered with, so `delivered_anew` delivers them again with what
@@ -21,7 +21,7 @@ from expdesign.estimation.values import Estimate
 from expdesign.reduction import TIMES, reduced
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
-from expdesign.vessel import Vessel, response_values, with_response_values
+from expdesign.vessel import RATE_UNITS, Vessel, response_values, stem, with_response_values
 
 Attempt = Callable[[Vessel, Record, tuple[ActuatorTime, ...]], Estimate]
 """(vessel, data, times that are estimated too) -> estimate."""
@@ -65,7 +65,7 @@ def delivered_anew(raw: Record, vessel: Vessel, attempt: Attempt, *, smoothed: b
 
 
 def value(vessel: Vessel, name: str) -> float:
-    """A dead time or lag of a vessel [s]."""
+    """A dead time or lag [s], or a slew rate, of a vessel."""
     return response_values(vessel.actuators)[name]
 
 
@@ -101,7 +101,9 @@ def considered(found: Estimate, record: Record, vessel: Vessel, again: Callable[
         return found
     columns = []
     for name in names:
-        step_s = min(vessel.std[name], TUNING.time_change * record.batches[0].sample_time_s)
+        step_s = vessel.std[name]  # what is delivered is linear in it
+        if not name.endswith("_rate"):
+            step_s = min(step_s, TUNING.time_change * record.batches[0].sample_time_s)
         later, sooner = (
             again(replace(record, batches=tuple(_moved(batch, name, change_s) for batch in record.batches)))
             for change_s in (step_s, -step_s)
@@ -121,6 +123,13 @@ def _moved(batch: Batch, name: str, change_s: float) -> Batch:
     assert batch.delivered is not None  # as it has uncertain times
     steps = batch.delivered.moved(name, change_s)
     return replace(batch, delivered=steps, inputs=steps.mean)
+
+
+def _unit(name: str) -> str:
+    """Unit of a time, or of a slew rate, after a space."""
+    signal, _, quantity = name.partition("_")
+    unit = RATE_UNITS[stem(signal)] if quantity == "rate" else "s"
+    return f" {unit}" if unit else ""
 
 
 def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Vessel) -> Estimate:
@@ -146,12 +155,13 @@ def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Ve
         return replace(found, warnings=(*found.warnings, note))
     known = response_values(stated.actuators)
     each = [
-        f"{name} {time:.3g} ± {std:.2g} s (in the vessel file {known[name]:.3g} ± {stated.std[name]:.2g} s)"
+        f"{name} {time:.3g} ± {std:.2g}{_unit(name)} (in the vessel file {known[name]:.3g} ± "
+        f"{stated.std[name]:.2g}{_unit(name)})"
         for name, (time, std) in times.items()
     ]
     note = (
-        f"Dead times and lags with a standard deviation are estimated with the parameters: {', '.join(each)}. Standard "
-        "deviations of the parameters count their errors."
+        f"Uncertain dead times, lags and slew rates are estimated with the parameters: {', '.join(each)}. "
+        "Standard deviations of the parameters count their errors."
     )
     values = dict(zip(found.nuisance_names, found.nuisance_values.tolist(), strict=True))
     values |= {name: time for name, (time, _) in times.items()}

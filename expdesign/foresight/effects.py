@@ -103,7 +103,7 @@ def usual_roll_period(ship: ExtendedModel) -> float:
 def _is_one_of_a_kind(key: str, ship: ExtendedModel) -> bool:
     """A fault of one actuator of several of the same kind."""
     kind, _, group = key.partition(":")
-    if kind not in ("lag", "delay", "deadband", "offset", "scale") or group not in ship.model.inputs:
+    if kind not in ("slew", "lag", "delay", "deadband", "offset", "scale") or group not in ship.model.inputs:
         return False
     return sum(stem(name) == stem(group) for name in ship.model.inputs) > 1
 

@@ -63,7 +63,7 @@ def optimise_commands(problem: FreeForm) -> Array | None:
     ends = _step(problem).map(k)(states[:, :-1], inputs)
     defects = ca.vec((ends - states[:, 1:]) / ca.DM(span))
     before = ca.horzcat(ca.DM(problem.entry_inputs / size), c[:, :-1])
-    reach = np.array([limit.rate for limit in problem.vessel.limits]) * problem.vessel.sample_time_s / size
+    reach = problem.vessel.rates * problem.vessel.sample_time_s / size
     bounded = np.flatnonzero(np.isfinite(reach))
     changes = c - before
     constraints = ca.vertcat(defects, *(changes[int(i), :].T for i in bounded))

@@ -13,6 +13,7 @@ from expdesign.conventions import OUTPUTS, POSE_COLUMNS
 from expdesign.errors import InputError, UnknownName
 from expdesign.records.file import (
     PLANNED,
+    REACHED,
     STEERED,
     Clock,
     Inputs,
@@ -44,6 +45,7 @@ from expdesign.records.pose import (
 )
 from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY, Batch, Record
+from expdesign.values import Array
 from expdesign.vessel import column_name
 
 UNCHECKED = ("time_s", "batch", "depth_m", "lat_deg", "lon_deg")
@@ -205,11 +207,17 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
     kept = kept_samples(part, origins)
     wind, depth, steered = relative_wind(table), table.columns.get("depth_m"), table.columns.get(STEERED)
     planned = [PLANNED + column for column in inputs.columns if PLANNED + column in table.columns]
+    names = tuple(column.removesuffix("_rps").removesuffix("_rad") for column in inputs.columns)
     return Batch(
         name=name,
         sample_time_s=clock.sample_time_s,
-        input_names=tuple(column.removesuffix("_rps").removesuffix("_rad") for column in inputs.columns),
-        inputs=table.stack(*inputs.columns)[kept],
+        input_names=names,
+        inputs=np.column_stack(
+            [
+                _input(table, column, part)[kept.start - part.start :][: kept.stop - kept.start]
+                for column in inputs.columns
+            ]
+        ),
         velocity=batch_velocity(table, part, clock.sample_time_s, origins, file.request.heading_std_rad),
         pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
         wind=wind[kept] if wind is not None else None,
@@ -219,5 +227,16 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         first_row=table.first_row + kept.start,
         steered=steered[kept] if steered is not None else None,
         planned=table.stack(*planned)[kept] if planned else None,
+        reached=tuple(
+            signal for signal, column in zip(names, inputs.columns, strict=True) if REACHED + column in table.columns
+        ),
         auxiliary=table.stack(*AUXILIARY)[kept] if set(AUXILIARY) & set(table.columns) else None,
     )
+
+
+def _input(table: Table, column: str, part: slice) -> Array:
+    """(k,) a command held in each sample of a part, or the mean of the positions that were reached at its ends."""
+    if REACHED + column not in table.columns:
+        return table.columns[column][part]
+    reached = table.columns[REACHED + column][part]
+    return np.asarray((reached + np.append(reached[1:], reached[-1:])) / 2)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,10 +17,10 @@ from expdesign.reduction.sensors import Stated, measured, shrinkage, turned, und
 from expdesign.reduction.tuning import TUNING
 from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 from expdesign.signals import Batch, Delivered, Record
-from expdesign.simulation import deliver, step_shares
+from expdesign.simulation import acting_response, deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, Response, Sensors, Vessel, VesselModel
+from expdesign.vessel import IDEAL, RATE_UNITS, Response, Sensors, Vessel, VesselModel, column_name, stem
 from expdesign.vessel.sensors import NOISE
 
 KNOWN: Mapping[str, float] = {}
@@ -107,8 +108,8 @@ def with_delivered_inputs(
         record: with commands as inputs.
         model: whose actuators respond.
         standing: (m,) commands held for long before each batch; None for its first ones.
-        std: standard deviations of what the vessel file states, as in `Vessel.std`; derivatives by dead times and lags
-            that have one come with what is delivered.
+        std: standard deviations of what the vessel file states, as in `Vessel.std`; derivatives by dead times, lags and
+            slew rates that have one come with what is delivered.
     """
     responses = {
         signal: response
@@ -123,25 +124,49 @@ def with_delivered_inputs(
         note = "The inputs in the data are forces; the responses that the vessel file states are of other signals."
         return replace(record, notes=(*record.notes, note))
     batches = tuple(_delivered(batch, responses, standing, std) for batch in record.batches)
-    note = (
-        f"As the vessel file states, {', '.join(names)} answer commands with lags, dead times, dead bands or offsets; "
-        "what they deliver is used."
-    )
-    return replace(record, batches=batches, notes=(*record.notes, note))
+    notes = [*record.notes, *_slew_notes(record, {name: responses[name] for name in names})]
+    late = [name for name in names if not responses[name].follows and name not in record.batches[0].reached]
+    if late:
+        notes.append(
+            f"As the vessel file states, {', '.join(late)} answer commands with lags, dead times, dead bands or "
+            "offsets; what they deliver is used."
+        )
+    return replace(record, batches=batches, notes=tuple(notes))
+
+
+def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[str]:
+    """What the recorded values of signals with slew rates are taken for."""
+    for name, response in responses.items():
+        if name in record.batches[0].reached:
+            yield f"reached_{column_name(name)} is used as measured; no rate, dead time, lag or dead band acts on it."
+        elif math.isfinite(response.rate):
+            kept = [acting_response(batch, name, response).rate == math.inf for batch in record.batches]
+            column, rate = column_name(name), f"{response.rate:.3g} {RATE_UNITS[stem(name)]}"
+            if not any(kept):
+                yield f"{column} is taken for the command; it is followed at {rate}, as the vessel file states."
+            else:
+                where = (
+                    "" if all(kept) else f" in {sum(kept)} of {len(kept)} batches, and for the command in the others"
+                )
+                yield (
+                    f"{column} changes no faster than {rate}, the stated rate, and is taken for the position{where}. "
+                    f"A position that was measured is best named reached_{column}."
+                )
 
 
 def _delivered(
     batch: Batch, responses: Mapping[str, Response], standing: Array | None, std: Mapping[str, float]
 ) -> Batch:
-    own = [responses.get(name, IDEAL) for name in batch.input_names]
+    own = [acting_response(batch, name, responses.get(name, IDEAL)) for name in batch.input_names]
     time_s, planned = batch.sample_time_s, batch.planned
     if planned is not None:
-        planned = deliver(own[: planned.shape[1]], planned, sample_time_s=time_s)[:, 0]
+        commanded = [responses.get(name, IDEAL) for name in batch.input_names[: planned.shape[1]]]
+        planned = deliver(commanded, planned, sample_time_s=time_s)[:, 0]
     uncertain = {
         f"{name}_{quantity}": UncertainTime(column=column, quantity=quantity)
         for column, name in enumerate(batch.input_names)
         for quantity in TIMES
-        if std.get(f"{name}_{quantity}", 0.0) > 0 and name in responses
+        if std.get(f"{name}_{quantity}", 0.0) > 0 and name in responses and name not in batch.reached
     }
     if uncertain:
         (values, shares), (by_values, by_shares) = delivered_with_slopes(
@@ -157,6 +182,8 @@ def _delivered(
     else:
         shares = step_shares(own, sample_time_s=time_s, substeps=SUBSTEPS)
         values = deliver(own, batch.inputs, sample_time_s=time_s, substeps=shares, standing=standing)
+        if values.shape[1] == 1:  # held over the whole sample
+            return replace(batch, inputs=values[:, 0], planned=planned)
         steps = Delivered(values=values, shares=shares)
     return replace(batch, inputs=steps.mean, delivered=steps, planned=planned)
 

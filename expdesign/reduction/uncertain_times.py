@@ -1,4 +1,4 @@
-"""What actuators deliver, and its derivatives by their dead times and lags.
+"""What actuators deliver, and its derivatives by their dead times, lags and slew rates.
 
 Samples are divided where commands arrive. A later arrival lengthens the part before it and shortens the part after it:
 what acts in the parts stays, so that simulated motion is smooth in dead times. Parts may have no length, where commands
@@ -13,18 +13,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.simulation import SampleMap, deliver_through, mapped
+from expdesign.simulation import SampleMap, deliver_through, mapped, positions
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, Response
+from expdesign.vessel import Response
 
 SMALL = 1e-4
-"""Change of a time that derivatives are taken by, in samples."""
-TIMES = ("delay_s", "lag_s")
+"""Change that derivatives are taken by: of a time, in samples; of a slew rate, as a share of it."""
+TIMES = ("delay_s", "lag_s", "rate")
+"""Fields of `Response` that may be uncertain and that inputs have derivatives by."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class UncertainTime:
-    """A time of an actuator signal that is not known exactly.
+    """A dead time, lag or slew rate of an actuator signal that is not known exactly.
 
     Attributes:
         column: of the signal, among the inputs.
@@ -102,7 +103,9 @@ def delivered_with_slopes(
     substeps: int,
     standing: Array | None = None,
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Delivered values (k, s, m) and shares (s,) of parts of samples, and both by the times (u, k, s, m), (u, s) [1/s].
+    """Delivered values (k, s, m) and shares (s,) of parts of samples, and both by the times (u, k, s, m), (u, s).
+
+    Derivatives are per second of a time, and per unit of a slew rate.
 
     Args:
         responses: one for each signal.
@@ -117,15 +120,17 @@ def delivered_with_slopes(
     def given(own: Sequence[Response]) -> tuple[Array, Array]:
         shares = parts.shares(own, sample_time_s)
         maps: list[SampleMap | None] = [
-            None if responses[column] == IDEAL and column not in moved else through
+            None if responses[column].follows and column not in moved else through
             for column, through in enumerate(parts.maps(own, sample_time_s))
         ]
-        return deliver_through(maps, commands, len(shares), standing=standing), shares
+        acting = positions(own, commands, sample_time_s=sample_time_s, standing=standing).means
+        return deliver_through(maps, acting, len(shares), standing=standing), shares
 
-    moved, slopes = {time.column for time in times}, []
+    moved, slopes = {time.column for time in times if time.quantity != "rate"}, []
     for time in times:
         was, own = getattr(responses[time.column], time.quantity), list(responses)
-        ends = was + SMALL * sample_time_s, max(was - SMALL * sample_time_s, 0.0)
+        small = SMALL * (was if time.quantity == "rate" else sample_time_s)
+        ends = was + small, max(was - small, 0.0)
         found = []
         for value in ends:
             own[time.column] = replace(responses[time.column], **{time.quantity: value})

@@ -1,9 +1,13 @@
-"""Actuator responses: dead band, dead time, first-order lag and misalignment, in this order.
+"""Actuator responses: slew rate, dead band, dead time, first-order lag and misalignment, in this order.
 
-Commands are held between samples, so the lag has a closed form: `sample_map` states it once, linear in the delivered
-value and in the commands, for arrays and for symbols. `deliver` applies it to commands that are known beforehand,
-`ActuatorState` sample by sample to commands that follow the motion. The mean delivered value over each integrator step
-acts in the equations of motion. A signal with the ideal response passes through unchanged, to the last bit.
+An actuator moves towards its command at its slew rate. Commands that change no faster, as planned ones do, are followed
+as they are held; towards a faster one it moves evenly, and its mean position over each sample goes on (`moved`).
+
+From there commands are held between samples, so the lag has a closed form: `sample_map` states it once, linear in the
+delivered value and in the commands, for arrays and for symbols. `deliver` applies it to commands that are known
+beforehand, `ActuatorState` sample by sample to commands that follow the motion. The mean delivered value over each
+integrator step acts in the equations of motion. A signal with the ideal response passes through unchanged, to the last
+bit, and so does one that only has a rate, where its commands keep to it.
 
 Before the first sample, the `standing` commands are held for long; the first ones by default.
 """
@@ -11,15 +15,20 @@ Before the first sample, the `standing` commands are held for long; the first on
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from expdesign.signals import Commands
+from expdesign.signals import Batch, Commands
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, Response, Vessel
+from expdesign.vessel import Response, Vessel
+
+FOLLOWED = 1.01
+"""Share of a rate up to which commands count as keeping to it: files round them."""
+FASTER, COARSEST = 1.5, 0.03
+"""Share of a stated rate that a recorded position may move at, and share of its range that its readings may step by."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,6 +129,101 @@ def _towards(value: Array, target: Array, lag_s: float, time_s: float) -> tuple[
     return time_s * target + lag_s * gone * (value - target), value + gone * (target - value)
 
 
+def moved(position: Any, goal: Any, reach: Any) -> tuple[Array, Array]:
+    """Mean and last position over a time in which something moves evenly towards a goal and stays there.
+
+    Args:
+        position: at the beginning.
+        goal: held.
+        reach: farthest that it moves in this time, more than 0.
+    """
+    way = goal - position
+    last = np.where(np.abs(way) <= reach, goal, position + np.clip(way, -reach, reach))
+    return np.asarray(last - (last - position) * np.minimum(np.abs(way) / reach, 1.0) / 2), last
+
+
+def positions(
+    responses: Sequence[Response], commands: Array, *, sample_time_s: float, standing: Array | None
+) -> Slewed:
+    """Where actuators stand that move towards their commands (k, m, ...) at their slew rates; see `deliver`."""
+    before = commands[0] if standing is None else standing
+    means, ends = commands, commands
+    for column, response in enumerate(responses):
+        reach = response.rate * sample_time_s
+        first = np.broadcast_to(np.asarray(before[column], dtype=float), commands.shape[2:])
+        previous = np.concatenate([first[None], commands[:-1, column]])
+        faster = np.abs(commands[:, column] - previous) > FOLLOWED * reach
+        if not faster.any():
+            continue
+        if means is commands:
+            means, ends = np.array(commands, dtype=float), np.array(commands, dtype=float)
+        rows = np.flatnonzero(faster.reshape(len(commands), -1).any(axis=1)).tolist()
+        means[:, column], ends[:, column] = _slewed(commands[:, column], previous, rows, reach)
+    return Slewed(means=means, ends=ends)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slewed:
+    """Positions of actuators that move at their slew rates.
+
+    Attributes:
+        means: (k, m, ...) over each sample; the commands themselves where these keep to the rates.
+        ends: (k, m, ...) at the end of each sample.
+    """
+
+    means: Array
+    ends: Array
+
+
+def _slewed(command: Array, previous: Array, faster: Sequence[int], reach: float) -> tuple[Array, Array]:
+    """Means and ends (k, ...) of one signal, followed from each command that is too fast until it is reached."""
+    means, ends, row = np.array(command, dtype=float), np.array(command, dtype=float), 0
+    for start in faster:
+        if start < row:
+            continue
+        row, position = start, previous[start]
+        while row < len(command):
+            means[row], position = _sample_moved(previous[row], position, command[row], reach)
+            ends[row] = position
+            row += 1
+            if (position == command[row - 1]).all():
+                break
+    return means, ends
+
+
+def _sample_moved(previous: Any, position: Any, command: Any, reach: Any) -> tuple[Array, Array]:
+    """Mean and last position over a sample; one that stood at its last command follows a slow change at once."""
+    followed = (position == previous) & (np.abs(command - previous) <= FOLLOWED * reach)
+    mean, last = moved(position, command, reach)
+    return np.where(followed, command, mean), np.where(followed, command, last)
+
+
+def acting_response(batch: Batch, name: str, response: Response) -> Response:
+    """What of a signal's response acts on its recorded values: all on commands, a misalignment on reached positions.
+
+    Values that keep to the slew rate are where the actuator stands, whether they were commanded or measured.
+    """
+    if name in batch.reached:
+        return Response(offset=response.offset)
+    recorded = batch.inputs[:, batch.input_names.index(name)]
+    kept = math.isfinite(response.rate) and keeps_to(response.rate, recorded, sample_time_s=batch.sample_time_s)
+    return replace(response, rate=math.inf) if kept else response
+
+
+def keeps_to(rate: float, signal: Array, *, sample_time_s: float) -> bool:
+    """Whether a recorded signal (k,) moves no faster than an actuator can, but for noise and rounding of its readings.
+
+    A recorded position does, and so does a smooth command. The noise follows from the second differences, the rounding
+    from the smallest change.
+    """
+    steps = np.abs(np.diff(signal))
+    if len(steps) < 2 or not steps.any():
+        return True
+    noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
+    rounding = min(float(steps[steps > 0].min()), COARSEST * float(np.ptp(signal)))
+    return bool(steps.max() <= FASTER * rate * sample_time_s + rounding + 6.0 * noise)
+
+
 def past_deadband(commands: Any, deadband: float) -> Any:
     """Commands outside the dead band; zero for the others."""
     return np.where(np.abs(commands) < deadband, 0.0, commands) if deadband > 0 else commands
@@ -143,22 +247,30 @@ def deliver(
         standing: (m, ...) commands that stood before the first sample; None for those of the first sample.
 
     Returns:
-        (k, substeps, m, ...); where every response is ideal (k, 1, m, ...), the commands themselves.
+        (k, substeps, m, ...); where no response has more than a rate (k, 1, m, ...), the commands themselves if they
+        keep to it.
     """
-    if all(response == IDEAL for response in responses):
-        return commands[:, None]
+    acting = positions(responses, commands, sample_time_s=sample_time_s, standing=standing).means
+    if all(response.follows for response in responses):
+        return acting[:, None]
     count = substeps if isinstance(substeps, int) else len(substeps)
-    maps = [
-        None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
+    return deliver_through(_maps(responses, sample_time_s, substeps), acting, count, standing=standing)
+
+
+def _maps(responses: Sequence[Response], sample_time_s: float, substeps: int | Array) -> tuple[SampleMap | None, ...]:
+    return tuple(
+        None if response.follows else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
         for response in responses
-    ]
-    return deliver_through(maps, commands, count, standing=standing)
+    )
 
 
 def deliver_through(
     maps: Sequence[SampleMap | None], commands: Array, substeps: int, *, standing: Array | None = None
 ) -> Array:
-    """(k, substeps, m, ...) inputs delivered by each signal's map over a sample, None where its response is ideal."""
+    """(k, substeps, m, ...) inputs delivered by each signal's map over a sample, None where it follows at once.
+
+    Commands are those that actuators with slew rates can follow, as of `positions`.
+    """
     result = np.repeat(commands[:, None], substeps, axis=1)
     for column, through in enumerate(maps):
         if through is None:
@@ -175,11 +287,12 @@ def delivered_at_samples(
 ) -> Array:
     """(k + 1, m) delivered values at the start of each sample, before its command acts, and at the end."""
     first = commands[0] if standing is None else standing
-    result = np.concatenate([first[None], commands])
+    acting = positions(responses, commands, sample_time_s=sample_time_s, standing=standing)
+    result = np.concatenate([first[None], acting.ends])
     for column, response in enumerate(responses):
-        if response != IDEAL:
+        if not response.follows:
             through = sample_map(response, sample_time_s=sample_time_s)
-            result[:, column] = _signals(through, commands[:, column], first[column])[0] + through.offset
+            result[:, column] = _signals(through, acting.means[:, column], first[column])[0] + through.offset
     return result
 
 
@@ -209,59 +322,97 @@ class ActuatorState:
     """Actuators of n ships at the start of a sample: `deliver` for commands that are not known beforehand.
 
     Attributes:
-        maps: (m) map of each signal over a sample; None where its response is ideal.
+        maps: (m) map of each signal over a sample; None where it follows at once.
         substeps: integrator steps per sample.
         values: (m, n) delivered values, less the misalignment.
-        past: for each signal (lateness + 1, n) commands outside the dead band that do not act yet, oldest first.
+        past: for each signal (lateness + 1, n) positions outside the dead band that do not act yet, oldest first.
+        reach: (m, 1) farthest that each signal moves in a sample.
+        commands, positions: (m, n) last command of each signal, and how far it came.
     """
 
     maps: tuple[SampleMap | None, ...]
     substeps: int
     values: Array
     past: tuple[Array, ...]
+    reach: Array
+    commands: Array
+    positions: Array
 
     @classmethod
     def standing(
         cls, responses: Sequence[Response], commands: Array, *, sample_time_s: float, substeps: int | Array
     ) -> ActuatorState:
         """The state after commands (m, n) held for long."""
-        maps = tuple(
-            None if response == IDEAL else sample_map(response, sample_time_s=sample_time_s, substeps=substeps)
-            for response in responses
-        )
+        maps = _maps(responses, sample_time_s, substeps)
         values = np.array([_effective(through, row) for through, row in zip(maps, commands, strict=True)])
         counts = [through.lateness + 1 if through else 0 for through in maps]
         past = tuple(np.tile(row, (count, 1)) for row, count in zip(values, counts, strict=True))
         count = substeps if isinstance(substeps, int) else len(substeps)
-        return cls(maps=maps, substeps=count, values=values, past=past)
+        reach = sample_time_s * np.array([[response.rate] for response in responses])
+        now = np.array(commands, dtype=float)
+        return cls(maps=maps, substeps=count, values=values, past=past, reach=reach, commands=now, positions=now)
 
     def mean(self, commands: Array) -> Array:
         """(substeps, m, n) mean over each integrator step of a sample with these commands (m, n).
 
-        Where every response is ideal (1, m, n), the commands themselves.
+        Where no response has more than a rate (1, m, n), the commands themselves if they keep to it.
         """
+        acting = self._moved(commands)[0]
         if not any(self.maps):
-            return commands[None]
-        result = np.repeat(commands[None], self.substeps, axis=0)
+            return acting[None]
+        result = np.repeat(acting[None], self.substeps, axis=0)
         for row, through in enumerate(self.maps):
             if through is not None:
-                result[:, row] = through.means @ self._driving(row, commands[row]) + through.offset
+                result[:, row] = through.means @ self._driving(row, acting[row]) + through.offset
         return result
 
     def after(self, commands: Array) -> ActuatorState:
         """One sample later."""
-        values, pasts = np.array(commands, dtype=float), list(self.past)
+        acting, last = self._moved(commands)
+        values, pasts = np.array(last, dtype=float), list(self.past)
         for row, through in enumerate(self.maps):
             if through is not None:
-                driving = self._driving(row, commands[row])
+                driving = self._driving(row, acting[row])
                 values[row] = through.end @ driving
-                pasts[row] = np.concatenate([self.past[row][1:], _effective(through, commands[row])[None]])
-        return ActuatorState(maps=self.maps, substeps=self.substeps, values=values, past=tuple(pasts))
+                pasts[row] = np.concatenate([self.past[row][1:], _effective(through, acting[row])[None]])
+        return replace(self, values=values, past=tuple(pasts), commands=np.array(commands, dtype=float), positions=last)
+
+    def part(self, ships: Array) -> ActuatorState:
+        """Those of some of the ships, by index (k,)."""
+        return self._changed(lambda rows: rows[:, ships])
+
+    def joined(self, part: ActuatorState, ships: Array) -> ActuatorState:
+        """With the state of a part, whose ships have these indices (k,)."""
+        return self._changed(lambda rows, some: _replaced(rows, some, ships), part)
+
+    def _changed(self, change: Callable[..., Array], *others: ActuatorState) -> ActuatorState:
+        """The state with every array (k, n) of the ships changed, together with those of other states."""
+        states = (self, *others)
+        return replace(
+            self,
+            values=change(*(state.values for state in states)),
+            past=tuple(change(*rows) for rows in zip(*(state.past for state in states), strict=True)),
+            commands=change(*(state.commands for state in states)),
+            positions=change(*(state.positions for state in states)),
+        )
+
+    def _moved(self, commands: Array) -> tuple[Array, Array]:
+        """Mean and last position (m, n) over a sample with these commands."""
+        if not np.isfinite(self.reach).any():
+            return commands, commands
+        return _sample_moved(self.commands, self.positions, commands, self.reach)
 
     def _driving(self, row: int, command: Array) -> Array:
         """(3, n) initial value of a signal, and the commands that act early and late in the sample."""
         on_their_way = np.concatenate([self.past[row], _effective(self.maps[row], command)[None]])
         return np.concatenate([self.values[row][None], on_their_way[:2]])
+
+
+def _replaced(rows: Array, some: Array, ships: Array) -> Array:
+    """Rows (k, n) with those of some ships."""
+    result = rows.copy()
+    result[:, ships] = some
+    return result
 
 
 def _effective(through: SampleMap | None, command: Array) -> Array:

@@ -108,19 +108,18 @@ class Helm:
     @property
     def drive_rate(self) -> float:
         """Largest change of the engine order per second."""
-        thrust = [a.limits[0] for a in self.vessel.actuators if a.kind in ("propeller", "azimuth", "force")]
-        return min(limit.rate / max(abs(limit.low), abs(limit.high)) for limit in thrust)
+        thrust = [a for a in self.vessel.actuators if a.kind in ("propeller", "azimuth", "force")]
+        return min(a.responses[0].rate / max(abs(a.limits[0].low), abs(a.limits[0].high)) for a in thrust)
 
     def angle_rate(self, drive: float) -> float:
         """Largest change of the helm angle per second [rad/s] at an engine order."""
         if self.means == "propeller":
             return self.drive_rate
         if self.means != "force":
-            return min((actuator.limits[-1].rate for actuator in self.steering), default=math.inf)
-        limits = self.steering[0].limits
-        thrust = max(abs(float(_share(limits[0], drive))), 1e-300)
+            return min((actuator.responses[-1].rate for actuator in self.steering), default=math.inf)
+        thrust = max(abs(float(_share(self.steering[0].limits[0], drive))), 1e-300)
         levers = (1.0, 1.0, self.vessel.length_m / 2)
-        return min(limit.rate / (thrust * lever) for limit, lever in zip(limits, levers, strict=True))
+        return min(how.rate / (thrust * lever) for how, lever in zip(self.steering[0].responses, levers, strict=True))
 
     def check(self, drive: float, angle_rad: float) -> None:
         """Raise InputError when an actuator cannot give this."""

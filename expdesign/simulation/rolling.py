@@ -14,11 +14,11 @@ import numpy as np
 import scipy
 
 from expdesign.signals import AUXILIARY, Commands, Trajectory
-from expdesign.simulation.actuation import delivered_at_samples
+from expdesign.simulation.actuation import delivered_at_samples, positions
 from expdesign.simulation.motion import motion_rates
 from expdesign.simulation.program import STATES
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, RollPendulum, Vessel
+from expdesign.vessel import RollPendulum, Vessel
 
 
 def rolled(
@@ -77,9 +77,10 @@ def in_waves(vessel: Vessel, sailed: Trajectory, rng: np.random.Generator) -> Tr
 
 def _at_ends(vessel: Vessel, commands: Commands, standing: Array | None) -> tuple[Array, Array]:
     """Delivered inputs (k, m) at the begin and at the end of every sample; held ones are the command at both."""
-    values = commands.values
-    exact = delivered_at_samples(vessel.responses, values, sample_time_s=commands.sample_time_s, standing=standing)
-    held = np.array([response == IDEAL for response in vessel.responses])
+    values, step_s = commands.values, commands.sample_time_s
+    exact = delivered_at_samples(vessel.responses, values, sample_time_s=step_s, standing=standing)
+    acting = positions(vessel.responses, values, sample_time_s=step_s, standing=standing).means
+    held = np.array([response.follows for response in vessel.responses]) & (acting == values)
     return np.where(held, values, exact[:-1]), np.where(held, values, exact[1:])
 
 

@@ -3,6 +3,7 @@
 from expdesign.vessel.actuators import (
     IDEAL,
     KINDS,
+    RATE_UNITS,
     Actuator,
     Limit,
     Response,
@@ -39,6 +40,7 @@ __all__ = [
     "NOT_ACTING_BACK",
     "NOT_SUPPORTED",
     "NUMPY",
+    "RATE_UNITS",
     "ROLL_PARAMETERS",
     "SCALAR",
     "SENSORS",

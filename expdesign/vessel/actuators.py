@@ -48,16 +48,26 @@ QUANTITIES = {
 """Signal stem -> quantity, its unit and the unit of its rate, as endings of keys in vessel files."""
 
 
-def limit_keys(stem: str) -> tuple[str, str, str]:
-    """Keys in vessel files of a signal's lower limit, upper limit and rate."""
-    name, unit, rate = QUANTITIES[stem]
-    return f"{name}_min{unit}", f"{name}_max{unit}", f"{name}_rate{rate}"
+RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in QUANTITIES.items()}
+"""Signal stem -> unit of its slew rate."""
 
 
-def response_keys(stem: str) -> tuple[str, str, str, str]:
-    """Keys in vessel files of a signal's lag, dead time, dead band and misalignment."""
+def limit_keys(stem: str) -> tuple[str, str]:
+    """Keys in vessel files of a signal's lower and upper limit."""
     name, unit, _ = QUANTITIES[stem]
-    return f"{name}_lag_s", f"{name}_delay_s", f"{name}_deadband{unit}", f"{name}_offset{unit}"
+    return f"{name}_min{unit}", f"{name}_max{unit}"
+
+
+def response_keys(stem: str) -> dict[str, str]:
+    """Field of `Response` -> key in vessel files, for a signal."""
+    name, unit, rate = QUANTITIES[stem]
+    return {
+        "rate": f"{name}_rate{rate}",
+        "lag_s": f"{name}_lag_s",
+        "delay_s": f"{name}_delay_s",
+        "deadband": f"{name}_deadband{unit}",
+        "offset": f"{name}_offset{unit}",
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,46 +76,51 @@ class Limit:
 
     Attributes:
         low, high: [unit of the signal], low < high; infinite where there is none.
-        rate: largest change per second, positive.
     """
 
     low: float = -math.inf
     high: float = math.inf
-    rate: float = math.inf
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
             raise InputError(f"limits are [{self.low:g}, {self.high:g}], expected low below high")
-        if not self.rate > 0:
-            raise InputError(f"rate is {self.rate:g}, expected more than 0")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Response:
     """How one actuator signal follows its command c(t), in this order.
 
-    A command acts `delay_s` after it is given; one smaller in size than `deadband` counts as zero, others are not
-    shortened; what is delivered approaches it as a first-order lag, dx/dt = (c - x) / `lag_s`; a misalignment is added,
-    x + `offset`. Limits and rates are those of commands and come before all this.
+    The actuator moves towards a command at its slew rate; a position smaller in size than `deadband` counts as zero,
+    others are not shortened; it acts `delay_s` later; what is delivered approaches it as a first-order lag,
+    dx/dt = (c - x) / `lag_s`; a misalignment is added, x + `offset`.
 
     Attributes:
+        rate: slew rate, the largest change per second [unit of the signal per second], infinite for none.
         lag_s: time constant [s], 0 for none.
         delay_s: dead time [s].
         deadband: [unit of the signal], not negative.
         offset: delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard.
     """
 
+    rate: float = math.inf
     lag_s: float = 0.0
     delay_s: float = 0.0
     deadband: float = 0.0
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        if not self.rate > 0:
+            raise InputError(f"response.rate is {self.rate:g}, expected more than 0")
         for name in ("lag_s", "delay_s", "deadband"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise InputError(f"response.{name} is {getattr(self, name):g}, expected 0 or more")
         if not math.isfinite(self.offset):
             raise InputError(f"response.offset is {self.offset:g}, expected a finite angle")
+
+    @property
+    def follows(self) -> bool:
+        """Whether commands that change no faster than `rate` are delivered unchanged and at once."""
+        return not (self.lag_s or self.delay_s or self.deadband or self.offset)
 
 
 IDEAL = Response()

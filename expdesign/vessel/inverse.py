@@ -186,7 +186,8 @@ class Allocator:
 def _bounds(actuators: tuple[Actuator, ...], sample_time_s: float) -> tuple[Array, Array, Array]:
     """(m,) lowest, highest command and largest change from sample to sample."""
     limits = [limit for actuator in actuators for limit in actuator.limits]
-    low, high, rate = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high", "rate"))
+    low, high = (np.array([getattr(limit, name) for limit in limits]) for name in ("low", "high"))
+    rate = np.array([response.rate for actuator in actuators for response in actuator.responses])
     return readonly(low), readonly(high), readonly(rate * sample_time_s)
 
 

@@ -80,6 +80,8 @@ class Vessel:
         for name in self.std:
             if name not in std_keys(self.actuators):
                 raise UnknownName("standard deviation", name, known=std_keys(self.actuators))
+            if name.endswith("_rate") and not np.isfinite(response_values(self.actuators)[name]):
+                raise InputError(f"std.{name} is given without a rate, expected the rate in the table of its actuator")
 
     @property
     def actuators(self) -> tuple[Actuator, ...]:
@@ -95,6 +97,11 @@ class Vessel:
     def responses(self) -> tuple[Response, ...]:
         """How every actuator signal follows its command, in command order."""
         return tuple(response for actuator in self.actuators for response in actuator.responses)
+
+    @property
+    def rates(self) -> Array:
+        """(m,) slew rate of every actuator signal [unit of the signal per second], in command order."""
+        return np.array([response.rate for response in self.responses])
 
     @property
     def angles(self) -> np.ndarray:

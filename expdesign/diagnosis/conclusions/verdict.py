@@ -22,6 +22,7 @@ MISSING_EFFECTS = {
     "thruster_asymmetry": "an asymmetry of thrust",
     "actuator_lag": "the lag of the actuators",
     "actuator_delay": "the dead time of the actuators",
+    "actuator_slew": "the slew rate of the actuators",
     "actuator_deadband": "the dead band of the actuators",
     "actuator_scale": "the scale of the rudder angle",
     "load_change": "the correct inertia",

@@ -17,7 +17,7 @@ from expdesign.diagnosis.model import ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import LinearisedMotion
 from expdesign.values import Array
 
-POSITIVE = ("lag:", "delay:")
+POSITIVE = ("lag:", "delay:", "slew:")
 """Effects that are times, from zero on."""
 LEAST_TIME_S = 1e-6
 """Taken for zero: derivatives are differences upward."""
@@ -235,9 +235,9 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
     result = {}
     for key, value in effects.items():
         kind = key.split(":")[0]
-        if kind in ("lag", "delay", "deadband") or key in ("roll:period", "roll:damping"):
+        if kind in ("lag", "delay", "slew", "deadband") or key in ("roll:period", "roll:damping"):
             before, ratio = ship.get(key), TUNING.largest_ratio
-            least = 0.0 if kind in ("lag", "delay") else before / ratio
+            least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
             value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
         elif kind in ("inertia", "gain", "gyro", "scale"):
             value = max(value, TUNING.smallest_factor_change)

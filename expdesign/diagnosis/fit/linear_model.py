@@ -144,7 +144,7 @@ def difference_step(ship: ExtendedModel, key: str) -> float:
     kind = key.split(":")[0]
     if kind in ("theta", "term"):
         return 1e-4 * max(1e-4, _parameter_scale(ship, key))
-    if kind in ("lag", "delay", "deadband"):
+    if kind in ("lag", "delay", "slew", "deadband"):
         return max(0.05 * value, 1e-6)
     if kind == "roll":
         return max(1e-3 * value, 1e-6)

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from expdesign.vessel import stem
 
-RESPONSES = {"deadband": "deadband", "delay": "delay_s", "lag": "lag_s", "offset": "offset"}
-"""Kind of effect of a group of inputs -> field of `vessel.Response`, in the order in which they act."""
+RESPONSES = {"slew": "rate", "deadband": "deadband", "delay": "delay_s", "lag": "lag_s", "offset": "offset"}
+"""Kind of effect of a group of inputs -> field of `vessel.Response`, in the order in which they act.
+
+The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.
+"""
+
+
+def response_effect(kind: str, value: float) -> float:
+    """From a field of `vessel.Response` to the effect or back: the inverse of a slew rate, else the same."""
+    return (1.0 / value if value else math.inf) if kind == "slew" else value
 
 
 def group_columns(group: str, inputs: tuple[str, ...]) -> list[int]:

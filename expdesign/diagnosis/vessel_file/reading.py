@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.data import derived_outputs, has_heading
-from expdesign.diagnosis.model import RESPONSES, ROLL, ExtendedModel, term_library, values_by_group
+from expdesign.diagnosis.model import RESPONSES, ROLL, ExtendedModel, response_effect, term_library, values_by_group
 from expdesign.diagnosis.vessel_file.stated_std import stated_std
 from expdesign.errors import InputError
 from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
-from expdesign.vessel import Environment, Roll, Sensors, Vessel, VesselModel
+from expdesign.simulation import acting_response
+from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, VesselModel
 from expdesign.vessel.structures import SHOAL
 
 
@@ -24,7 +25,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
     """
     model, max_draught_over_depth = _driven(vessel, record)
     derived = derived_outputs(record)
-    effects = _answering(model) | _sensed(vessel.sensors, derived) | _rolled(model.roll)
+    effects = _answering(model, record) | _sensed(vessel.sensors, derived) | _rolled(model.roll)
     effects |= _flowing(vessel.environment) if has_heading(record) else {}
     known = {key: value for key, value in effects.items() if value}
     return ExtendedModel(
@@ -41,14 +42,22 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
     )
 
 
-def _answering(model: VesselModel) -> dict[str, float]:
-    """Actuator responses of a vessel file."""
+def _answering(model: VesselModel, record: Record) -> dict[str, float]:
+    """Actuator responses of a vessel file, as far as they act on what is recorded (`simulation.acting_response`)."""
     rows = [row for actuator in model.actuators for row in zip(actuator.signals, actuator.responses, strict=True)]
-    return {
-        f"{kind}:{group}": value
-        for kind, name in RESPONSES.items()
-        for group, value in values_by_group({signal: getattr(how, name) for signal, how in rows}, model.inputs).items()
-    }
+    found = dict[str, float]()
+    for kind, name in RESPONSES.items():
+        values = {
+            signal: response_effect(kind, getattr(_acting(record, signal, response), name)) for signal, response in rows
+        }
+        found |= {f"{kind}:{group}": value for group, value in values_by_group(values, model.inputs).items()}
+    return found
+
+
+def _acting(record: Record, signal: str, response: Response) -> Response:
+    """The response that acts on the recorded values of a signal in any of the batches."""
+    given = [acting_response(batch, signal, response) for batch in record.batches if signal in batch.input_names]
+    return next((own for own in given if own == response), given[0] if given else response)
 
 
 def _flowing(weather: Environment) -> dict[str, float]:

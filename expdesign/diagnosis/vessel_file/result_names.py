@@ -29,6 +29,9 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
     if kind == "deadband":
         unit = _input_unit(rest, model)
         return f"deadband_{rest}_{unit}" if unit else f"deadband_{rest}", 1.0, 0.0, unit
+    if kind == "slew":
+        unit = _input_unit(rest, model)
+        return f"slew_{rest}_s_per_{unit or 'unit'}", 1.0, 0.0, f"s/{unit}" if unit else "s"
     if key == "asymmetry":
         return _lean_name(model)
     if kind in PATTERNS:

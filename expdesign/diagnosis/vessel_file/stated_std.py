@@ -26,15 +26,24 @@ def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...]
     found = {}
     for key in stated:
         kind = key.split(":")[0]
-        names = _file_keys(key, inputs, derived)
-        found[key] = flows[kind] if kind in flows else max((vessel.std.get(name, 0.0) for name in names), default=0.0)
+        given = (vessel.std.get(name, 0.0) for name in _file_keys(key, inputs, derived))
+        found[key] = flows[kind] if kind in flows else max(given, default=0.0) * _slope(key, stated[key])
     return {key: std for key, std in found.items() if std > 0 and key.split(":")[0] not in SEARCHED}
 
 
 def found_std(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float], known: Sequence[str]) -> dict[str, float]:
     """`Vessel.std` with the standard errors of effects; `known` are the keys that the vessel's file may have."""
-    named = {name: value for key, value in std.items() for name in _file_keys(key, ship.model.inputs, ship.derived)}
+    named = {
+        name: value / _slope(key, ship.get(key))
+        for key, value in std.items()
+        for name in _file_keys(key, ship.model.inputs, ship.derived)
+    }
     return {name: value for name, value in {**vessel.std, **named}.items() if name in known and value > 0}
+
+
+def _slope(key: str, effect: float) -> float:
+    """Change of an effect by that of the number which the vessel file states."""
+    return effect**2 if key.startswith("slew:") and effect else 1.0
 
 
 def with_std(weather: Environment, std: Mapping[str, float]) -> Environment:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind
+from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind, response_effect
 from expdesign.diagnosis.vessel_file.found_terms import found_model
 from expdesign.diagnosis.vessel_file.stated_std import found_std, with_std
 from expdesign.values import Array
@@ -76,14 +76,14 @@ def _actuators(actuators: tuple[Actuator, ...], ship: ExtendedModel) -> tuple[tu
     recorded = ship.model.inputs
     changes: dict[str, dict[str, float]] = {}
     lost = []
-    for key, value in ship.effects.items():
+    for key in dict.fromkeys((*ship.stated, *ship.effects)):
         kind, _, group = key.partition(":")
         if kind not in RESPONSES:
             continue
         for index in group_columns(group, recorded):
             if recorded[index] in own:
                 row = changes.setdefault(recorded[index], {})
-                row[RESPONSES[kind]] = row.get(RESPONSES[kind], 0.0) + value
+                row[kind] = row.get(kind, 0.0) + ship.get(key)
             else:
                 lost.append(
                     f"{kind} of {recorded[index]} is not in the vessel file, whose actuators take other signals."
@@ -91,11 +91,16 @@ def _actuators(actuators: tuple[Actuator, ...], ship: ExtendedModel) -> tuple[tu
     result = []
     for actuator in actuators:
         responses = tuple(
-            Response(**changes.get(signal, {})) if signal in recorded else response
+            _changed(response, changes.get(signal, {}))
             for signal, response in zip(actuator.signals, actuator.responses, strict=True)
         )
         result.append(replace(actuator, responses=responses))
     return tuple(result), tuple(dict.fromkeys(lost))
+
+
+def _changed(response: Response, effects: Mapping[str, float]) -> Response:
+    """A response with other effects; those that played no role in the data stay as they are stated."""
+    return replace(response, **{RESPONSES[kind]: response_effect(kind, value) for kind, value in effects.items()})
 
 
 def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:

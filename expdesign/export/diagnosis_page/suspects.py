@@ -38,7 +38,7 @@ def is_force(found: Diagnosis, item: Finding) -> bool:
 
 def has_sign(item: Finding) -> bool:
     """Whether the error changes its sign with the variable; otherwise only its size grows."""
-    return not item.keys[0].startswith(("lag:", "delay:", "roll:", "change:"))
+    return not item.keys[0].startswith(("slew:", "lag:", "delay:", "roll:", "change:"))
 
 
 def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) -> tuple[Array, str]:
@@ -81,7 +81,7 @@ def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
     """(w, s) values of the variable that an error depends on, at the compared samples, and their label."""
     key = item.keys[0]
     kind, _, rest = key.partition(":")
-    if kind in ("lag", "delay"):
+    if kind in ("slew", "lag", "delay"):
         inputs = extended_model(found.vessel, found.record).model.inputs
         return _since_change(found, group_columns(rest, inputs))
     if kind == "inertia" or key in ("late:u", "late:v", "late:r"):

@@ -13,6 +13,7 @@ TITLES = {
     "thruster_asymmetry": "Asymmetry of thrust or angles",
     "actuator_lag": "Actuator lag",
     "actuator_delay": "Actuator dead time",
+    "actuator_slew": "Slew rate of the actuators",
     "actuator_deadband": "Actuator dead band",
     "load_change": "Change of load (inertia)",
     "heading_bias": "Misaligned compass or speed sensor",

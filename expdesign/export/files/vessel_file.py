@@ -66,10 +66,10 @@ def _actuator(actuator: Actuator) -> dict[str, str | float]:
         "starboard_m": actuator.starboard_m,
     }
     for stem, limit, response in zip(KINDS[actuator.kind], actuator.limits, actuator.responses, strict=True):
-        values = zip(limit_keys(stem), (limit.low, limit.high, limit.rate), strict=True)
+        values = zip(limit_keys(stem), (limit.low, limit.high), strict=True)
         entries |= {key: value for key, value in values if math.isfinite(value)}
-        values = zip(response_keys(stem), vars(response).values(), strict=True)
-        entries |= {key: value for key, value in values if value}
+        fields = ((key, getattr(response, name)) for name, key in response_keys(stem).items())
+        entries |= {key: value for key, value in fields if value and math.isfinite(value)}
     return entries
 
 

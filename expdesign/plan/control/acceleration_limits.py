@@ -13,7 +13,7 @@ from expdesign.memory import recalled
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, NUMPY, Vessel
+from expdesign.vessel import NUMPY, Vessel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,9 +119,8 @@ def leg_end(
 def to_work_s(vessel: Vessel) -> float:
     """Time of the slowest actuator from nothing to full, of those without limits over a quarter turn [s]."""
     reach = [max(abs(limit.low), abs(limit.high)) for limit in vessel.limits]
-    times = [
-        (far if np.isfinite(far) else np.pi / 2) / limit.rate for far, limit in zip(reach, vessel.limits, strict=True)
-    ]
+    rates: list[float] = vessel.rates.tolist()
+    times = [(far if np.isfinite(far) else np.pi / 2) / rate for far, rate in zip(reach, rates, strict=True)]
     return max([*times, vessel.sample_time_s])
 
 
@@ -132,12 +131,11 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
         np.where(limited, [getattr(x, name) for x in vessel.limits], far)
         for name, far in (("low", -np.pi), ("high", np.pi))
     )
-    if inputs is None or any(response != IDEAL for response in vessel.responses):
+    if inputs is None or not all(response.follows for response in vessel.responses):
         return np.array([np.inf]), np.stack([low, high])[None]
     until_s = to_work_s(vessel) * np.array(CONTROL.stage_shares)
-    rates = np.array([limit.rate for limit in vessel.limits])
     # a command may move before the first sample of a leg is over
-    reach = np.minimum(rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
+    reach = np.minimum(vessel.rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
     # fmax and fmin take the limit where a command may be anything
     lows = np.where(limited | np.isnan(inputs), np.fmax(inputs - reach, low), inputs - reach)
     highs = np.where(limited | np.isnan(inputs), np.fmin(inputs + reach, high), inputs + reach)
@@ -222,5 +220,4 @@ def _moved_s(vessel: Vessel, first: Array, last: Array) -> float:
     turned = np.nan_to_num(np.abs(first - last), nan=0.0)
     turns = ~np.isfinite([limit.high - limit.low for limit in vessel.limits])
     turned[turns] = np.abs(wrap_angle(turned[turns]))
-    rates = np.array([limit.rate for limit in vessel.limits])
-    return max(0.0, float((turned / rates).max(initial=0.0)) - 2 * vessel.sample_time_s)
+    return max(0.0, float((turned / vessel.rates).max(initial=0.0)) - 2 * vessel.sample_time_s)

@@ -63,7 +63,7 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         acceleration_mps2=_acceleration(vessel, transit),
         spot_rate_radps=CONTROL.usable_share * spot,
         lateral_mps2=max(CONTROL.lateral_mps2, 1.01 * transit * rate),
-        working_s=max(_reach(limit) / limit.rate for limit in vessel.limits),
+        working_s=max(_reach(limit) / rate for limit, rate in zip(vessel.limits, vessel.rates.tolist(), strict=True)),
         late_s=max(response.lag_s + response.delay_s for response in vessel.responses),
     )
 

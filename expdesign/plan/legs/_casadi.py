@@ -39,7 +39,7 @@ class Program:
 
     def __init__(self, vessel: Vessel, environment: Environment, nodes: int, block: int, free_time: bool) -> None:
         self.vessel, self.environment, self.nodes, self.block, self.free = vessel, environment, nodes, block, free_time
-        self.limits = vessel.limits
+        self.limits, self.rates = vessel.limits, vessel.rates
         self.state_scale = np.array([vessel.length_m] * 2 + [1.0] * 4)
         self.input_scale = np.array([max(abs(x.low), abs(x.high)) if np.isfinite(x.high) else 1.0 for x in self.limits])
         self.maps = [sample_map(x, sample_time_s=vessel.sample_time_s) for x in vessel.responses]
@@ -67,7 +67,7 @@ class Program:
         rows = self._region(states[:, 1:-1], path, circle, arm)
         for index in self._rated:
             step = (inputs[int(index), 1:] - inputs[int(index), :-1]).T / self.input_scale[index]
-            reach = self.limits[index].rate * self.block * h / self.input_scale[index]
+            reach = self.rates[index] * self.block * h / self.input_scale[index]
             rows += [step - reach + RELAXED, RELAXED - step - reach]
         through = x[3:5, 1:-1] - self._current_b(x[2, 1:-1])
         others = ca.vertcat(*rows, ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T)
@@ -124,7 +124,7 @@ class Program:
     @property
     def _rated(self) -> np.ndarray:
         """Indices of the signals with a finite rate."""
-        return np.flatnonzero(np.isfinite([limit.rate for limit in self.limits]))
+        return np.flatnonzero(np.isfinite(self.rates))
 
     def _arriving(self, past: ca.MX, inputs: ca.MX) -> tuple[ca.MX, ca.MX]:
         """(m block, j) commands that arrive at the actuators in each sample: the earlier and the later one."""

@@ -19,7 +19,7 @@ from expdesign.signals import Trajectory
 from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, step_shares, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, NUMPY, Vessel
+from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import swept_hulls
 
 ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
@@ -192,7 +192,7 @@ class LegWater:
     @cached_property
     def prompt(self) -> bool:
         """Whether every actuator delivers its commands at once."""
-        return all(response == IDEAL for response in self.vessel.responses)
+        return all(response.follows for response in self.vessel.responses)
 
     @cached_property
     def _sea(self) -> Array:

@@ -306,8 +306,8 @@ class Guidance:
         angle they would push ahead one sample and astern the next.
         """
         vessel = self._helm.vessel
-        rates = [limit.rate for limit, free in zip(vessel.limits, vessel.turns_freely, strict=True) if free]
-        half_turn = np.pi / min(rates, default=np.inf) / vessel.sample_time_s
+        slowest = float(vessel.rates[vessel.turns_freely].min(initial=np.inf))
+        half_turn = np.pi / slowest / vessel.sample_time_s
         sideways = np.abs(np.cos(self._inputs)) < MONTE_CARLO.sideways_share
         return half_turn + np.where(sideways, 0.0, self._arrival - self._first)
 
@@ -367,7 +367,7 @@ def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) 
     ships = np.flatnonzero(sailing & ~fleet.lost)
     part, poses = fleet.part(ships), np.repeat(fleet.states[None, :, :3], len(values) + 1, axis=0)
     turns = nearest_turns(helm.vessel, values[0], part.given) - values[0]
-    reach = np.array([limit.rate for limit in helm.vessel.limits]) * helm.vessel.sample_time_s
+    reach = helm.vessel.rates * helm.vessel.sample_time_s
     for sample, row in enumerate(values, start=1):
         part.advance(np.minimum(np.maximum(row + turns, part.given - reach), part.given + reach))
         poses[sample, ships] = part.states[:, :3]

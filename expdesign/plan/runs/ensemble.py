@@ -7,7 +7,7 @@ that deliver as the vessel's file says. For ships that wait, only the weather go
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -117,9 +117,7 @@ class Fleet:
         some = copy(self)
         some.states, some.given, some.delivered = (_some(x, ships) for x in (self.states, self.given, self.delivered))
         some.lost, some._ships = self.lost[ships], self._ships[ships]
-        old = self._actuators
-        past = tuple(commands[:, ships] for commands in old.past)
-        some._actuators = replace(old, values=old.values[:, ships], past=past)
+        some._actuators = self._actuators.part(ships)
         some._program = self._program.part(ships)
         return some
 
@@ -134,13 +132,7 @@ class Fleet:
             )
         )
         self.lost[ships] = part.lost
-        old, new = self._actuators, part._actuators
-        pasts = zip(old.past, new.past, strict=True)
-        self._actuators = replace(
-            old,
-            values=_with(old.values.T, ships, new.values.T).T,
-            past=tuple(_with(whole.T, ships, some.T).T for whole, some in pasts),
-        )
+        self._actuators = self._actuators.joined(part._actuators, ships)
 
     def advance(self, commands: Array) -> None:
         """One sample with commands (n, m); ships that are lost wait."""

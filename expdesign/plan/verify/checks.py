@@ -19,7 +19,7 @@ from expdesign.sea_area import SeaArea
 from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation import Environment, simulate, to_body
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, NUMPY, Vessel
+from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import hull_polygons
 
 
@@ -203,11 +203,12 @@ def _end_problems(
 def _limit_excess(vessel: Vessel, commands: Commands, standing: Array) -> tuple[float, str]:
     """The largest violation of a limit or a rate relative to the signal's range, and which; (m,) stood before."""
     worst, which = 0.0, ""
-    for name, limit, values, before in zip(commands.names, vessel.limits, commands.values.T, standing, strict=True):
+    signals = zip(commands.names, vessel.limits, vessel.rates.tolist(), commands.values.T, standing, strict=True)
+    for name, limit, rate, values, before in signals:
         span = limit.high - limit.low if np.isfinite(limit.high - limit.low) else 2 * np.pi
         beyond = max(float((values - limit.high).max()), float((limit.low - values).max()))
         steps = np.abs(np.diff([np.clip(before, limit.low, limit.high), *values]))
-        faster = float(steps.max()) - limit.rate * commands.sample_time_s
+        faster = float(steps.max()) - rate * commands.sample_time_s
         for excess, what in ((beyond, "limit"), (faster, "rate")):
             if excess / span > worst:
                 worst, which = excess / span, f"{name} passes its {what}"
@@ -216,7 +217,7 @@ def _limit_excess(vessel: Vessel, commands: Commands, standing: Array) -> tuple[
 
 def _standing_problems(vessel: Vessel, commands: Commands, standing: Array) -> list[str]:
     """Actuators that answer late deliver what stood before the plan; its files do so by a first row that repeats it."""
-    late = np.array([response != IDEAL for response in vessel.responses])
+    late = np.array([not response.follows for response in vessel.responses])
     changed = np.abs(commands.values[0] - standing) > 1e-9
     return [
         f"{name} is commanded {first:.3g} at once, expected {before:.3g} for a sample, as it answers late"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from expdesign.errors import FileError, nearest
-from expdesign.records.file.names import LABEL, PLANNED, Source, Unitless, is_input, meaning
+from expdesign.records.file.names import LABEL, PLANNED, REACHED, Source, Unitless, input_name, is_input, meaning
 
 PAIRS = (
     ("north_m", "east_m"),
@@ -59,7 +59,7 @@ def choose_columns(path: Path, header: tuple[str, ...], *, inputs: Inputs | None
     chosen = {
         name: source
         for name, source in used.items()
-        if not (is_input(own := name.removeprefix(PLANNED)) and own not in wanted)
+        if not (is_input(own := input_name(name)) and own not in wanted)
         and not any(name == a and b in used for a, b in INSTEAD)
     }
     _check_planned(path, chosen, wanted)
@@ -86,7 +86,7 @@ def _one_each(path: Path, sources: Iterable[Source]) -> Sources:
 
 def _wanted(path: Path, header: tuple[str, ...], used: Sources, inputs: Inputs | None) -> tuple[str, ...]:
     """Names of the input columns to read, all of them there or refused later for want of a unit."""
-    there = tuple(name for name in used if is_input(name))
+    there = tuple(dict.fromkeys(input_name(name) for name in used if is_input(name.removeprefix(REACHED))))
     if inputs is None:
         if there:
             return there
@@ -96,7 +96,7 @@ def _wanted(path: Path, header: tuple[str, ...], used: Sources, inputs: Inputs |
         raise FileError(path, "row 1", f"names no inputs, expected {expected}{found}")
     meanings = [meaning(name, column) for column, name in enumerate(header)]
     unitless = {name for known in meanings if isinstance(known, Unitless) for name in known.names}
-    missing = [name for name in inputs.columns if name not in used and name not in unitless]
+    missing = [name for name in inputs.columns if not {name, REACHED + name} & used.keys() and name not in unitless]
     if missing:
         found = f"the file gives {', '.join(there) or 'none'}"
         problem = f"names no {' '.join(missing)}, expected every input of {inputs.whose}; {found}"

@@ -10,7 +10,7 @@ from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.signals import AUXILIARY
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
-STEERED, PLANNED = "steered", "planned_"
+STEERED, PLANNED, REACHED = "steered", "planned_", "reached_"
 PLAIN = ("batch", STEERED, *FORCES)
 LABEL = "manoeuvre"
 """A column of texts, which only `records.labels` reads."""
@@ -123,6 +123,13 @@ COLUMNS = (
         "planned_n1_rps, planned_tau_x",
         "what an input was planned to be, whatever the ship did; optional, for every input or none",
     ),
+    Quantity(
+        "",
+        {},
+        "reached_n1_rps, reached_rudder1_rad",
+        "the speed or angle that the actuator reached, as measured; beside or instead of the commanded one, and used "
+        "in its place: of what the vessel file states of this actuator only a misalignment acts on it",
+    ),
     Quantity("", {}, LABEL, "label of the manoeuvre, a text; only expdesign mine --labels column reads it"),
 )
 """All columns that are read."""
@@ -176,8 +183,9 @@ class Unitless:
 def meaning(header: str, column: int) -> Source | Unitless | None:
     """The quantity of a column, or None for an unknown name."""
     name = re.sub(r"[\s\[\]()]+", "_", header.lower()).strip("_")
-    if name.startswith(PLANNED):
-        return _planned(meaning(name.removeprefix(PLANNED), column), header)
+    for prefix in (PLANNED, REACHED):
+        if name.startswith(prefix):
+            return _of_input(meaning(name.removeprefix(prefix), column), header, prefix)
     if name in PLAIN:
         return Source(column, header, name)
     for quantity in QUANTITIES:
@@ -196,11 +204,16 @@ def meaning(header: str, column: int) -> Source | Unitless | None:
     return None
 
 
-def _planned(source: Source | Unitless | None, header: str) -> Source | None:
-    """The planned input, where the rest of its name is an input's."""
+def _of_input(source: Source | Unitless | None, header: str, prefix: str) -> Source | None:
+    """The planned or reached input, where the rest of its name is an input's."""
     if not isinstance(source, Source) or not is_input(source.name):
         return None
-    return replace(source, header=header, name=PLANNED + source.name)
+    return replace(source, header=header, name=prefix + source.name)
+
+
+def input_name(name: str) -> str:
+    """The contract's name of an input, without what says that it is planned or reached."""
+    return name.removeprefix(PLANNED).removeprefix(REACHED)
 
 
 def is_input(name: str) -> bool:

@@ -39,9 +39,19 @@ RANGES = (
     Range(pattern="wind_speed_mps", low=0, high=120, expected="0 to 120 m/s"),
     Range(pattern="wind_angle_rad", low=-TURN, high=TURN, expected="-6.28 to 6.28 rad", degrees=True),
     Range(pattern="steered", low=0, high=1, expected="0 or 1"),
-    Range(pattern=r"(?:planned_)?a\d+_rad", low=-4 * TURN, high=4 * TURN, expected="-25.1 to 25.1 rad", degrees=True),
     Range(
-        pattern=r"(?:planned_)?rudder\d+_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True
+        pattern=r"(?:planned_|reached_)?a\d+_rad",
+        low=-4 * TURN,
+        high=4 * TURN,
+        expected="-25.1 to 25.1 rad",
+        degrees=True,
+    ),
+    Range(
+        pattern=r"(?:planned_|reached_)?rudder\d+_rad",
+        low=-TURN / 4,
+        high=TURN / 4,
+        expected="-1.57 to 1.57 rad",
+        degrees=True,
     ),
     Range(pattern="roll_rad", low=-TURN / 4, high=TURN / 4, expected="-1.57 to 1.57 rad", degrees=True),
     Range(pattern="roll_rate_radps", low=-TURN, high=TURN, expected="-6.28 to 6.28 rad/s", degrees=True),

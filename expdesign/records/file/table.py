@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from expdesign.errors import FileError
 from expdesign.records.file.cells import FIRST_ROW, Cells, read_cells, shown
 from expdesign.records.file.choice import Inputs, Sources, choose_columns
-from expdesign.records.file.names import Source, is_input
+from expdesign.records.file.names import REACHED, Source, is_input
 from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
@@ -61,7 +61,8 @@ class Table:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Input columns, in file order."""
-        return tuple(name for name in self.columns if is_input(name))
+        names = (name.removeprefix(REACHED) for name in self.columns)
+        return tuple(dict.fromkeys(name for name in names if is_input(name)))
 
     def stack(self, *names: str) -> Array:
         """Columns side by side, (k, m); nan where one is not there."""

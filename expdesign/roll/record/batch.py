@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.errors import InputError, UnknownName
 from expdesign.roll.runs import Run
 from expdesign.signals import AUXILIARY, Batch
-from expdesign.simulation import delivered_at_samples, steering_signals
+from expdesign.simulation import acting_response, delivered_at_samples, steering_signals
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, Vessel
 
@@ -65,8 +65,9 @@ def _delivered(batch: Batch, given: Array, ship: Vessel | None) -> Array:
     for signal, response in zip(ship.model.inputs, ship.responses, strict=True):
         if signal in batch.input_names and response != IDEAL:
             column = batch.input_names.index(signal)
+            own = acting_response(batch, signal, response) if given is batch.inputs else response
             commanded = inputs[:, [column]]
-            inputs[:, column] = delivered_at_samples([response], commanded, sample_time_s=batch.sample_time_s)[:-1, 0]
+            inputs[:, column] = delivered_at_samples([own], commanded, sample_time_s=batch.sample_time_s)[:-1, 0]
     return inputs
 
 

@@ -42,6 +42,7 @@ from expdesign.vessel import (
     VesselModel,
     limit_keys,
     response_keys,
+    response_values,
     std_keys,
     structure_terms,
 )
@@ -91,6 +92,8 @@ def _std(given: Mapping[str, float], actuators: Sequence[Actuator], entry: Entry
     for name in given:
         if name not in known:
             raise entry.error(f"{shown(name)} is no quantity of a sensor or an actuator, {offer(name, known)}")
+        if name.endswith("_rate") and not math.isfinite(response_values(actuators)[name]):
+            raise entry.at(name).error("is given without a rate, expected the rate in the table of its actuator")
     return dict(given)
 
 
@@ -149,20 +152,16 @@ def _check_force_alone(kinds: list[str], entry: Entry) -> None:
         raise entry.item(kinds.index("force") + 1).at("kind").error("is 'force', expected no other thruster")
 
 
-def _limit(table: ActuatorTable, keys: tuple[str, str, str], entry: Entry) -> Limit:
-    low, high, rate = (getattr(table, name) for name in keys)
+def _limit(table: ActuatorTable, keys: tuple[str, str], entry: Entry) -> Limit:
+    low, high = (getattr(table, name) for name in keys)
     if low is not None and high is not None and not low < high:
         raise entry.at(keys[1]).error(f"is {shown(high)}, expected more than {keys[0]} = {shown(low)}")
-    return Limit(
-        low=-math.inf if low is None else low,
-        high=math.inf if high is None else high,
-        rate=math.inf if rate is None else rate,
-    )
+    return Limit(low=-math.inf if low is None else low, high=math.inf if high is None else high)
 
 
 def _response(table: ActuatorTable, stem: str) -> Response:
-    lag, delay, deadband, offset = (getattr(table, key, 0.0) for key in response_keys(stem))
-    return Response(lag_s=lag, delay_s=delay, deadband=deadband, offset=offset)
+    given = {name: getattr(table, key, None) for name, key in response_keys(stem).items()}
+    return Response(**{name: value for name, value in given.items() if value is not None})
 
 
 def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: float, entry: Entry) -> VesselModel:

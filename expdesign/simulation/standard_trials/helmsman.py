@@ -15,7 +15,7 @@ import scipy
 
 from expdesign.errors import Diverged, NoAnswer
 from expdesign.signals import Commands, Trajectory
-from expdesign.simulation.actuation import ActuatorState, step_shares
+from expdesign.simulation.actuation import ActuatorState, moved, step_shares
 from expdesign.simulation.helm import Approach, Helm
 from expdesign.simulation.motion import begun
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
@@ -76,22 +76,13 @@ class _Orders:
         drive, angle = self.drive, self.angle_rad
         for stage, part in ((old, share), (new, 1 - share)):
             time_s = part * self.step_s
-            mean, drive = _moved(drive, stage.drive, self.helm.drive_rate, time_s)
-            drives.append(mean * part)
-            mean, angle = _moved(angle, stage.angle_rad, self.helm.angle_rate(stage.drive), time_s)
-            angles.append(mean * part)
+            if time_s > 0:
+                mean, drive = map(float, moved(drive, stage.drive, self.helm.drive_rate * time_s))
+                drives.append(mean * part)
+                mean, angle = map(float, moved(angle, stage.angle_rad, self.helm.angle_rate(stage.drive) * time_s))
+                angles.append(mean * part)
         end = _Orders(helm=self.helm, drive=drive, angle_rad=angle, step_s=self.step_s)
         return self.helm.inputs(sum(drives), sum(angles)), end
-
-
-def _moved(value: float, goal: float, rate: float, time_s: float) -> tuple[float, float]:
-    """(mean, last) over a time of a value that moves to a goal at a rate and stays there."""
-    if time_s <= 0:
-        return value, value
-    way = goal - value
-    ramp_s = min(abs(way) / rate, time_s)
-    last = goal if abs(way) <= rate * time_s else value + math.copysign(rate * time_s, way)
-    return last - (last - value) * ramp_s / (2 * time_s), last
 
 
 def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: str) -> Trial:

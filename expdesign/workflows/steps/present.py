@@ -21,9 +21,9 @@ from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.scenario.scenario_file import berth_problem
 from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
-from expdesign.simulation import Environment, delivered_at_samples
+from expdesign.simulation import Environment, acting_response, delivered_at_samples
 from expdesign.values import Array, seal
-from expdesign.vessel import IDEAL, Vessel
+from expdesign.vessel import Vessel
 from expdesign.workflows.steps.known import updated
 from expdesign.workflows.steps.measured import measured
 
@@ -182,15 +182,16 @@ def _at_end(values: Array) -> float:
 
 def _standing(batch: Batch, ship: Vessel) -> Array:
     """(m,) commands that would give what the actuators deliver at the last row; zeros where the data give forces."""
-    names, responses = ship.model.inputs, ship.responses
+    names = ship.model.inputs
     if not set(names) <= set(batch.input_names):
         return np.zeros(len(names))
     given = batch.inputs[:, [batch.input_names.index(name) for name in names]]
-    delivered = delivered_at_samples(responses, given, sample_time_s=batch.sample_time_s)[-2]
-    prompt = np.array([response == IDEAL for response in responses])
-    settled = delivered - np.array([response.offset for response in responses])
+    responses = [acting_response(batch, *row) for row in zip(names, ship.responses, strict=True)]
+    before, now = delivered_at_samples(responses, given, sample_time_s=batch.sample_time_s)[-2:]
+    settled = before - np.array([response.offset for response in responses])
+    prompt = np.array([response.follows for response in responses])
     limits = np.array([(limit.low, limit.high) for limit in ship.limits]).T
-    return np.asarray(np.clip(np.where(prompt, given[-1], settled), *limits))
+    return np.asarray(np.clip(np.where(prompt, now, settled), *limits))
 
 
 def _left(first: Scenario, sailed_s: float, stated_s: float | None) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
+from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +123,7 @@ def vessel_of(case: Case) -> Vessel:
     terms = tuple(Term(*row) for row in case.terms)
     zeros = np.zeros(len(terms))
     propeller = Actuator(kind="propeller", number=1, limits=(Limit(low=-20, high=20),))
-    rudder = Actuator(kind="rudder", number=1, limits=(Limit(low=-0.7, high=0.7, rate=0.35),))
+    rudder = Actuator(kind="rudder", number=1, limits=(Limit(low=-0.7, high=0.7),), responses=(Response(rate=0.35),))
     model = VesselModel(
         terms=terms,
         parameters=zeros,

@@ -2,7 +2,7 @@
 
 from expdesign.diagnosis.causes.actuators.actuator_deadband import ACTUATOR_DEADBAND
 from expdesign.diagnosis.causes.actuators.actuator_delay import ACTUATOR_DELAY
-from expdesign.diagnosis.causes.actuators.actuator_lag import ACTUATOR_LAG
+from expdesign.diagnosis.causes.actuators.actuator_lag import ACTUATOR_LAG, ACTUATOR_SLEW
 from expdesign.diagnosis.causes.actuators.actuator_scale import ACTUATOR_SCALE
 from expdesign.diagnosis.causes.actuators.thrust_advance_loss import THRUST_ADVANCE_LOSS
 from expdesign.diagnosis.causes.actuators.thrust_gain import THRUST_GAIN
@@ -13,6 +13,7 @@ __all__ = [
     "ACTUATOR_DELAY",
     "ACTUATOR_LAG",
     "ACTUATOR_SCALE",
+    "ACTUATOR_SLEW",
     "THRUSTER_ASYMMETRY",
     "THRUST_ADVANCE_LOSS",
     "THRUST_GAIN",

@@ -1,4 +1,4 @@
-"""Actuators that follow their commands with a first-order lag."""
+"""Actuators that follow their commands with a first-order lag, or at another slew rate than stated."""
 
 from __future__ import annotations
 
@@ -48,3 +48,22 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
 
 
 ACTUATOR_LAG = Cause(name="actuator_lag", candidates=_candidates, explain=_explain)
+
+
+def _slewing(situation: Situation) -> tuple[Candidate, ...]:
+    return tuple(item for item in followers(situation, "slew", "actuator_slew") if not item.positive)
+
+
+def _explain_slew(values: Values, _ship: ExtendedModel) -> str:
+    key, value, std = first(values)
+    if value <= 0:
+        return (
+            f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs follow them at once."
+        )
+    return (
+        f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs move at "
+        f"{rounded(1.0 / value, std / value**2)} per second, another slew rate than stated."
+    )
+
+
+ACTUATOR_SLEW = Cause(name="actuator_slew", candidates=_slewing, explain=_explain_slew)
