@@ -40,6 +40,7 @@ EFFECTS = {
     "thruster_asymmetry": {"offset:a": 0.05},
     "actuator_lag": {"lag:all": 3.0},
     "actuator_delay": {"delay:n": 2.0},
+    "actuator_slew": {"slew:a": 10.0},
     "actuator_deadband": {"deadband:n": 6.0},
     "load_change": {"inertia:u": 0.2, "inertia:v": 0.1},
     "heading_bias": {"heading_bias": 0.03},

@@ -45,7 +45,10 @@ def settled_s(vessel: Vessel, *, allowed_for: bool) -> np.ndarray:
 
 def test_ships_with_slow_actuators_come_to_rest_sooner_when_commanded_more_than_desired():
     prompt = ship()
-    slow = [replace(item, responses=(LATE,) * len(item.limits)) for item in prompt.actuators]
+    slow = [
+        replace(item, responses=tuple(replace(LATE, rate=own.rate) for own in item.responses))
+        for item in prompt.actuators
+    ]
     late = replace(prompt, model=replace(prompt.model, actuators=tuple(slow)))
     ideal_s, allowed_s, ignored_s = (
         settled_s(vessel, allowed_for=allowed) for vessel, allowed in ((prompt, True), (late, True), (late, False))

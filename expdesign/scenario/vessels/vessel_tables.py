@@ -46,7 +46,8 @@ class PropellerTable(ActuatorTable):
     speed_min_rps: Number = Field(description="the lowest propeller speed [rps], negative for astern")
     speed_max_rps: Number = Field(description="the highest propeller speed [rps]")
     speed_rate_rps2: Positive | None = Field(
-        default=None, description="the largest rate of the propeller speed [rps per second]; no limit when not given"
+        default=None,
+        description="the slew rate at which the speed follows orders [rps per second]; no limit when not given",
     )
     speed_lag_s: NonNegative = Field(
         default=0.0, description="the time constant with which the propeller speed follows [s]"
@@ -65,7 +66,7 @@ class AzimuthTable(PropellerTable):
     )
     angle_max_rad: TwoTurns | None = Field(default=None, description="the highest angle [rad]; free when not given")
     angle_rate_radps: Positive | None = Field(
-        default=None, description="the largest rate of the angle [rad/s]; no limit when not given"
+        default=None, description="the slew rate at which the angle follows orders [rad/s]; no limit when not given"
     )
     angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
     angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
@@ -90,7 +91,7 @@ class RudderTable(ActuatorTable):
     angle_min_rad: HalfTurn = Field(description="the lowest rudder angle [rad]")
     angle_max_rad: HalfTurn = Field(description="the highest rudder angle [rad]")
     angle_rate_radps: Positive | None = Field(
-        default=None, description="the largest rate of the angle [rad/s]; no limit when not given"
+        default=None, description="the slew rate at which the angle follows orders [rad/s]; no limit when not given"
     )
     angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
     angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
@@ -108,7 +109,7 @@ class ForceTable(ActuatorTable):
     x_min: Number = Field(description="the lowest tau_x, the surge force in the model's unit")
     x_max: Number = Field(description="the highest tau_x")
     x_rate: Positive | None = Field(
-        default=None, description="the largest rate of tau_x [per second]; no limit when not given"
+        default=None, description="the slew rate of tau_x [per second]; no limit when not given"
     )
     x_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_x follows [s]")
     x_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_x [s]")
@@ -116,7 +117,7 @@ class ForceTable(ActuatorTable):
     y_min: Number = Field(description="the lowest tau_y, the sway force in the model's unit")
     y_max: Number = Field(description="the highest tau_y")
     y_rate: Positive | None = Field(
-        default=None, description="the largest rate of tau_y [per second]; no limit when not given"
+        default=None, description="the slew rate of tau_y [per second]; no limit when not given"
     )
     y_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_y follows [s]")
     y_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_y [s]")
@@ -124,7 +125,7 @@ class ForceTable(ActuatorTable):
     psi_min: Number = Field(description="the lowest tau_psi, the yaw moment in the model's unit")
     psi_max: Number = Field(description="the highest tau_psi")
     psi_rate: Positive | None = Field(
-        default=None, description="the largest rate of tau_psi [per second]; no limit when not given"
+        default=None, description="the slew rate of tau_psi [per second]; no limit when not given"
     )
     psi_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_psi follows [s]")
     psi_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_psi [s]")
@@ -292,7 +293,7 @@ class VesselTable(Table):
     std: dict[str, NonNegative] = Field(
         default={},
         description="the standard deviations of what [sensors] and [[actuators]] state, by the key of the sensor, or "
-        "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_offset; 0, for known, when not given",
+        "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_rate; 0, for known, when not given",
     )
     roll: PendulumTable | None = Field(
         default=None,
