@@ -89,7 +89,7 @@ def test_a_recorded_stop_is_found_and_other_runs_give_the_reason_for_no_trial() 
     ahead = zigzag(ship, heading_rad=TEN, helm_rad=TEN, conduct=Conduct(speed_mps=7.0, approach_s=90, duration_s=80))
     straight = measured_trial(ship, as_batch(ship, *ahead))
     assert isinstance(straight, NotStandard)
-    assert "neither the helm nor the engines" in straight.reason
+    assert "no helm is held over, and the engines" in straight.reason
     short = turning_circle(ship, turn_rad=math.radians(60), conduct=conduct)
     part = measured_trial(ship, as_batch(ship, *short))
     assert isinstance(part, NotStandard)
