@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from expdesign.errors import InputError
 from expdesign.indices.read import SIDE_NAMES, read_circle, read_stop, read_zigzag
@@ -26,6 +26,7 @@ from expdesign.vessel import Vessel
 
 LEAST_HELM_RAD = math.radians(2.0)
 TURNED_RAD = math.radians(80.0)
+Samples = NDArray[np.intp]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,15 +60,20 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
         raise InputError(f"{batch.name}: has no complete positions and headings, which the indices need")
     run = _steered_run(vessel, batch, reference_forward_m)
     held = _held(run)
-    if held:
+    turned = float(np.ptp(run.pose[:, 2]))
+    still = len(held) == 1 and held[0].order_s is None and turned < TURNED_RAD
+    if held and not still:
         return (_late if held[0].order_s is None else _steered)(vessel, run.until(held[-1].last), held)
+    helm = "no helm is held over"
+    if still:
+        helm = f"the helm stays at {_degrees(held[0].level_rad)} and the heading changes by {_degrees(turned)} only"
     astern = _astern(run)
     if astern is None:
-        return NotStandard(name=batch.name, reason="no helm is held over, and the engines are not ordered to stop")
+        return NotStandard(name=batch.name, reason=f"{helm}, and the engines are not ordered to stop")
     approach = _approach(run, astern)
     found = read_stop(run, order_s=astern, course_rad=approach.course_rad, speed_mps=approach.speed_mps)
     if found is None or approach.speed_mps < _slow(run):
-        return NotStandard(name=batch.name, reason="no helm is held over, and the ship keeps its headway")
+        return NotStandard(name=batch.name, reason=f"{helm}, and the ship keeps its headway")
     return replace(found, remarks=approach.remarks)
 
 
@@ -105,23 +111,24 @@ class _Held:
 
 
 def _held(run: SteeredRun) -> tuple[_Held, ...]:
-    """Stretches of held helm in time order; none where the helm is steered, stays amidships or changes nothing."""
+    """Stretches of held helm in time order; none where the helm is steered or stays amidships."""
     stretches = _stretches(run)
     if not stretches or 2 * sum(map(len, stretches)) < stretches[-1][-1] - stretches[0][0]:
         return ()
     levels = [float(np.median(run.helm_rad[part])) for part in stretches]
     orders_s = [_first_order(run, int(stretches[0][0]), levels[0])]
     for (one, other), (before, after) in zip(pairwise(stretches), pairwise(levels), strict=True):
-        orders_s.append(_left(run, int(one[-1]), int(other[0]), before, after))
-    if orders_s == [None] and abs(run.pose[-1, 2] - run.pose[0, 2]) < TURNED_RAD:
-        return ()
+        turned = before * after < 0  # else the helm was let go between, and the run will be refused
+        orders_s.append(
+            _left(run, int(one[-1]), int(other[0]), before, after) if turned else float(run.time_s[other[0]])
+        )
     return tuple(
         _Held(order_s=order, level_rad=level, last=int(part[-1]))
         for order, level, part in zip(orders_s, levels, stretches, strict=True)
     )
 
 
-def _stretches(run: SteeredRun) -> list[Any]:
+def _stretches(run: SteeredRun) -> list[Samples]:
     """Samples of every stretch in which the helm is held at the angle of its side, but for short interruptions.
 
     That is the largest angle held while the ship sails her own length; a steering helmsman moves on sooner.
@@ -143,7 +150,7 @@ def _stretches(run: SteeredRun) -> list[Any]:
             sides[np.abs(side * helm - level) < min(LEAST_HELM_RAD, largest / 10)] = side
     parts = [part for part in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(sides)) + 1) if sides[part[0]]]
     shortest = TUNING.touched * max(map(len, parts), default=0)
-    stretches: list[Any] = []
+    stretches: list[Samples] = []
     for part in (part for part in parts if len(part) >= shortest):
         same = bool(stretches) and sides[stretches[-1][0]] == sides[part[0]]
         if same and part[0] - stretches[-1][-1] <= shortest:
@@ -163,7 +170,7 @@ def _first_order(run: SteeredRun, arrived: int, level: float) -> float | None:
         begin, earlier = arrived - length, max(arrived - 2 * length, 0)
         moved = way[arrived] - way[begin]
         if moved > TUNING.least_move and abs(way[begin] - way[earlier]) < moved / 4:
-            before = float(np.median(way[earlier : begin + 1]))
+            before = float(np.median(way[max(arrived - math.ceil(1.5 * length), 0) : arrived - int(1.2 * length) + 1]))
             close = np.flatnonzero(way[earlier:arrived] < before + moved / 10)
             return _left(run, earlier + int(close[-1]), arrived, before * level, level)
     return None
@@ -176,7 +183,7 @@ def _left(run: SteeredRun, first: int, arrived: int, before: float, after: float
     gives means over samples. Its middle is the mean time of the changes; its duration follows from their variance, of
     which a sample before and one after the ramp, filled in part, add a sixth of a squared sample.
     """
-    more = 1 + (arrived - first) // 8
+    more = 1 + (arrived - first) // 4
     first, last = max(first - more, 0), min(arrived + more, len(run.helm_rad) - 1)
     way = np.clip((run.helm_rad[first : last + 1] - before) / (after - before), 0.0, 1.0)
     way[0], way[-1] = 0.0, 1.0

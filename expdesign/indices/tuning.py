@@ -11,7 +11,7 @@ class Tuning:
     """Constants that were chosen, not derived.
 
     Attributes:
-        zigzag_deviation_rad: largest deviation of helm, and of heading at reversals, of a 10/10 or 20/20 zig-zag from the
+        zigzag_deviation_rad: largest deviation of helm and reversals of a 10/10 or 20/20 zig-zag from the
             nominal angles [rad].
         under_way: speed by the root of the length [m^0.5/s] (a Froude number of 0.016) below which a ship is not under
             way.
