@@ -22,10 +22,9 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch
 from expdesign.simulation import Conduct, turning_circle, zigzag
 from expdesign.vessel import Vessel
-from measured_trials import TUG, TUG_TRUE, quiet, write_run
+from measured_trials import TUG, TUG_TRUE, as_batch, quiet, write_run
 from nomoto_ship import nomoto_ship
 from sample_files import OUTSIDE, outside
-from test_indices_agree_with_other_readings import as_batch
 from vessel_files import ESSO_WIND, KVLCC2, write_vessel
 
 SHIP = replace(nomoto_ship(sense=1.0), length_m=50.0)
