@@ -15,12 +15,12 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.export.indices_form import IndicesContent, indices_html
-from expdesign.indices import Circle, NotStandard, ZigZag, criteria, judge, measured_trial, standard_results
+from expdesign.indices import Circle, NotStandard, Stop, ZigZag, criteria, judge, measured_trial, standard_results
 from expdesign.indices.criteria import Verdict
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch
-from expdesign.simulation import Conduct, turning_circle, zigzag
+from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
 from expdesign.vessel import Vessel
 from measured_trials import TUG, TUG_TRUE, as_batch, quiet, write_run
 from nomoto_ship import nomoto_ship
@@ -215,6 +215,27 @@ def test_helm_let_go_ends_a_trial_and_a_second_trial_is_refused() -> None:
     assert "expected one trial in a file" in measured_trial(SHIP, record(twice, 1.0)).reason
 
 
+@pytest.mark.parametrize("angle", [TEN, TWENTY])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_on_the_rudder_reading_makes_no_orders(angle: float, seed: int) -> None:
+    """Half a degree, about helm held against wind on the approach, at the angles of the trial, and during a stop."""
+    rng = np.random.default_rng(seed)
+    rows, orders = sailed(angle, angle, seconds=360.0, approach="against wind")
+    batch = record(rows, 1.0, "reached")
+    noisy = replace(
+        batch, inputs=batch.inputs + np.stack([np.zeros(360), rng.normal(0, math.radians(0.5), 360)], axis=1)
+    )
+    found = measured_trial(SHIP, noisy)
+    assert isinstance(found, ZigZag)
+    assert [order.time_s for order in found.executes] == pytest.approx(orders, abs=2.0)
+    ship = nomoto_ship(sample_time_s=1.0)
+    commands, trial = stopping(ship, conduct=Conduct(speed_mps=7.0, approach_s=30.0, duration_s=600.0))
+    stop = as_batch(ship, commands, trial)
+    helm = np.array(stop.inputs)
+    helm[:, 1] = rng.normal(math.radians(3.5), math.radians(0.5), len(helm))
+    assert isinstance(measured_trial(ship, replace(stop, inputs=helm)), Stop)
+
+
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize("heading", [TWENTY, math.inf])
 @pytest.mark.parametrize("first", [0.0, LEAD + 10.0])
@@ -240,6 +261,16 @@ def test_only_reversals_near_the_nominal_heading_give_an_index_with_a_criterion(
     moved = replace(found, executes=(found.executes[0], late, second, *found.executes[3:]))
     assert judge((moved,), length_m=50.0) == ()
     assert len(orders) == 5
+
+
+def test_the_distance_to_ten_degrees_of_heading_is_not_given_where_the_helm_is_reversed_before() -> None:
+    five = math.radians(5)
+    rows, _ = sailed(TEN, five, seconds=120.0)
+    assert measured_trial(SHIP, record(rows, 0.1)).initial_turning_m is None
+    rows, (order, *_) = sailed(TEN, TEN)
+    (first, last) = round(order / STEP), int(np.argmax(rows[:, 3] >= TEN))
+    way = np.hypot(*np.diff(rows[first : last + 1, 1:3], axis=0).T).sum()
+    assert measured_trial(SHIP, record(rows, 0.1)).initial_turning_m == pytest.approx(way, abs=SPEED * 0.1)
 
 
 def content(found: tuple[object, ...]) -> IndicesContent:

@@ -61,7 +61,8 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     run = _steered_run(vessel, batch, reference_forward_m)
     held = _held(run)
     turned = float(np.ptp(run.pose[:, 2]))
-    still = len(held) == 1 and held[0].order_s is None and turned < TURNED_RAD
+    one_sided = len({stretch.level_rad > 0 for stretch in held}) == 1
+    still = one_sided and held[0].order_s is None and turned < TURNED_RAD
     if held and not still:
         return (_late if held[0].order_s is None else _steered)(vessel, run.until(held[-1].last), held)
     helm = "no helm is held over"
@@ -140,14 +141,16 @@ def _stretches(run: SteeredRun) -> list[Samples]:
         return []
     top, bottom = (f(helm, held) for f in (scipy.ndimage.maximum_filter1d, scipy.ndimage.minimum_filter1d))
     middle = (top + bottom) / 2
-    near = np.minimum(LEAST_HELM_RAD, np.abs(middle) / 10)
-    levels = middle[(top - bottom <= 2 * near) & (np.abs(middle) >= LEAST_HELM_RAD)]
+    narrow = top - bottom <= 2 * np.minimum(LEAST_HELM_RAD, np.abs(middle) / 5)
+    levels = middle[narrow & (np.abs(middle) >= LEAST_HELM_RAD)]
     largest = np.abs(levels).max(initial=0.0)
+    near = min(LEAST_HELM_RAD, largest / 5)
     sides = np.zeros(len(helm), dtype=int)
     for side in (1, -1):
         level = (side * levels).max(initial=0.0)
         if level > largest / 2:
-            sides[np.abs(side * helm - level) < min(LEAST_HELM_RAD, largest / 10)] = side
+            level = np.median(side * helm[np.abs(side * helm - level) <= near])  # noise raises the largest
+            sides[np.abs(side * helm - level) <= near] = side
     parts = [part for part in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(sides)) + 1) if sides[part[0]]]
     shortest = TUNING.touched * max(map(len, parts), default=0)
     stretches: list[Samples] = []

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from expdesign.indices.steered_run import SteeredRun, crossing
+from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
 from expdesign.values import Array
 
@@ -141,9 +142,9 @@ def read_zigzag(
         speed_mps=speed_mps,
         executes=executes,
         overshoots_rad=tuple(overshoots),
-        initial_turning_m=sailed_to(
-            run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * min(nominal, TEN)
-        ),
+        initial_turning_m=None
+        if nominal < TEN - TUNING.zigzag_deviation_rad
+        else sailed_to(run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * TEN),
         tolerance_m=run.tolerance_m(orders_s[0]),
     )
 

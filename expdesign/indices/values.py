@@ -70,8 +70,8 @@ class ZigZag:
         executes: rudder orders, the first included; where the record begins later, its reversals, with headings from
             the middle of the swings.
         overshoots_rad: change of heading from the second, third, ... of `executes` to the largest heading, positive.
-        initial_turning_m: distance sailed from the first execute until the heading has changed by 10 degrees, or by
-            `heading_rad` where that is less.
+        initial_turning_m: distance sailed from the first execute until the heading has changed by 10 degrees; None
+            where the helm is reversed well before.
         tolerance_m: of initial turning.
         remarks: on the approach, the helm, and what is missing.
     """

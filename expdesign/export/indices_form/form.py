@@ -168,7 +168,6 @@ def zigzag_rows(content: IndicesContent) -> list[tuple[str, ...]]:
     for source, trial in content.trials:
         if isinstance(trial, ZigZag):
             reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
-            tolerance = max((order.tolerance_rad for order in reversals), default=0.0)
             rows.append(
                 (
                     source,
@@ -176,10 +175,17 @@ def zigzag_rows(content: IndicesContent) -> list[tuple[str, ...]]:
                     "" if trial.speed_mps is None else f"{trial.speed_mps:.3g} m/s",
                     f"{degrees(trial.heading_rad)} / {degrees(trial.helm_rad)}",
                     ", ".join(degrees(order.heading_rad) for order in reversals),
-                    ", ".join(map(degrees, trial.overshoots_rad)) + (f" ± {degrees(tolerance)}" if tolerance else ""),
+                    overshoots(trial),
                 )
             )
     return rows
+
+
+def overshoots(trial: ZigZag) -> str:
+    """All of them, and the largest tolerance [deg]."""
+    reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
+    tolerance = max((order.tolerance_rad for order in reversals), default=0.0)
+    return ", ".join(map(degrees, trial.overshoots_rad)) + (f" ± {degrees(tolerance)}" if tolerance else "")
 
 
 def degrees(angle_rad: float) -> str:

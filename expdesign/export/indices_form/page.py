@@ -6,7 +6,7 @@ import math
 
 from expdesign.export import words
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
-from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
+from expdesign.export.indices_form.form import IndicesContent, overshoots, shown, verdict_rows
 from expdesign.export.pages import page_template
 from expdesign.indices import Circle, Stop, ZigZag
 
@@ -31,8 +31,9 @@ def indices_html(content: IndicesContent) -> str:
 
 def _counts(content: IndicesContent, source: str) -> str:
     """How many results there are and how they stand to their criteria."""
-    counted = ", ".join(f"{number} {word}" for word, number in content.counted(source).items())
-    return f"{source.capitalize()} results beside their criteria: {counted}."
+    counted = content.counted(source)
+    parts = ", ".join(f"{number} {word}" for word, number in counted.items()) if any(counted.values()) else "none"
+    return f"{source.capitalize()} results beside their criteria: {parts}."
 
 
 def _degrees(angle_rad: float) -> str:
@@ -62,14 +63,10 @@ def _circle(source: str, trial: Circle) -> tuple[str, ...]:
 
 
 def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
-    overshoots = ", ".join(
-        shown("_rad", angle, order.tolerance_rad).removesuffix(" deg")
-        for angle, order in zip(trial.overshoots_rad, trial.executes[1:], strict=False)
-    )
     executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes)
     initial = _with_tolerance(trial.initial_turning_m, trial.tolerance_m)
     head = (source, trial.name, trial.side, f"{_degrees(trial.heading_rad)} / {_degrees(trial.helm_rad)}")
-    return (*head, _speed(trial.speed_mps), overshoots, initial, executes)
+    return (*head, _speed(trial.speed_mps), overshoots(trial), initial, executes)
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:
