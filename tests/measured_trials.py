@@ -1,12 +1,13 @@
 """Made-up trials of the example ships as CSV files, for the tests of `expdesign estimate`."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from expdesign.scenario import load_vessel
-from expdesign.signals import Commands
+from expdesign.signals import Batch, Commands, Trajectory
 from expdesign.simulation import CALM, Environment, measure, simulate
 from expdesign.vessel import Sensors, Vessel
 from record_files import write_trial
@@ -61,3 +62,17 @@ def write_run(
     rng = np.random.default_rng(seed)
     columns = measure(vessel, commands, motion, environment=environment, rng=rng)
     return write_trial(path, {name: values for name, values in columns.items() if name not in drop})
+
+
+def as_batch(vessel: Vessel, commands: Commands, motion: Trajectory, *, turn_rad: float = 0.0) -> Batch:
+    """What perfect instruments record, in a frame turned by an angle."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    pose = motion.pose[:-1] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + (300.0, -80.0, turn_rad)
+    return Batch(
+        name="recorded",
+        sample_time_s=motion.sample_time_s,
+        input_names=vessel.model.inputs,
+        inputs=commands.values,
+        velocity=motion.velocity[:-1],
+        pose=pose,
+    )

@@ -10,10 +10,10 @@ from expdesign.errors import InputError
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag, measured_trial, standard_results
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
-from expdesign.signals import Batch, Commands, Trajectory
+from expdesign.signals import Batch
 from expdesign.simulation import Conduct, steady_ahead, stopping, turning_circle, zigzag
 from expdesign.vessel import Vessel
-from measured_trials import TUG_TRUE
+from measured_trials import TUG_TRUE, as_batch
 from nomoto_ship import nomoto_ship
 from sample_files import outside
 from vessel_files import KVLCC2, write_vessel
@@ -40,20 +40,6 @@ def test_the_tugs_zigzag_and_stop_agree_with_a_reading_of_fine_samples() -> None
         (heading.max() - TEN, -heading.min() - TEN), rel=5e-3, abs=math.radians(0.1)
     )
     assert found.stops[0].track_reach_m == pytest.approx(stopping(TUG_TRUE, conduct=FINE)[1].pose[-1, 0], rel=5e-3)
-
-
-def as_batch(vessel: Vessel, commands: Commands, motion: Trajectory, *, turn_rad: float = 0.0) -> Batch:
-    """What perfect instruments record, in a frame turned by an angle."""
-    c, s = math.cos(turn_rad), math.sin(turn_rad)
-    pose = motion.pose[:-1] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + (300.0, -80.0, turn_rad)
-    return Batch(
-        name="recorded",
-        sample_time_s=motion.sample_time_s,
-        input_names=vessel.model.inputs,
-        inputs=commands.values,
-        velocity=motion.velocity[:-1],
-        pose=pose,
-    )
 
 
 @pytest.mark.parametrize("vessel", [nomoto_ship(), nomoto_ship(sense=1.0, bias=0.02), TUG_TRUE])
@@ -89,7 +75,7 @@ def test_a_recorded_stop_is_found_and_other_runs_give_the_reason_for_no_trial() 
     ahead = zigzag(ship, heading_rad=TEN, helm_rad=TEN, conduct=Conduct(speed_mps=7.0, approach_s=90, duration_s=80))
     straight = measured_trial(ship, as_batch(ship, *ahead))
     assert isinstance(straight, NotStandard)
-    assert "neither the helm nor the engines" in straight.reason
+    assert "no helm is held over, and the engines" in straight.reason
     short = turning_circle(ship, turn_rad=math.radians(60), conduct=conduct)
     part = measured_trial(ship, as_batch(ship, *short))
     assert isinstance(part, NotStandard)

@@ -50,7 +50,7 @@ def test_every_index_stands_under_its_side_beside_its_criterion() -> None:
     assert lines[3].starboard[0].value == f"{math.degrees(ten.overshoots_rad[1]):.1f} deg"
     assert lines[3].criterion == f"{math.degrees(limits['second_overshoot_10_10_rad']):.1f} deg at L/V = 25.7 s"
     assert [len(line.both) for line in lines] == [0, 0, 0, 0, 0, 0, 1]
-    assert lines[6].both[0].met == (found.stops[0].track_reach_m <= limits["track_reach_m"])
+    assert (lines[6].both[0].verdict == "met") == (found.stops[0].track_reach_m <= limits["track_reach_m"])
 
 
 def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() -> None:
@@ -59,7 +59,7 @@ def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() ->
         tactical_diameter_m=899.0, initial_turning_m=1.0, steady_diameter_m=None,
     )  # fmt: skip
     lines = form_lines(content(simulated=None, measured=(wide,)), "measured")
-    assert (lines[0].port[0].met, lines[1].port[0].met, lines[0].starboard) == (False, True, ())
+    assert (lines[0].port[0].verdict, lines[1].port[0].verdict, lines[0].starboard) == ("not met", "met", ())
     page = html.fromstring(indices_html(content(simulated=None, measured=(wide,))))
     rows = {" ".join(" ".join(row.itertext()).split()) for row in page.iter("tr")}
     assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds no result") for row in rows)

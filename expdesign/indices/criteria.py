@@ -43,17 +43,21 @@ class Verdict:
         run: name of the run that shows the index.
         side: "starboard", "port", or "" where there is none.
         value: of the index [m or rad], or None where the run does not show it.
+        tolerance: of the value [m or rad].
     """
 
     criterion: Criterion
     run: str
     side: str
     value: float | None
+    tolerance: float = 0.0
 
     @property
     def met(self) -> bool | None:
-        """Whether the criterion is met; None where the run does not show the index."""
-        return None if self.value is None else self.value <= self.criterion.limit
+        """Whether the criterion is met; None where the run does not show it, or the limit is within the tolerance."""
+        if self.value is None or abs(self.value - self.criterion.limit) < self.tolerance:
+            return None
+        return self.value <= self.criterion.limit
 
 
 def criteria(length_m: float, speed_mps: float, *, scale: float = 1.0) -> tuple[Criterion, ...]:
@@ -80,33 +84,48 @@ def criteria(length_m: float, speed_mps: float, *, scale: float = 1.0) -> tuple[
 
 
 def judge(found: Iterable[Circle | ZigZag | Stop], *, length_m: float, scale: float = 1.0) -> tuple[Verdict, ...]:
-    """Every index with a criterion, run by run; zig-zags other than 10/10 and 20/20 have none."""
+    """Every index with a criterion, run by run.
+
+    Zig-zags other than 10/10 and 20/20 have none, nor has a record that begins after the first order.
+    """
     verdicts: list[Verdict] = []
     for trial in found:
+        if trial.speed_mps is None:
+            continue
         limits = {limit.key: limit for limit in criteria(length_m, trial.speed_mps, scale=scale)}
-        for key, value in indices_of(trial).items():
-            if key in limits:
-                side = getattr(trial, "side", "")
-                verdicts.append(Verdict(criterion=limits[key], run=trial.name, side=side, value=value))
+        side = getattr(trial, "side", "")
+        verdicts += [
+            Verdict(criterion=limits[key], run=trial.name, side=side, value=value, tolerance=tolerance)
+            for key, (value, tolerance) in indices_of(trial).items()
+        ]
     return tuple(verdicts)
 
 
-def indices_of(trial: Circle | ZigZag | Stop) -> dict[str, float | None]:
-    """Key -> value of the indices that have criteria."""
+def indices_of(trial: Circle | ZigZag | Stop) -> dict[str, tuple[float | None, float]]:
+    """Key -> (value, tolerance) of the indices that have criteria."""
     if isinstance(trial, Circle):
-        return {"advance_m": trial.advance_m, "tactical_diameter_m": trial.tactical_diameter_m}
-    if isinstance(trial, Stop):
-        return {"track_reach_m": trial.track_reach_m}
-    first, second = (*trial.overshoots_rad, None, None)[:2]
-    if _is(trial, 10.0):
         return {
-            "initial_turning_m": trial.initial_turning_m,
-            "overshoot_10_10_rad": first,
-            "second_overshoot_10_10_rad": second,
+            "advance_m": (trial.advance_m, trial.tolerance_m),
+            "tactical_diameter_m": (trial.tactical_diameter_m, 0.0),
         }
-    return {"overshoot_20_20_rad": first} if _is(trial, 20.0) else {}
+    if isinstance(trial, Stop):
+        return {"track_reach_m": (trial.track_reach_m, trial.tolerance_m)}
+    if _reversed_at(trial, 1, 10.0):
+        found = {
+            "initial_turning_m": (trial.initial_turning_m, trial.tolerance_m),
+            "overshoot_10_10_rad": _nth(trial, 1),
+        }
+        return found | ({"second_overshoot_10_10_rad": _nth(trial, 2)} if _reversed_at(trial, 2, 10.0) else {})
+    return {"overshoot_20_20_rad": _nth(trial, 1)} if _reversed_at(trial, 1, 20.0) else {}
 
 
-def _is(trial: ZigZag, degrees: float) -> bool:
-    near_heading = abs(trial.heading_rad - degrees * DEGREE) < TUNING.zigzag_deviation_rad
-    return near_heading and abs(trial.helm_rad - degrees * DEGREE) < TUNING.zigzag_deviation_rad
+def _nth(trial: ZigZag, number: int) -> tuple[float | None, float]:
+    """An overshoot and its tolerance [rad]."""
+    value = trial.overshoots_rad[number - 1] if len(trial.overshoots_rad) >= number else None
+    return value, trial.executes[number].tolerance_rad
+
+
+def _reversed_at(trial: ZigZag, number: int, degrees: float) -> bool:
+    """Whether a reversal was at a heading and from a helm of so many degrees."""
+    angles = [trial.helm_rad, *(abs(order.heading_rad) for order in trial.executes[number : number + 1])]
+    return len(angles) == 2 and all(abs(angle - degrees * DEGREE) < TUNING.zigzag_deviation_rad for angle in angles)

@@ -1,29 +1,32 @@
 """Measured standard trials: the kind of a run, the times of its orders, and its indices.
 
-A helm order is timed where the rudder leaves its old angle: linear extrapolation from the times at 10 % and 50 % of its
-travel.
+The helm of a standard trial is held at one angle to each side; what the helmsman does on the approach is no order. An
+order is timed where the rudder leaves for such an angle. A recorded input stands from its sample to the next, so a step
+begins at the sample that first shows it; where a logger reads the rudder, it began up to one sample earlier.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from expdesign.errors import InputError
-from expdesign.indices.read import read_circle, read_stop, read_zigzag
+from expdesign.indices.read import SIDE_NAMES, read_circle, read_stop, read_zigzag
 from expdesign.indices.steered_run import SteeredRun, orders
 from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Stop, ZigZag
 from expdesign.signals import Batch
-from expdesign.simulation import Helm
-from expdesign.values import Array
+from expdesign.simulation import Helm, steady_ahead
 from expdesign.vessel import Vessel
 
 LEAST_HELM_RAD = math.radians(2.0)
 TURNED_RAD = math.radians(80.0)
+Samples = NDArray[np.intp]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +49,7 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     """The indices of one measured run: a zig-zag, a turning circle or a stop.
 
     Args:
-        vessel: for length and actuators.
+        vessel: for length, actuators, and the side to which its helm turns it.
         batch: with pose and velocity.
         reference_forward_m: how far forward of amidships the recorded positions and velocities are [m].
 
@@ -55,20 +58,27 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     """
     if batch.pose is None or not np.isfinite(batch.pose).all():
         raise InputError(f"{batch.name}: has no complete positions and headings, which the indices need")
-    helm = Helm(vessel=vessel)
-    run = _steered_run(vessel, batch, helm, reference_forward_m)
-    turned = _orders(run)
-    if turned:
-        return _steered(run, turned)
+    run = _steered_run(vessel, batch, reference_forward_m)
+    held = _held(run)
+    turned = float(np.ptp(run.pose[:, 2]))
+    one_sided = len({stretch.level_rad > 0 for stretch in held}) == 1
+    still = one_sided and held[0].order_s is None and turned < TURNED_RAD
+    if held and not still:
+        return (_late if held[0].order_s is None else _steered)(vessel, run.until(held[-1].last), held)
+    helm = "no helm is held over"
+    if still:
+        helm = f"the helm stays at {_degrees(held[0].level_rad)} and the heading changes by {_degrees(turned)} only"
     astern = _astern(run)
     if astern is None:
-        return NotStandard(name=batch.name, reason="neither the helm nor the engines are ordered to move")
-    course, speed = _approach(run, astern)
-    stop = read_stop(run, order_s=astern, course_rad=course, speed_mps=speed) if speed > _slow(run) else None
-    return stop or NotStandard(name=batch.name, reason="the helm stays amidships and the ship keeps its headway")
+        return NotStandard(name=batch.name, reason=f"{helm}, and the engines are not ordered to stop")
+    approach = _approach(run, astern)
+    found = read_stop(run, order_s=astern, course_rad=approach.course_rad, speed_mps=approach.speed_mps)
+    if found is None or approach.speed_mps < _slow(run):
+        return NotStandard(name=batch.name, reason=f"{helm}, and the ship keeps its headway")
+    return replace(found, remarks=approach.remarks)
 
 
-def _steered_run(vessel: Vessel, batch: Batch, helm: Helm, forward_m: float) -> SteeredRun:
+def _steered_run(vessel: Vessel, batch: Batch, forward_m: float) -> SteeredRun:
     assert batch.pose is not None
     pose, velocity = np.array(batch.pose), np.array(batch.velocity)
     if not np.isfinite(velocity).all():
@@ -81,87 +91,236 @@ def _steered_run(vessel: Vessel, batch: Batch, helm: Helm, forward_m: float) -> 
         time_s=batch.time_s,
         pose=pose,
         velocity=velocity,
-        order_time_s=batch.time_s + batch.sample_time_s / 2,  # inputs are held: a value belongs to its sample's middle
-        **orders(helm, batch.input_names, batch.inputs),
+        tolerance_s=batch.sample_time_s,
+        **orders(Helm(vessel=vessel), batch.input_names, batch.inputs),
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Order:
-    """A helm order: when it was given and the angle it led to, from neutral."""
+class _Held:
+    """A stretch over which the helm is held.
 
-    time_s: float
-    helm_rad: float
+    Attributes:
+        order_s: when the helm was ordered there, or None where the record begins with the helm over.
+        level_rad: the angle held.
+        last: last sample of the stretch.
+    """
+
+    order_s: float | None
+    level_rad: float
+    last: int
 
 
-def _orders(run: SteeredRun) -> tuple[_Order, ...]:
-    """Helm orders in time order; successive plateaus lie on alternate sides of neutral."""
-    neutral = float(np.median(run.helm_rad[: max(3, len(run.helm_rad) // 200)]))
-    helm = run.helm_rad - neutral
-    largest = float(np.abs(helm).max())
-    if largest < LEAST_HELM_RAD:
+def _held(run: SteeredRun) -> tuple[_Held, ...]:
+    """Stretches of held helm in time order; none where the helm is steered or stays amidships."""
+    stretches = _stretches(run)
+    if not stretches or 2 * sum(map(len, stretches)) < stretches[-1][-1] - stretches[0][0]:
         return ()
-    side = np.where(helm > largest / 2, 1, np.where(helm < -largest / 2, -1, 0))
-    firm = np.flatnonzero(side)
-    stretches = np.split(firm, np.flatnonzero(np.diff(side[firm]) != 0) + 1)
-    levels = [float(np.median(helm[stretch])) for stretch in stretches]
-    times = [_left(run.order_time_s, helm, stretches[0][0], 0.0, levels[0])]
-    for (_, late), (before, after) in zip(pairwise(stretches), pairwise(levels), strict=True):
-        times.append(_left(run.order_time_s, helm, late[0], before, after))
-    return tuple(_Order(time_s=time, helm_rad=level) for time, level in zip(times, levels, strict=True))
+    levels = [float(np.median(run.helm_rad[part])) for part in stretches]
+    orders_s = [_first_order(run, int(stretches[0][0]), levels[0])]
+    for (one, other), (before, after) in zip(pairwise(stretches), pairwise(levels), strict=True):
+        turned = before * after < 0  # else the helm was let go between, and the run will be refused
+        orders_s.append(
+            _left(run, int(one[-1]), int(other[0]), before, after) if turned else float(run.time_s[other[0]])
+        )
+    return tuple(
+        _Held(order_s=order, level_rad=level, last=int(part[-1]))
+        for order, level, part in zip(orders_s, levels, stretches, strict=True)
+    )
 
 
-def _left(time_s: Array, helm: Array, arrived: int, before: float, after: float) -> float:
-    """Time at which the helm left one level for another, which it had reached at sample `arrived`."""
-    way = (helm - before) / (after - before)
-    moments = []
-    for share in (0.1, 0.5):
-        below = np.flatnonzero(way[: arrived + 1] < share)
-        index = int(below[-1]) if len(below) else 0
-        high = min(index + 1, arrived)
-        moments.append(float(np.interp(share, way[[index, high]], time_s[[index, high]])))
-    return float(max(time_s[0], moments[0] - (moments[1] - moments[0]) / 4))
+def _stretches(run: SteeredRun) -> list[Samples]:
+    """Samples of every stretch in which the helm is held at the angle of its side, but for short interruptions.
+
+    That is the largest angle held while the ship sails her own length; a steering helmsman moves on sooner.
+    """
+    helm = run.helm_rad
+    length_s = run.length_m / max(run.median_speed_mps, 1e-9)
+    held = max(3, math.ceil(TUNING.held_lengths * length_s / run.sample_time_s))
+    if held > len(helm):
+        return []
+    top, bottom = (f(helm, held) for f in (scipy.ndimage.maximum_filter1d, scipy.ndimage.minimum_filter1d))
+    middle = (top + bottom) / 2
+    narrow = top - bottom <= 2 * np.minimum(LEAST_HELM_RAD, np.abs(middle) / 5)
+    levels = middle[narrow & (np.abs(middle) >= LEAST_HELM_RAD)]
+    largest = np.abs(levels).max(initial=0.0)
+    near = min(LEAST_HELM_RAD, largest / 5)
+    sides = np.zeros(len(helm), dtype=int)
+    for side in (1, -1):
+        level = (side * levels).max(initial=0.0)
+        if level > largest / 2:
+            level = np.median(side * helm[np.abs(side * helm - level) <= near])  # noise raises the largest
+            sides[np.abs(side * helm - level) <= near] = side
+    parts = [part for part in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(sides)) + 1) if sides[part[0]]]
+    shortest = TUNING.touched * max(map(len, parts), default=0)
+    stretches: list[Samples] = []
+    for part in (part for part in parts if len(part) >= shortest):
+        same = bool(stretches) and sides[stretches[-1][0]] == sides[part[0]]
+        if same and part[0] - stretches[-1][-1] <= shortest:
+            stretches[-1] = np.concatenate([stretches[-1], part])
+        else:
+            stretches.append(part)
+    return stretches
 
 
-def _steered(run: SteeredRun, turned: tuple[_Order, ...]) -> Found:
-    course, speed = _approach(run, turned[0].time_s)
+def _first_order(run: SteeredRun, arrived: int, level: float) -> float | None:
+    """When the helm left for the first angle that is held, or None where the record does not show it.
+
+    The move reaches back to where the helm was about as long before its beginning as it took.
+    """
+    way = run.helm_rad / level
+    for length in range(1, arrived):
+        begin, earlier = arrived - length, max(arrived - 2 * length, 0)
+        moved = way[arrived] - way[begin]
+        if moved > TUNING.least_move and abs(way[begin] - way[earlier]) < moved / 4:
+            before = float(np.median(way[max(arrived - math.ceil(1.5 * length), 0) : arrived - int(1.2 * length) + 1]))
+            close = np.flatnonzero(way[earlier:arrived] < before + moved / 10)
+            return _left(run, earlier + int(close[-1]), arrived, before * level, level)
+    return None
+
+
+def _left(run: SteeredRun, first: int, arrived: int, before: float, after: float) -> float:
+    """When the helm left one angle for another, at a constant rate between two samples.
+
+    Inputs stand from their sample to the next, so that a change between two samples lies at the second, and a ramp
+    gives means over samples. Its middle is the mean time of the changes; its duration follows from their variance, of
+    which a sample before and one after the ramp, filled in part, add a sixth of a squared sample.
+    """
+    more = 1 + (arrived - first) // 4
+    first, last = max(first - more, 0), min(arrived + more, len(run.helm_rad) - 1)
+    way = np.clip((run.helm_rad[first : last + 1] - before) / (after - before), 0.0, 1.0)
+    way[0], way[-1] = 0.0, 1.0
+    time, share = run.time_s[first + 1 : last + 1], np.diff(way)
+    middle = float(share @ time)
+    width_s = math.sqrt(max(0.0, 12 * float(share @ (time - middle) ** 2) - 2 * run.sample_time_s**2))
+    return max(float(run.time_s[0]), middle - width_s / 2)
+
+
+def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
+    times = tuple(stretch.order_s for stretch in held if stretch.order_s is not None)
+    approach = _approach(run, times[0])
+    course, speed = approach.course_rad, approach.speed_mps
     if speed < _slow(run):
         return NotStandard(name=run.name, reason=f"the ship makes {speed:.3g} m/s when the helm is ordered")
-    until = turned[1].time_s if len(turned) > 1 else float(run.time_s[-1])
-    swung = run.at(until)[2] - course
+    swung = run.at(times[1] if len(times) > 1 else float(run.time_s[-1]))[2] - course
     side = 1 if swung > 0 else -1
-    size = abs(turned[0].helm_rad)
-    if len(turned) == 1:
+    remarks = approach.remarks + _against(vessel, side, held[0])
+    if len(held) == 1:
         if abs(swung) < TURNED_RAD:
-            return NotStandard(
-                name=run.name, reason=f"one helm order, and the heading changes by {_degrees(swung)} only"
-            )
-        return read_circle(
-            run, order_s=turned[0].time_s, course_rad=course, side=side, helm_rad=size, speed_mps=speed, current=True
+            reason = f"one helm order, and the heading changes by {_degrees(swung)} only"
+            return NotStandard(name=run.name, reason=reason)
+        size = abs(held[0].level_rad)
+        circle = read_circle(
+            run, order_s=times[0], course_rad=course, side=side, helm_rad=size, speed_mps=speed, current=True
         )
-    sizes = np.abs([order.helm_rad for order in turned])
-    if sizes.max() > 1.3 * sizes.min():
-        sides = f"{_degrees(sizes.min())} and {_degrees(sizes.max())}"
-        return NotStandard(name=run.name, reason=f"the helm is ordered to different angles, {sides}")
-    times = tuple(order.time_s for order in turned)
-    found = read_zigzag(
-        run, orders_s=times, course_rad=course, side=side, helm_rad=float(np.mean(sizes)), speed_mps=speed
-    )
+        return replace(circle, remarks=(*remarks, *_removed(circle)))
+    if reason := _unlike(held):
+        return NotStandard(name=run.name, reason=reason)
+    found = read_zigzag(run, orders_s=times, course_rad=course, side=side, helm_rad=_size(held), speed_mps=speed)
     swings = [execute.heading_rad for execute in found.executes[1:]]
     if any(one * other >= 0 for one, other in pairwise(swings)) or found.heading_rad < math.radians(0.5):
         return NotStandard(name=run.name, reason="the heading does not swing to both sides of the approach course")
-    return found
+    return replace(found, remarks=remarks)
 
 
-def _approach(run: SteeredRun, order_s: float) -> tuple[float, float]:
+def _removed(circle: Circle) -> tuple[str, ...]:
+    """A remark on the current that was taken out, where it matters."""
+    flow = math.hypot(circle.current_north_mps or 0.0, circle.current_east_mps or 0.0)
+    if flow <= TUNING.current * (circle.speed_mps or math.inf):
+        return ()
+    return (f"a drift of {flow:.2g} m/s is taken for a uniform current and removed",)
+
+
+def _late(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
+    """What a record shows that begins with the helm over."""
+    times = tuple(stretch.order_s for stretch in held if stretch.order_s is not None)
+    begins = "the record begins with the helm over"
+    if not times:
+        turned = float(run.pose[-1, 2] - run.pose[0, 2])
+        side = 1 if turned > 0 else -1
+        circle = read_circle(
+            run, order_s=float(run.time_s[0]), course_rad=float(run.pose[0, 2]), side=side,
+            helm_rad=abs(held[0].level_rad), speed_mps=None, current=True,
+        )  # fmt: skip
+        if circle.steady_diameter_m is None:
+            reason = f"{begins} and turns by {_degrees(turned)}, expected 270 deg or more for a steady diameter"
+            return NotStandard(name=run.name, reason=reason)
+        remark = f"{begins}: advance, transfer and tactical diameter, which count from the order, cannot be had"
+        return replace(
+            circle, advance_m=None, transfer_m=None, tactical_diameter_m=None, initial_turning_m=None, tolerance_m=0.0,
+            remarks=(remark, *_against(vessel, side, held[0])),
+        )  # fmt: skip
+    if len(times) == 1:
+        return NotStandard(name=run.name, reason=f"{begins} and shows one reversal, expected two or more")
+    if reason := _unlike(held):
+        return NotStandard(name=run.name, reason=reason)
+    headings = [float(run.at(time)[2]) for time in times]
+    middle = float(np.mean(headings[::2]) + np.mean(headings[1::2])) / 2
+    side = 1 if headings[1] > headings[0] else -1
+    found = read_zigzag(run, orders_s=times, course_rad=middle, side=side, helm_rad=_size(held), speed_mps=None)
+    remark = (
+        f"{begins}: approach course and speed and the numbers of the overshoots cannot be had; those from the second "
+        "recorded reversal on are given, and headings are from the middle of the swings"
+    )
+    remarks = (remark, *_against(vessel, side, held[1]))
+    return replace(found, side="", initial_turning_m=None, tolerance_m=0.0, remarks=remarks)
+
+
+def _unlike(held: tuple[_Held, ...]) -> str:
+    """Why stretches of held helm are none of a zig-zag, or ""."""
+    if any(one.level_rad * other.level_rad > 0 for one, other in pairwise(held)):
+        return "the helm is held over to one side, let go, and held over to the same side, expected one trial in a file"
+    sizes = np.abs([stretch.level_rad for stretch in held])
+    if sizes.max() > 1.3 * sizes.min():
+        return f"the helm is ordered to different angles, {_degrees(sizes.min())} and {_degrees(sizes.max())}"
+    return ""
+
+
+def _size(held: tuple[_Held, ...]) -> float:
+    """Half the angle between the helm to starboard and to port, wherever amidships is [rad]."""
+    return float(np.ptp([stretch.level_rad for stretch in held])) / 2
+
+
+def _against(vessel: Vessel, side: int, held: _Held) -> tuple[str, ...]:
+    """A remark where the ship turns to the other side than the vessel's model does with this helm."""
+    try:
+        sense = steady_ahead(vessel).starboard
+    except InputError:  # the model cannot be trimmed, so nobody knows how it turns
+        return ()
+    if sense * side * held.level_rad >= 0:
+        return ()
+    return (
+        f"the ship turns to {SIDE_NAMES[side]} with helm that turns the vessel of the file to {SIDE_NAMES[-side]}: "
+        "is the sign of the recorded helm right?",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Approach:
     """Mean heading and speed over the last ship length before an order, or over the part of it that was recorded."""
-    before = run.time_s <= order_s
+
+    course_rad: float
+    speed_mps: float
+    remarks: tuple[str, ...]
+
+
+def _approach(run: SteeredRun, order_s: float) -> _Approach:
     speeds = np.hypot(*run.velocity[:, :2].T)
-    last = float(speeds[before][-1]) if before.any() else float(speeds[0])
-    stretch = before & (run.time_s >= order_s - run.length_m / max(last, 1e-9))
-    if not stretch.any():
-        stretch = np.arange(len(run.time_s)) == 0
-    return float(run.pose[stretch, 2].mean()), float(speeds[stretch].mean())
+    before = np.flatnonzero(run.time_s <= order_s)
+    last = float(speeds[before[-1]])
+    length_s = run.length_m / max(last, 1e-9)
+    stretch = before[run.time_s[before] >= min(order_s - length_s, run.time_s[before[-1]])]
+    recorded = order_s - run.time_s[0]
+    remarks = []
+    if recorded < 0.99 * length_s:
+        remarks.append(f"{recorded / length_s:.1f} ship lengths of approach are recorded, expected 1 or more")
+    third = max(len(stretch) // 3, 1)
+    start, end = (float(speeds[part].mean()) for part in (stretch[:third], stretch[-third:]))
+    if abs(end - start) > TUNING.steady_approach * (end + start) / 2:
+        remarks.append(f"the approach is not steady: {start:.3g} m/s becomes {end:.3g} m/s over the last ship length")
+    return _Approach(
+        course_rad=float(run.pose[stretch, 2].mean()), speed_mps=float(speeds[stretch].mean()), remarks=tuple(remarks)
+    )
 
 
 def _slow(run: SteeredRun) -> float:
@@ -175,7 +334,7 @@ def _astern(run: SteeredRun) -> float | None:
     if first <= 0 or not len(stopped):
         return None
     left = np.flatnonzero(np.abs(run.drive[: stopped[0] + 1] - first) > 0.02 * first)
-    return float(run.order_time_s[max(int(left[0]) - 1, 0)]) if len(left) else None
+    return float(run.time_s[left[0]]) if len(left) else None
 
 
 def _degrees(angle_rad: float) -> str:

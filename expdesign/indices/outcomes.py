@@ -100,14 +100,13 @@ def simulated_circle(vessel: Vessel, *, side: str, conduct: Conduct) -> Circle:
     """A simulated turning circle."""
     commands, motion = turning_circle(vessel, side=side, conduct=conduct)
     run = steered_run(vessel, commands, motion, name=f"circle to {side}")
-    approach = steady_ahead(vessel, conduct.speed_mps)
     return read_circle(
         run,
         order_s=0.0,
         course_rad=0.0,
         side=1 if side == "starboard" else -1,
-        helm_rad=abs(float(run.helm_rad[-1]) - approach.angle_rad),
-        speed_mps=approach.speed_mps,
+        helm_rad=abs(float(run.helm_rad[-1])),
+        speed_mps=float(math.hypot(*motion.velocity[0, :2])),
         current=False,
     )
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from expdesign.indices.steered_run import SteeredRun, crossing
+from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
 from expdesign.values import Array
 
@@ -15,7 +16,14 @@ SIDE_NAMES = {1: "starboard", -1: "port"}
 
 
 def read_circle(
-    run: SteeredRun, *, order_s: float, course_rad: float, side: int, helm_rad: float, speed_mps: float, current: bool
+    run: SteeredRun,
+    *,
+    order_s: float,
+    course_rad: float,
+    side: int,
+    helm_rad: float,
+    speed_mps: float | None,
+    current: bool,
 ) -> Circle:
     """A turning circle.
 
@@ -25,7 +33,7 @@ def read_circle(
         course_rad: heading of the approach.
         side: +1 to starboard, -1 to port.
         helm_rad: size of the helm.
-        speed_mps: approach speed.
+        speed_mps: approach speed, or None where unknown.
         current: whether to estimate and subtract a uniform current, which needs 540 degrees of turn.
     """
     drift = uniform_current(run, order_s=order_s, course_rad=course_rad, side=side) if current else None
@@ -50,6 +58,7 @@ def read_circle(
         steady_diameter_m=_steady_diameter(run, order_s=order_s, course_rad=course_rad, side=side, flow=flow),
         current_north_mps=None if drift is None else float(drift[0]),
         current_east_mps=None if drift is None else float(drift[1]),
+        tolerance_m=run.tolerance_m(order_s),
     )
 
 
@@ -94,21 +103,24 @@ def read_zigzag(
     course_rad: float,
     side: int,
     helm_rad: float,
-    speed_mps: float,
+    speed_mps: float | None,
     heading_rad: float | None = None,
 ) -> ZigZag:
     """A zig-zag.
 
     Args:
         run: with its rudder orders.
-        orders_s: times of the orders, the first included.
+        orders_s: times of the orders, the first included where it is known.
         course_rad: heading of the approach.
-        side: of the first turn, +1 to starboard.
+        side: of the turn that follows the first of these, +1 to starboard.
         helm_rad: size of the helm.
-        speed_mps: approach speed.
+        speed_mps: approach speed, or None where unknown.
         heading_rad: nominal change of heading at the orders, or None for the actual ones.
     """
-    executes = tuple(Execute(time_s=t, heading_rad=side * float(run.at(t)[2] - course_rad)) for t in orders_s)
+    executes = tuple(
+        Execute(time_s=t, heading_rad=side * float(run.at(t)[2] - course_rad), tolerance_rad=run.tolerance_rad(t))
+        for t in orders_s
+    )
     swings = [(-1) ** n for n in range(len(orders_s))]
     nominal = heading_rad
     if nominal is None:
@@ -130,9 +142,10 @@ def read_zigzag(
         speed_mps=speed_mps,
         executes=executes,
         overshoots_rad=tuple(overshoots),
-        initial_turning_m=sailed_to(
-            run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * min(nominal, TEN)
-        ),
+        initial_turning_m=None
+        if nominal < TEN - TUNING.zigzag_deviation_rad
+        else sailed_to(run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * TEN),
+        tolerance_m=run.tolerance_m(orders_s[0]),
     )
 
 
@@ -155,4 +168,5 @@ def read_stop(run: SteeredRun, *, order_s: float, course_rad: float, speed_mps: 
         lateral_m=float(east * c - north * s),
         heading_change_rad=float(last[2] - course_rad),
         time_s=end - order_s,
+        tolerance_m=run.tolerance_m(order_s),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -28,9 +28,9 @@ class SteeredRun:
         time_s: (k,).
         pose: (k, 3) midship point north, east [m]; heading [rad], continuous.
         velocity: (k, 3) over ground, b-frame.
-        order_time_s: (j,) times that `helm_rad` and `drive` belong to.
-        helm_rad: (j,) helm angle in the actuators' own sense.
-        drive: (j,) engine order or mean propeller speed, ahead positive.
+        helm_rad: (j,) helm angle in the actuators' own sense, each from its sample to the next.
+        drive: (j,) engine order or mean propeller speed, ahead positive, likewise.
+        tolerance_s: of the times of orders: one sample of a record, 0 in a simulation.
     """
 
     name: str
@@ -38,12 +38,12 @@ class SteeredRun:
     time_s: Array
     pose: Array
     velocity: Array
-    order_time_s: Array
     helm_rad: Array
     drive: Array
+    tolerance_s: float
 
     def __post_init__(self) -> None:
-        seal(self, time_s="k", pose="k 3", velocity="k 3", order_time_s="j", helm_rad="j", drive="j")
+        seal(self, time_s="k", pose="k 3", velocity="k 3", helm_rad="j", drive="j")
 
     @cached_property
     def _motion(self) -> scipy.interpolate.CubicHermiteSpline:
@@ -52,6 +52,24 @@ class SteeredRun:
         return scipy.interpolate.CubicHermiteSpline(
             self.time_s, self.pose, np.stack([u * c - v * s, u * s + v * c, r], axis=1)
         )
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between samples [s]."""
+        return float(self.time_s[1] - self.time_s[0])
+
+    @property
+    def median_speed_mps(self) -> float:
+        """Over ground [m/s]."""
+        return float(np.median(np.hypot(*self.velocity[:, :2].T)))
+
+    def until(self, last: int) -> SteeredRun:
+        """The run up to a sample."""
+        part = slice(last + 1)
+        return replace(
+            self, time_s=self.time_s[part], pose=self.pose[part], velocity=self.velocity[part],
+            helm_rad=self.helm_rad[part], drive=self.drive[part],
+        )  # fmt: skip
 
     def at(self, time_s: float) -> Array:
         """(3,) pose at a time within the run."""
@@ -63,6 +81,20 @@ class SteeredRun:
         times = np.concatenate([[first_s], inner, [last_s]])
         fine = np.concatenate([*(np.linspace(a, b, 4, endpoint=False) for a, b in pairwise(times)), [last_s]])
         return float(np.hypot(*np.diff(self._motion(fine)[:, :2], axis=0).T).sum())
+
+    def tolerance_m(self, order_s: float) -> float:
+        """Way made within the tolerance of an order's time [m]."""
+        first_s, last_s = self._order_sample(order_s)
+        return self.sailed_m(first_s, last_s)
+
+    def tolerance_rad(self, order_s: float) -> float:
+        """Change of heading within the tolerance of an order's time [rad]."""
+        first_s, last_s = self._order_sample(order_s)
+        return abs(float(self.at(last_s)[2] - self.at(first_s)[2]))
+
+    def _order_sample(self, order_s: float) -> tuple[float, float]:
+        first_s = max(order_s - self.tolerance_s, float(self.time_s[0]))
+        return first_s, min(first_s + self.tolerance_s, float(self.time_s[-1]))
 
     def first_turned(self, change_rad: float, *, since_s: float, course_rad: float) -> float | None:
         """When the heading first differs by `change_rad` (signed) from the course, or None."""
@@ -99,7 +131,7 @@ def crossing(curve: Curve, low: float, high: float) -> float:
 
 
 def steered_run(vessel: Vessel, commands: Commands, motion: Trajectory, *, name: str) -> SteeredRun:
-    """A simulated trial; the mean command of a sample belongs to its middle."""
+    """A simulated trial."""
     helm = Helm(vessel=vessel)
     return SteeredRun(
         name=name,
@@ -107,7 +139,7 @@ def steered_run(vessel: Vessel, commands: Commands, motion: Trajectory, *, name:
         time_s=motion.time_s,
         pose=motion.pose,
         velocity=motion.velocity,
-        order_time_s=motion.time_s[:-1] + commands.sample_time_s / 2,
+        tolerance_s=0.0,
         **orders(helm, commands.names, commands.values),
     )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from expdesign.export.indices_form.form import IndicesContent, shown
+from expdesign.export.indices_form.form import IndicesContent, shown, verdict_word
 from expdesign.export.words import speed
 from expdesign.indices import DEPTH_BY_DRAUGHT, HIGHEST_SEA, STRONGEST_WIND, Verdict, beaufort
 
@@ -31,12 +31,12 @@ KIND_NAMES = {"azimuth": "azimuth thruster", "tunnel": "tunnel thruster"}
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """One result in a cell: the value, the same by length, the run it is from, and whether the criterion is met."""
+    """One result in a cell: the value, the same by length, the run it is from, and one of `VERDICT_WORDS`."""
 
     value: str
     by_length: str
     run: str
-    met: bool | None
+    verdict: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,10 +79,10 @@ def _result(content: IndicesContent, verdict: Verdict) -> Result:
     value = verdict.value
     metric = verdict.criterion.key.endswith("_m") and value is not None
     return Result(
-        value=shown(verdict.criterion.key, value),
+        value=shown(verdict.criterion.key, value, verdict.tolerance),
         by_length=f"{value / content.vessel.length_m:.2f} L" if metric and value is not None else "",
         run=verdict.run,
-        met=verdict.met,
+        verdict=verdict_word(verdict),
     )
 
 
@@ -132,6 +132,7 @@ def _length_by_speed(content: IndicesContent) -> str:
     found = dict.fromkeys(
         f"{content.vessel.length_m / trial.speed_mps * content.scale**0.5:.1f} s at {speed(trial.speed_mps)}"
         for _, trial in content.trials
+        if trial.speed_mps is not None
     )
     return ", ".join(found)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -15,6 +16,9 @@ from expdesign.vessel.environment import SEA_STATES
 
 KINDS = {Circle: "turning circle", ZigZag: "zig-zag", Stop: "stopping", NotStandard: "no standard trial"}
 Found = Circle | ZigZag | Stop | NotStandard
+VERDICT_WORDS = ("met", "not met", "open", "no result")
+OTHER_SPEED = 0.05
+"""Difference of approach speeds, by the simulation's, above which measured and simulated results are no comparison."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +90,29 @@ class IndicesContent:
         )
 
     @property
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """(of what, remark): what gave no result and why, then remarks on runs, on the simulation and on the files."""
+        refused = [(item.name, f"no result: {item.reason}") for item in self.measured if isinstance(item, NotStandard)]
+        runs = [(trial.name, remark) for _, trial in self.trials for remark in trial.remarks]
+        found = self.simulated
+        model = [("simulation", reason) for reason in (found.not_run if found else (self.simulated_why_not,)) if reason]
+        speeds = [trial.speed_mps for source, trial in self.trials if source == "measured" and trial.speed_mps]
+        if found and any(abs(speed / found.speed_mps - 1) > OTHER_SPEED for speed in speeds):
+            measured = " to ".join(dict.fromkeys(f"{end(speeds):.3g}" for end in (min, max)))
+            model.append(
+                (
+                    "simulation",
+                    f"is at {found.speed_mps:.3g} m/s, the runs at {measured} m/s: --speed-mps makes them alike",
+                )
+            )
+        return (*refused, *runs, *model, *(("file", note) for note in self.notes))
+
+    def counted(self, source: str) -> dict[str, int]:
+        """Number of results of "measured" or "simulated" trials with each of `VERDICT_WORDS`, the last two if any."""
+        counted = Counter(verdict_word(verdict) for origin, verdict in self.verdicts if origin == source)
+        return {word: counted[word] for word in VERDICT_WORDS if counted[word] or word in ("met", "not met")}
+
+    @property
     def applies(self) -> str:
         """Whether the resolution applies to this ship, as a sentence."""
         full = self.vessel.length_m * self.scale
@@ -97,11 +124,20 @@ class IndicesContent:
         )
 
 
-def shown(key: str, value: float | None) -> str:
-    """A value of an index in metres or degrees."""
+def shown(key: str, value: float | None, tolerance: float = 0.0) -> str:
+    """A value of an index in metres or degrees, with its tolerance where it has one."""
     if value is None:
         return "no result"
-    return f"{math.degrees(value):.1f} deg" if key.endswith("_rad") else f"{value:.4g} m"
+    if key.endswith("_rad"):
+        return f"{math.degrees(value):.1f}{f' ± {math.degrees(tolerance):.1f}' if tolerance else ''} deg"
+    return f"{value:.4g}{f' ± {tolerance:.2g}' if tolerance else ''} m"
+
+
+def verdict_word(verdict: Verdict) -> str:
+    """One of `VERDICT_WORDS`; open where the limit is within the tolerance."""
+    if verdict.value is None:
+        return "no result"
+    return {True: "met", False: "not met", None: "open"}[verdict.met]
 
 
 def verdict_rows(content: IndicesContent) -> list[tuple[str, ...]]:
@@ -116,14 +152,45 @@ def verdict_rows(content: IndicesContent) -> list[tuple[str, ...]]:
                 source,
                 verdict.run,
                 limit.name,
-                shown(limit.key, value),
+                shown(limit.key, value, verdict.tolerance),
                 f"{value / length:.2f} L" if metric and value is not None else "",
                 shown(limit.key, limit.limit),
                 limit.rule,
-                {True: "met", False: "NOT met", None: "-"}[verdict.met],
+                verdict_word(verdict).replace("not", "NOT"),
             )
         )
     return rows
+
+
+def zigzag_rows(content: IndicesContent) -> list[tuple[str, ...]]:
+    """Source, run, approach speed, angles, headings at the reversals that overshoots follow, and these [deg]."""
+    rows: list[tuple[str, ...]] = []
+    for source, trial in content.trials:
+        if isinstance(trial, ZigZag):
+            reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
+            rows.append(
+                (
+                    source,
+                    trial.name,
+                    "" if trial.speed_mps is None else f"{trial.speed_mps:.3g} m/s",
+                    f"{degrees(trial.heading_rad)} / {degrees(trial.helm_rad)}",
+                    ", ".join(degrees(order.heading_rad) for order in reversals),
+                    overshoots(trial),
+                )
+            )
+    return rows
+
+
+def overshoots(trial: ZigZag) -> str:
+    """All of them, and the largest tolerance [deg]."""
+    reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
+    tolerance = max((order.tolerance_rad for order in reversals), default=0.0)
+    return ", ".join(map(degrees, trial.overshoots_rad)) + (f" ± {degrees(tolerance)}" if tolerance else "")
+
+
+def degrees(angle_rad: float) -> str:
+    """With one decimal."""
+    return f"{math.degrees(angle_rad):.1f}"
 
 
 def indices_json(content: IndicesContent) -> str:
@@ -143,6 +210,7 @@ def indices_json(content: IndicesContent) -> str:
                     "side": verdict.side,
                     "index": verdict.criterion.key,
                     "value": verdict.value,
+                    "tolerance": verdict.tolerance,
                     "limit": verdict.criterion.limit,
                     "rule": verdict.criterion.rule,
                     "met": verdict.met,

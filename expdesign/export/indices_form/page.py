@@ -6,15 +6,14 @@ import math
 
 from expdesign.export import words
 from expdesign.export.indices_form.appendix import condition_rows, form_lines, ship_rows
-from expdesign.export.indices_form.form import IndicesContent, shown, verdict_rows
+from expdesign.export.indices_form.form import IndicesContent, overshoots, shown, verdict_rows
 from expdesign.export.pages import page_template
-from expdesign.indices import Circle, NotStandard, Stop, ZigZag
+from expdesign.indices import Circle, Stop, ZigZag
 
 
 def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
     sources = tuple(dict.fromkeys(source for source, _ in content.trials))
-    unmet = sum(verdict.met is False for _, verdict in content.verdicts)
     page = page_template("expdesign.export.indices_form", "indices.html")
     return page.render(
         content=content,
@@ -23,12 +22,18 @@ def indices_html(content: IndicesContent) -> str:
         forms={source: form_lines(content, source) for source in sources},
         ship=ship_rows(content),
         conditions=condition_rows(content),
-        unmet=unmet,
+        counts=[_counts(content, source) for source in sources],
         circles=[_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)],
         zigzags=[_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)],
         stops=[_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)],
-        others=[item for item in content.measured if isinstance(item, NotStandard)],
     )
+
+
+def _counts(content: IndicesContent, source: str) -> str:
+    """How many results there are and how they stand to their criteria."""
+    counted = content.counted(source)
+    parts = ", ".join(f"{number} {word}" for word, number in counted.items()) if any(counted.values()) else "none"
+    return f"{source.capitalize()} results beside their criteria: {parts}."
 
 
 def _degrees(angle_rad: float) -> str:
@@ -39,24 +44,32 @@ def _metres(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
 
 
+def _speed(value: float | None) -> str:
+    return "" if value is None else words.speed(value)
+
+
+def _with_tolerance(value: float | None, tolerance_m: float) -> str:
+    return shown("_m", value, tolerance_m).removesuffix(" m") if value is not None else ""
+
+
 def _circle(source: str, trial: Circle) -> tuple[str, ...]:
-    lengths = (trial.advance_m, trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
+    advance = _with_tolerance(trial.advance_m, trial.tolerance_m)
+    lengths = (trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
     current = ""
     if trial.current_north_mps is not None and trial.current_east_mps is not None:
         current = f"{trial.current_north_mps:.3f}, {trial.current_east_mps:.3f}"
-    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), words.speed(trial.speed_mps))
+    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), _speed(trial.speed_mps), advance)
     return (*head, *(_metres(length) for length in lengths), current)
 
 
 def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
-    overshoots = ", ".join(_degrees(angle) for angle in trial.overshoots_rad)
-    executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes[:4])
-    more = ", ..." if len(trial.executes) > 4 else ""
+    executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes)
+    initial = _with_tolerance(trial.initial_turning_m, trial.tolerance_m)
     head = (source, trial.name, trial.side, f"{_degrees(trial.heading_rad)} / {_degrees(trial.helm_rad)}")
-    return (*head, words.speed(trial.speed_mps), overshoots, _metres(trial.initial_turning_m), executes + more)
+    return (*head, _speed(trial.speed_mps), overshoots(trial), initial, executes)
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:
-    lengths = (trial.track_reach_m, trial.head_reach_m, trial.lateral_m)
+    reach = [shown("_m", value, trial.tolerance_m) for value in (trial.track_reach_m, trial.head_reach_m)]
     times = (_degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
-    return (source, trial.name, words.speed(trial.speed_mps), *(shown("_m", length) for length in lengths), *times)
+    return (source, trial.name, words.speed(trial.speed_mps), *reach, shown("_m", trial.lateral_m), *times)

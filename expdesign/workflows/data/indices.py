@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import write_files
-from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, verdict_rows
-from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
+from expdesign.export.indices_form import (
+    Held,
+    IndicesContent,
+    indices_html,
+    indices_json,
+    verdict_rows,
+    zigzag_rows,
+)
+from expdesign.indices import NotStandard, StandardResults, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
@@ -113,33 +119,43 @@ def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[
 
 
 def _summary(content: IndicesContent) -> dict[str, object]:
-    verdicts = content.verdicts
+    refused = sum(isinstance(item, NotStandard) for item in content.measured)
+    found = content.simulated
     return {
         "vessel": content.vessel.name,
         "measured_runs": len(content.measured),
+        **({"measured_runs_without_result": refused, **_counts(content, "measured")} if content.measured else {}),
+        **({"simulated_at_mps": found.speed_mps, **_counts(content, "simulated")} if found else {}),
         "results": {
-            f"{source} {v.run}: {v.criterion.key}": {"value": v.value, "limit": v.criterion.limit, "met": v.met}
-            for source, v in verdicts
+            f"{source} {v.run}: {v.criterion.key}": {
+                "value": v.value, "tolerance": v.tolerance, "limit": v.criterion.limit, "met": v.met
+            }
+            for source, v in content.verdicts
         },
-        "criteria_met": sum(verdict.met is True for _, verdict in verdicts),
-        "criteria_not_met": sum(verdict.met is False for _, verdict in verdicts),
-    }
+    }  # fmt: skip
+
+
+def _counts(content: IndicesContent, source: str) -> dict[str, object]:
+    """How many results of a source stand how to their criteria."""
+    counted = content.counted(source).items()
+    return {f"{source}_criteria_{word.replace(' ', '_')}": number for word, number in counted}
 
 
 def _tables(content: IndicesContent) -> tuple[TextTable, ...]:
-    rows = verdict_rows(content)
-    shown = [TextTable(title=f"MSC.137(76): {content.vessel.name}", header=HEADER, rows=tuple(rows))] if rows else []
-    zigzags = [
-        (source, trial.name, *_swings(trial.heading_rad, trial.helm_rad, trial.overshoots_rad))
-        for source, trial in content.trials
-        if isinstance(trial, ZigZag)
-    ]
-    if zigzags:
-        header = ("From", "Run", "Heading / helm, deg", "Overshoots, deg")
-        shown.append(TextTable(title="Zig-zags", header=header, rows=tuple(zigzags)))
-    return tuple(shown)
-
-
-def _swings(heading_rad: float, helm_rad: float, overshoots_rad: Sequence[float]) -> tuple[str, str]:
-    angles = f"{math.degrees(heading_rad):.1f} / {math.degrees(helm_rad):.1f}"
-    return angles, ", ".join(f"{math.degrees(angle):.1f}" for angle in overshoots_rad)
+    criteria = f"MSC.137(76): {content.vessel.name}"
+    if any(verdict.tolerance for _, verdict in content.verdicts):
+        criteria += " (± is one sample of the record at the order)"
+    zigzags = (
+        "From",
+        "Run",
+        "Approach",
+        "Heading / helm, deg",
+        "Heading at reversals, deg",
+        "Overshoot from there, deg",
+    )
+    tables = (
+        (criteria, HEADER, verdict_rows(content)),
+        ("Zig-zags", zigzags, zigzag_rows(content)),
+        ("Missing results and remarks", ("Of", "Remark"), content.remarks),
+    )
+    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
