@@ -137,6 +137,10 @@ class NoRoom(NoPlan):
     lacking: tuple[str, ...] = ()
 
 
+class NotDrawn(UserWarning):
+    """A page or a figure of one could not be drawn, a defect of ours. It says so in its place; all results are kept."""
+
+
 def _remade(kind: type[ExpdesignError], arguments: tuple[object, ...]) -> ExpdesignError:
     """An error with a message that is already made."""
     return kind.__new__(kind, *arguments)

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -21,9 +23,12 @@ from rich.progress import Progress as Bar
 
 from expdesign import __version__
 from expdesign.cli.summary import as_json, print_summary
+from expdesign.errors import NotDrawn
 from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
 
+BUG = 1
+"""Exit status of a defect of this program."""
 PLAIN_STEP = 0.1
 """Least share of the work between two plain lines about the same activity."""
 LEAST_SHARE = 0.1
@@ -120,12 +125,14 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
 
                 work = getattr(workflows, asked.workflow)
             lines = {"tell": _untold if quiet or json else _tell} if asked.tells else {}
-            with shown_progress(quiet=quiet) as progress:
+            with shown_progress(quiet=quiet) as progress, warnings.catch_warnings():
+                warnings.simplefilter("ignore", NotDrawn)  # told below
                 outcome = work(*asked.arguments, progress=progress, **lines, **asked.options)
             if json:
                 typer.echo(as_json(name, outcome))
             elif not quiet:
                 print_summary(outcome)
+            tell_gaps(outcome.files)
 
         kind = inspect.Parameter.KEYWORD_ONLY
         own = inspect.signature(asking, eval_str=True).parameters.values()
@@ -140,6 +147,17 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
         return asking
 
     return register
+
+
+def tell_gaps(files: Sequence[Path]) -> None:
+    """Say which pages or figures could not be drawn, and end with the status of a defect if any."""
+    from expdesign.export.folder import gaps
+
+    found = gaps(files)
+    for line in found:
+        typer.echo(f"expdesign: error: {line}", err=True)
+    if found:
+        raise typer.Exit(BUG)
 
 
 def _tell(line: str) -> None:

@@ -14,6 +14,7 @@ from types import FrameType
 import typer
 from typer.main import get_command
 
+from expdesign.cli.app import BUG
 from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
@@ -35,7 +36,7 @@ LISTS = (
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data", "--reference")
 """Options of `LISTS` whose values are files."""
-DONE, BUG, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 2, 3, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:

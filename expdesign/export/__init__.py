@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         track_csv,
         vessel_toml,
     )
-    from expdesign.export.folder import write_files
+    from expdesign.export.folder import Content, write_files
     from expdesign.export.formats import FORMATS, STANDARD, Format, find_format, route_files
     from expdesign.export.routes import (
         PlannedTrack,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = [
     "FORMATS",
     "STANDARD",
+    "Content",
     "Format",
     "PlannedTrack",
     "Route",
@@ -95,7 +96,7 @@ if not TYPE_CHECKING:
                 "track_csv",
                 "vessel_toml",
             ),
-            "folder": ("write_files",),
+            "folder": ("Content", "write_files"),
             "formats": ("FORMATS", "STANDARD", "Format", "find_format", "route_files"),
             "routes": (
                 "PlannedTrack",

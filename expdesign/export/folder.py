@@ -1,21 +1,27 @@
-"""Files are written completely or not at all."""
+"""Files are written completely or not at all, and results before the pages that show them."""
 
 from __future__ import annotations
 
 import os
 import re
 import shutil
+import traceback
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from expdesign.errors import FileError
+from expdesign.errors import FileError, NotDrawn
+from expdesign.export.formats.format import xml_text
 from expdesign.interruptions import interruptions_wait
 
 REMAINS = re.compile(r"\..+\.(\d+)-[0-9a-f]{12}\.(?:new|old)")
 """Names of temporary files, with the process that writes them."""
+NOT_DRAWN = re.compile(r'<p class="not-drawn">(.*?)</p>', re.DOTALL)
+Content = str | bytes | Callable[[], str]
+"""Of a file; a page is a function that draws it."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +62,12 @@ class _Slot:
                 path.unlink(missing_ok=True)
 
 
-def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, ...]:
-    """Write all files, or none: each beside its final name, synchronised to disk, then all renamed.
+def write_files(folder: Path, files: Mapping[str, Content]) -> tuple[Path, ...]:
+    """Write all results, or none; then draw the pages and write all of them, or none.
 
-    After an error or an interruption the folder is as it was, and a folder made for the files is gone again.
+    Files are written beside their final names, synchronised to disk, then all renamed. After an error or an
+    interruption the folder is as it was, but for results whose pages were being drawn, and a folder made for the files
+    is gone again. A page that cannot be drawn is replaced by one that says so.
 
     Args:
         folder: where to; made when missing.
@@ -67,6 +75,46 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
 
     Returns:
         The paths written, in the order given.
+
+    Raises:
+        FileError: the folder or a file cannot be written.
+    """
+    results = {name: content for name, content in files.items() if not callable(content)}
+    pages = {name: content for name, content in files.items() if callable(content)}
+    for name in files:
+        _slot(folder, name, "")
+    if results or not pages:
+        _write(folder, results)
+    if pages:
+        _write(folder, {name: _page(name, draw) for name, draw in pages.items()})
+    return tuple(folder / name for name in files)
+
+
+def _page(name: str, draw: Callable[[], str]) -> str:
+    try:
+        return draw()
+    except Exception as error:
+        return f'<!DOCTYPE html>\n<meta charset="utf-8">\n<title>{name}</title>\n{not_drawn("this page", error)}\n'
+
+
+def not_drawn(what: str, error: Exception) -> str:
+    """A paragraph in place of what could not be drawn, with a warning `NotDrawn`."""
+    said = xml_text(f"{type(error).__name__}: {error}".replace("<", "").replace("&", ""))
+    if os.environ.get("EXPDESIGN_DEBUG"):
+        traceback.print_exception(error)
+    sentence = f"{what} could not be drawn ({said}): a defect in expdesign"
+    warnings.warn(NotDrawn(sentence), stacklevel=2)
+    return f'<p class="not-drawn">{sentence[0].upper()}{sentence[1:]}. All other results are written.</p>'
+
+
+def gaps(paths: Sequence[Path]) -> tuple[str, ...]:
+    """What could not be drawn in pages among these files, a sentence each."""
+    pages = [path for path in paths if path.suffix == ".html"]
+    return tuple(f"{path}: {found}" for path in pages for found in NOT_DRAWN.findall(path.read_text(encoding="utf-8")))
+
+
+def _write(folder: Path, files: Mapping[str, str | bytes]) -> None:
+    """Write all files, or none.
 
     Raises:
         FileError: the folder or a file cannot be written.
@@ -81,7 +129,6 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> tuple[Path, .
             _put_in_place(slots)
         except OSError as error:
             raise FileError(folder, "", f"cannot be written: {error.strerror or error}") from None
-    return tuple(slot.target for slot in slots)
 
 
 def _clear_remains(folder: Path) -> None:

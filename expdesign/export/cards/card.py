@@ -22,7 +22,7 @@ from expdesign.export.cards.orders import (
     orders_notes,
     run_orders,
 )
-from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, svg
+from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, page_figure, svg
 from expdesign.export.report.content import ReportContent, Run, relative_information
 from expdesign.export.report.figures.chart import draw_sea, place_labels
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 WIDTH_IN, HEIGHT_IN = 3.6, 3.6
 
 
+@page_figure
 def run_chart(content: ReportContent, legs: Sequence[Leg], *, numbers: Sequence[int]) -> str:
     """Runs that share a sheet, as SVG; where there are several, each has its number."""
     plan, pose = content.plan, content.plan.trajectory.pose

@@ -11,7 +11,7 @@ from expdesign.diagnosis import Diagnosis
 from expdesign.diagnosis.accuracy import Dependence, dependence
 from expdesign.export.diagnosis_page.suspects import DEGREES, has_sign, is_force, suspected, suspected_force
 from expdesign.export.estimate_page.figures import AXES, thinned
-from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, short, svg
+from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import column_name
@@ -33,6 +33,7 @@ VARIABLES = {
 }  # fmt: skip
 
 
+@page_figure
 def window_figure(found: Diagnosis, index: int) -> str:
     """One stretch of data: measured, simulated by the model in use, simulated by the extended one."""
     outputs = found.before.outputs
@@ -62,6 +63,7 @@ def window_figure(found: Diagnosis, index: int) -> str:
     return svg(figure, key=f"window{index}", label="Measured and simulated velocities over time")
 
 
+@page_figure
 def growth_figure(found: Diagnosis) -> str:
     """Error of the simulation against the time since it started from a measured state."""
     outputs = found.before.outputs
@@ -87,6 +89,7 @@ def growth_figure(found: Diagnosis) -> str:
     return svg(figure, key="growth", label="Root mean square error of the simulation against its horizon")
 
 
+@page_figure
 def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
     """The error without a finding, or the missing acceleration, against the variable that it should depend on."""
     outputs, item = found.before.outputs, found.findings[index]
@@ -151,6 +154,7 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     ]
 
 
+@page_figure
 def _residual_figure(
     name: str, outputs: tuple[str, ...], items: list[Dependence], limits: list[float], clear: float
 ) -> str:

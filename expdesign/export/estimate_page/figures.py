@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.assessment import Assessed, RunCheck
 from expdesign.conventions import OUTPUTS
-from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, page_figure, plain, svg
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
@@ -23,6 +23,7 @@ AXES = {
 """Output -> label of its axis and factor to the unit shown."""
 
 
+@page_figure
 def run_figure(index: int, methods: tuple[Assessed, ...]) -> str:
     """One run: every output measured (thick, grey) and simulated by each method."""
     checks = [item.runs[index] for item in methods]
@@ -70,6 +71,7 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
     return time[kept], values[kept]
 
 
+@page_figure
 def residual_figure(item: Assessed, runs: tuple[str, ...], sample_time_s: float) -> str:
     """One-step residuals of all runs, one after the other."""
     found = item.one_step
@@ -88,6 +90,7 @@ def residual_figure(item: Assessed, runs: tuple[str, ...], sample_time_s: float)
     return svg(figure, key="residuals", label=f"One-step residuals over the time of {len(runs)} runs")
 
 
+@page_figure
 def autocorrelation_figure(item: Assessed, sample_time_s: float) -> str:
     """Autocorrelation of the residuals of every output, with the band that white ones would keep to."""
     found = item.one_step
@@ -105,6 +108,7 @@ def autocorrelation_figure(item: Assessed, sample_time_s: float) -> str:
     return svg(figure, key="autocorrelation", label="Autocorrelation of the one-step residuals")
 
 
+@page_figure
 def interval_figure(methods: tuple[Assessed, ...], best: Assessed) -> str:
     """Every estimate with its 95 % interval, relative to the value in the vessel file."""
     names = best.estimate.names

@@ -15,10 +15,21 @@ from expdesign.export.foresight_page.content import (
     runs_text,
 )
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, plain, report_style, svg
+from expdesign.export.pages.figures import (
+    BLUE,
+    GREY,
+    VERMILION,
+    light_grid,
+    new_figure,
+    page_figure,
+    plain,
+    report_style,
+    svg,
+)
 from expdesign.foresight import Foreseen, Foresight
 
 
+@page_figure
 def power_figure(found: Foresight) -> str:
     """Probability that the test accepts each cause, that held-out runs show it too, and that it is named first."""
     items = [item for item in found.weakest if item.sized]

@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.export.files import finite
 from expdesign.export.monitor_page.content import HOUR, MonitorContent, hours
-from expdesign.export.pages.figures import LINES, light_grid, new_figure, plain, svg
+from expdesign.export.pages.figures import LINES, light_grid, new_figure, page_figure, plain, svg
 from expdesign.monitoring import KINDS
 from expdesign.values import Array
 
@@ -35,6 +35,7 @@ def delays_s(content: MonitorContent) -> Array:
         return np.asarray(np.where(rate > 0, np.ceil(2.0 * content.limit / rate) * c.stretch_s, np.inf))
 
 
+@page_figure
 def budget_figure(content: MonitorContent) -> str:
     """Bars of the shares, an axes for each equation that has terms."""
     share, stretches = shares(content), content.state.budget.stretches

@@ -16,6 +16,7 @@ from expdesign.export.pages.figures import (
     VERMILION,
     light_grid,
     new_figure,
+    page_figure,
     plain,
     report_style,
     svg,
@@ -25,6 +26,7 @@ SHOWN = 5
 """Largest number of estimates that are drawn."""
 
 
+@page_figure
 def statistic_figure(content: MonitorContent) -> str:
     """The largest sum in every piece of the data, the threshold and the alarms."""
     figure = new_figure(6.8, 2.8)
@@ -42,6 +44,7 @@ def statistic_figure(content: MonitorContent) -> str:
     return svg(figure, key="statistic", label="Statistic of the watch over time, with its threshold")
 
 
+@page_figure
 def estimate_figure(content: MonitorContent) -> str:
     """The changes that are known best at the end, or that alarms name, over time with 95 % intervals."""
     figure = new_figure(6.8, 3.2)

@@ -10,11 +10,13 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from markupsafe import Markup, escape
 
+from expdesign.export.folder import not_drawn
 from expdesign.export.formats.format import xml_text
 from expdesign.export.tuning import TUNING
 from expdesign.memory import in_order
@@ -34,6 +36,7 @@ LAND, WATER, FORBIDDEN = "#e9d8a6", "#e6f2fa", "#d4d4d4"
 
 LONGEST_NAME = 32
 Drawn = TypeVar("Drawn")
+Given = ParamSpec("Given")
 
 SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -69,6 +72,19 @@ def drawn(figures: Sequence[Callable[[], Drawn]]) -> list[Drawn]:
 def _in_style(figure: Callable[[], Drawn]) -> Drawn:
     with report_style():
         return figure()
+
+
+def page_figure(draw: Callable[Given, Drawn]) -> Callable[Given, Drawn | Markup]:
+    """A function that draws a figure of a page. Where it fails, the page says so in its place; see `NotDrawn`."""
+
+    @wraps(draw)
+    def drawn_or_said(*args: Given.args, **options: Given.kwargs) -> Drawn | Markup:
+        try:
+            return draw(*args, **options)
+        except Exception as error:
+            return Markup(not_drawn(f"the figure {draw.__name__.strip('_')}", error))
+
+    return drawn_or_said
 
 
 def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:

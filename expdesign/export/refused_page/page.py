@@ -10,7 +10,17 @@ from markupsafe import Markup
 
 from expdesign.errors import NoPlan
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import BLACK, GREEN, GREY, PURPLE, VERMILION, new_figure, report_style, svg
+from expdesign.export.pages.figures import (
+    BLACK,
+    GREEN,
+    GREY,
+    PURPLE,
+    VERMILION,
+    new_figure,
+    page_figure,
+    report_style,
+    svg,
+)
 from expdesign.export.report.figures.chart import draw_sea
 from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
 from expdesign.export.tuning import TUNING
@@ -103,6 +113,7 @@ def refused_html(refusal: Refusal) -> str:
     )
 
 
+@page_figure
 def _chart(refusal: Refusal) -> Markup:
     """Start, goal, the track as far as it was planned, and the obstacle."""
     west, south, east, north = box = _view(refusal)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, svg
+from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, svg
 from expdesign.export.step_trial_page.content import StepTrialContent, Validated, command_units
 from expdesign.step_trials import StepSample, Surface
 from expdesign.values import Array
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 MOST_POINTS = 3000
 
 
+@page_figure
 def coverage_figure(content: StepTrialContent) -> str:
     """Steady states and middles of transients in the plane of speed and yaw rate."""
     figure = new_figure(6.8, 3.4)
@@ -34,6 +35,7 @@ def coverage_figure(content: StepTrialContent) -> str:
     return svg(figure, key="coverage", label="Steady states and steps in the plane of speed and yaw rate")
 
 
+@page_figure
 def surface_figure(content: StepTrialContent) -> str:
     """Both dampings and both inertias: measured, and by the model at the same places."""
     figure = new_figure(6.8, 5.4)
@@ -81,6 +83,7 @@ def _inertia(axes: Axes, samples: list[StepSample], surface: Surface, title: str
     light_grid(axes)
 
 
+@page_figure
 def simulation_figure(part: Validated, key: str) -> str:
     """U and r, measured and simulated from the commands alone."""
     figure = new_figure(6.8, 3.6)

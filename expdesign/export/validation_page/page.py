@@ -14,6 +14,7 @@ from expdesign.export.pages.figures import (
     VERMILION,
     light_grid,
     new_figure,
+    page_figure,
     plain,
     report_style,
     round_ticks,
@@ -23,6 +24,7 @@ from expdesign.export.validation_page.content import ERROR_LIMIT, ValidationCont
 from expdesign.rehearsal import Validated
 
 
+@page_figure
 def error_figure(results: tuple[Validated, ...]) -> str:
     """Share of trials below each normalised error, one line per design."""
     figure = new_figure(6.4, 3.4)
@@ -44,6 +46,7 @@ def error_figure(results: tuple[Validated, ...]) -> str:
     return svg(figure, key="errors", label="Share of simulated trials below each normalised error, by design")
 
 
+@page_figure
 def spread_figure(result: Validated) -> str:
     """Observed over predicted standard deviation of each parameter, with its sampling error."""
     names = [plain(name) for name in result.parameters]

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from expdesign.export.pages.figures import LINES, REPOSITION, VERMILION, light_grid, new_figure, plain, round_ticks, svg
+from expdesign.export.pages.figures import (
+    LINES,
+    REPOSITION,
+    VERMILION,
+    light_grid,
+    new_figure,
+    page_figure,
+    plain,
+    round_ticks,
+    svg,
+)
 from expdesign.export.whatif_page.content import DAY, WhatIfContent
 
 
+@page_figure
 def time_figure(content: WhatIfContent) -> str:
     """Informative time, with the repositioning where planned, and the time for the accuracy of the scenario."""
     cases = [case for case in content.cases if not case.problem]
@@ -30,6 +41,7 @@ def time_figure(content: WhatIfContent) -> str:
     return svg(figure, key="times", label="Time of each variant, and time for the accuracy of the scenario")
 
 
+@page_figure
 def day_figure(content: WhatIfContent) -> str | None:
     """Length of the day against the information of its whole track, a point a case; None where no day is known."""
     known = [(case, against.track) for case in content.cases if (against := content.against(case)) and against.track]
@@ -50,6 +62,7 @@ def day_figure(content: WhatIfContent) -> str | None:
     return svg(figure, key="days", label="Length of the day against the information of its whole track, for each case")
 
 
+@page_figure
 def ratio_figure(content: WhatIfContent) -> str | None:
     """Standard deviations over those of the scenario, for each parameter; None when nothing can be compared."""
     compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
@@ -72,6 +85,7 @@ def ratio_figure(content: WhatIfContent) -> str | None:
     return svg(figure, key="ratios", label="Expected standard deviation of each parameter over that of the scenario")
 
 
+@page_figure
 def runs_figure(content: WhatIfContent) -> str:
     """Whole runs of each primitive in every case."""
     cases = [case for case in content.cases if not case.problem]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.regression import model_for
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.export.diagnosis_page import (
     RollVerdict,
     diagnosis_html,
@@ -84,10 +85,10 @@ def diagnose(
         {"--vessel": vessel, "--scenario": scenario, "--velocity": velocity, "--seed": seed},
         usual={"--velocity": "auto"},
     )
-    files = {
+    files: dict[str, Content] = {
         "diagnosis.json": diagnosis_json(found, roll),
-        "diagnosis.html": diagnosis_html(
-            found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
+        "diagnosis.html": partial(
+            diagnosis_html, found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
         ),
         "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
     }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess, settled
 from expdesign.errors import InputError
 from expdesign.export import (
+    Content,
     disturbance_table,
     estimate_json,
     estimate_warnings,
@@ -85,10 +87,11 @@ def estimate(
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
     command = _command(data, vessel, tests, velocity, options)
-    files = {
+    files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
-        "estimate.html": estimate_html(
+        "estimate.html": partial(
+            estimate_html,
             EstimateContent(vessel=ship, found=found, command=command, version=__version__),
             progress=within(progress, 0.7, 0.98),
         ),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import InputError
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.export.indices_form import (
     Held,
     IndicesContent,
@@ -79,7 +80,7 @@ def indices(
         version=__version__,
         held=held,
     )
-    files = {"indices.json": indices_json(content), "indices.html": indices_html(content)}
+    files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))

@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.export.monitor_page import (
     Moment,
     MonitorContent,
@@ -282,10 +283,10 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
     )
 
 
-def _files(content: MonitorContent, now: Watch) -> dict[str, str | bytes]:
+def _files(content: MonitorContent, now: Watch) -> dict[str, Content]:
     assert isinstance(now.phase, Watching)
-    files: dict[str, str | bytes] = {
-        "monitor.html": monitor_html(content),
+    files: dict[str, Content] = {
+        "monitor.html": partial(monitor_html, content),
         "monitor.json": monitor_json(content, budget_entries(content)),
         STATE: _state(now),
     }

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan, UnknownName
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.export.load_page import (
     CASE_HEADER,
     PRECISION_HEADER,
@@ -37,7 +38,7 @@ from expdesign.workflows.steps.scored import scored
 from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
 from expdesign.workflows.steps.workers import load_planner, workers
 
-Files = dict[str, str | bytes]
+Files = dict[str, Content]
 MOST_MINUTES = 30.0
 """Default of `--minutes`."""
 
@@ -113,7 +114,7 @@ def roll_plan(
         placed = _placed(case, information, content, seed, placing) if place else ()
     names = {_runs_name(number): repeats_json(content, number) for number in range(len(plan.repeats))}
     files = {
-        "roll-plan.json": load_plan_json(content), "roll-plan.html": load_plan_html(content),
+        "roll-plan.json": load_plan_json(content), "roll-plan.html": partial(load_plan_html, content),
         "loads.toml": loads_toml(content), **names,
     }  # fmt: skip
     paths = write_files(folder, files)

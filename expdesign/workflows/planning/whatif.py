@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import InputError, NoAnswer
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
@@ -93,7 +94,7 @@ def whatif(
     )
     if all(case.problem for case in content.cases):
         raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
-    files = {"whatif.json": whatif_json(content), "whatif.html": whatif_html(content)}
+    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(whatif_html, content)}
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import FileError, NoPlan
-from expdesign.export import write_files
+from expdesign.export import Content, write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
@@ -28,7 +29,7 @@ def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) ->
 def written(
     case: Scenario,
     out: Path | None,
-    files: Mapping[str, str | bytes],
+    files: Mapping[str, Content],
     summary: Mapping[str, object],
     progress: Progress,
     tables: tuple[TextTable, ...] = (),
@@ -71,7 +72,7 @@ def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]
         raise
 
 
-def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, str | bytes]:
+def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, Content]:
     from expdesign.export.refused_page import Refusal, refused_html, refused_json
 
     there = sorted(path.name for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
@@ -87,4 +88,4 @@ def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[st
         command=command,
         version=__version__,
     )
-    return {"refused.json": refused_json(refusal), "refused.html": refused_html(refusal)}
+    return {"refused.json": refused_json(refusal), "refused.html": partial(refused_html, refusal)}

@@ -8,6 +8,7 @@ from expdesign import __version__
 from expdesign.durations import DurationDesign
 from expdesign.export import (
     STANDARD,
+    Content,
     Route,
     build_bridge_route,
     durations_json,
@@ -28,20 +29,31 @@ from expdesign.workflows.steps.scored import score_files
 
 def trial_files(
     case: Scenario, growth: Growth | None, content: ReportContent, route: Route, *, progress: Progress = silent
-) -> dict[str, str | bytes]:
+) -> dict[str, Content]:
     """Every file of a planned trial, by name."""
     content = replace(content, growth=growth)
-    files = {
+    files: dict[str, Content] = {
         **score_files(case, content.information),
         **growth_files(case, growth),
         "durations.json": durations_json(content.design, compared=content.compared),
         **plan_files(case, content.plan),
         **route_files(route, STANDARD),
     }
-    progress("drawing the report", 0.02)
-    files["report.html"] = report_html(content)
-    progress("drawing the run cards", 0.7)
-    return {**files, "cards.html": cards_html(content)}
+    return {**files, **trial_pages(content, progress)}
+
+
+def trial_pages(content: ReportContent, progress: Progress) -> dict[str, Content]:
+    """The pages of a planned trial, drawn when they are written."""
+
+    def report() -> str:
+        progress("drawing the report", 0.02)
+        return report_html(content)
+
+    def cards() -> str:
+        progress("drawing the run cards", 0.7)
+        return cards_html(content)
+
+    return {"report.html": report, "cards.html": cards}
 
 
 def built_route(case: Scenario, plan: Plan) -> Route:

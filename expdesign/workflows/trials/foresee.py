@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
@@ -91,7 +92,7 @@ def foresee(
         version=__version__,
     )
     progress("writing the page", 0.95)
-    files = {"foresee.json": foresight_json(content), "foresee.html": foresight_html(content)}
+    files = {"foresee.json": foresight_json(content), "foresee.html": partial(foresight_html, content)}
     return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
 
 
@@ -111,7 +112,7 @@ def _operation(
         command=command_text("foresee", [scenario], {"--operation": voyages, "--seed": seed}),
         version=__version__,
     )
-    files = {"operation.json": operation_json(content), "operation.html": operation_html(content)}
+    files = {"operation.json": operation_json(content), "operation.html": partial(operation_html, content)}
     summary = {"voyages_without_change": found.nominal, "false_alarms": found.false_alarms}
     sentences = tuple((text,) for text in operation_sentences(found))
     tables = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
@@ -109,7 +110,7 @@ def roll(
         scale=scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
-    files = {"roll.json": roll_json(content), "roll.html": roll_html(content)}
+    files = {"roll.json": roll_json(content), "roll.html": partial(roll_html, content)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)

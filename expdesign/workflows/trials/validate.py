@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import joblib
@@ -98,7 +99,7 @@ def validate_design(
         version=__version__,
     )
     files = write_files(
-        folder, {"validation.json": validation_json(content), "validation.html": validation_html(content)}
+        folder, {"validation.json": validation_json(content), "validation.html": partial(validation_html, content)}
     )
     forget()
     progress("done", 1.0)

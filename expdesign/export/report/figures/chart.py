@@ -24,6 +24,7 @@ from expdesign.export.pages.figures import (
     REPOSITION,
     WATER,
     new_figure,
+    page_figure,
     svg,
 )
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -115,6 +116,7 @@ SHALLOW, DEEP, SAFETY = "#a9cfe8", "#ffffff", "#3f4a55"
 Box = tuple[float, float, float, float]
 
 
+@page_figure
 def chart(content: ReportContent) -> str:
     """The whole trial on the chart, as SVG."""
     plan = content.plan

@@ -15,6 +15,7 @@ from expdesign.export.pages.figures import (
     VERMILION,
     light_grid,
     new_figure,
+    page_figure,
     round_ticks,
     short,
     svg,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@page_figure
 def durations_figure(content: ReportContent) -> str:
     """Left: time of each primitive, optimal and in whole runs. Right: its sensitivity against the bound."""
     design = content.design
@@ -76,6 +78,7 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     light_grid(axes, "x")
 
 
+@page_figure
 def information_figure(content: ReportContent) -> str:
     """Heat map: for each parameter, information per minute of each primitive relative to the best one."""
     share = relative_information(content).T
@@ -101,6 +104,7 @@ def information_figure(content: ReportContent) -> str:
     return svg(figure, key="information", label=label)
 
 
+@page_figure
 def pareto_figure(day: ShortestDay) -> str:
     """Every day planned as a point, the estimated shortest days as a line, and the bound."""
     figure = new_figure(6.4, 3.6)
@@ -131,6 +135,7 @@ def pareto_figure(day: ShortestDay) -> str:
     return svg(figure, key="pareto", label="Length of the day against the information of its whole track")
 
 
+@page_figure
 def uncertainty_figure(content: ReportContent, found: Expected) -> str:
     """One row for each parameter, logarithmic: prior, after the runs, after the whole track."""
     names = [short(name) for name in content.parameters]

@@ -9,7 +9,7 @@ import numpy as np
 from expdesign.conventions import to_n_frame
 from expdesign.dictionary.desired import desired_motion
 from expdesign.dictionary.primitive import Primitive
-from expdesign.export.pages.figures import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, svg
+from expdesign.export.pages.figures import BLACK, BLUE, GREEN, GREY, PRIMITIVE, light_grid, new_figure, page_figure, svg
 from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
@@ -26,6 +26,7 @@ PATH_BOX = (0.125, 0.15, 0.335, 0.82)
 CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0.15))
 
 
+@page_figure
 def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str:
     """Path with hull outlines on the left; u, v and r over time on the right, dashed the desired velocities."""
     figure = new_figure(*SIZE_IN, arranged=False)  # fixed places: many small figures are drawn much sooner

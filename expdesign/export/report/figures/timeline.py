@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from expdesign.conventions import KNOTS_PER_MPS
-from expdesign.export.pages.figures import LINES, PRIMITIVE, light_grid, new_figure, plain, short, svg
+from expdesign.export.pages.figures import LINES, PRIMITIVE, light_grid, new_figure, page_figure, plain, short, svg
 from expdesign.export.report.content import primitive_runs
 from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
@@ -39,6 +39,7 @@ GROUPS = {
 """Stem of an actuator signal -> title of its panel, and the factor to the unit shown."""
 
 
+@page_figure
 def timeline_figure(plan: Plan) -> str:
     """Speed, yaw rate and every actuator command over the time of the trial."""
     panels = (*_motion_panels(plan), *_command_panels(plan))

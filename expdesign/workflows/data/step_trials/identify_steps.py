@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import InputError
-from expdesign.export import vessel_toml, write_files
+from expdesign.export import Content, vessel_toml, write_files
 from expdesign.export.step_trial_page import (
     REPEAT_HEADER,
     StepTrialContent,
@@ -99,7 +100,10 @@ def identify_steps(
         version=__version__,
     )
     progress("drawing the page", 0.9)
-    files = {"step-model.json": step_model_json(content), "step-trial.html": step_trial_html(content)}
+    files: dict[str, Content] = {
+        "step-model.json": step_model_json(content),
+        "step-trial.html": partial(step_trial_html, content),
+    }
     if content.nominal is not None:
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
     written = write_files(out or Path("runs") / data[0].stem, files)
