@@ -322,16 +322,14 @@ def _resumed(path: Path, asked: Asked) -> Watch:
         table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         if table["version"] != __version__:
             raise ValueError("of another version")
-        now, begun = restored_watch(table), dict(table["options"])
+        now, begun = restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
     except FileNotFoundError:
         raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
     except (KeyError, TypeError, ValueError, AttributeError):
         raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
     for name, value in _kept(asked).items():
-        if begun.get(name) != value:
-            raise InputError(
-                f"{name} is {value:g}, but the watch was begun with {begun.get(name):g}; expected the same"
-            )
+        if begun[name] != value:
+            raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")
     return now
 
 
