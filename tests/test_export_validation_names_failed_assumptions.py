@@ -1,11 +1,13 @@
 """Where simulated trials differ from predictions, the page says which assumption does not hold."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from design_case import example_dictionary, vessel
+from expdesign.estimation.methods import METHODS
 from expdesign.export.validation_page import ValidationContent, judgements
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
@@ -77,6 +79,11 @@ def test_where_predictions_hold_no_assumption_is_blamed():
         ({"environment": CURRENT}, "no current and wind. Method iv removes only a constant"),
         ({"environment": WIND}, "--method iv-air, iv-wind or iv-augmented accounts for weather"),
         ({"environment": CURRENT, "method": "iv-air"}, "no current. Method iv-air accounts for measured wind only"),
+        ({"environment": WIND, "method": "iv-current"}, "iv-air-current also for measured wind"),
+        (
+            {"environment": CURRENT, "method": "oe"},
+            "--method oe-air accounts for weather, oe-current for a steady current",
+        ),
         ({"method": "iv-wind"}, "the current known. Method iv-wind estimates additional parameters"),
         ({"method": "iv-augmented"}, "current and wind known. Method iv-augmented estimates additional parameters"),
         ({"method": "ls"}, "the regressors have no noise"),
@@ -92,6 +99,16 @@ def test_each_assumption_that_fails_is_named(changes: dict[str, object], words: 
     said = told(rehearsal(**changes), spread=1.5)
     assert "predicted and observed standard deviations differ for X_u" in said
     assert words in said
+
+
+@pytest.mark.parametrize("method", [method.name for method in METHODS])
+@pytest.mark.parametrize("environment", [CURRENT, WIND, Environment(current_std_mps=0.1, wind_std_mps=1.0)])
+def test_methods_that_are_advised_are_methods(method: str, environment: Environment):
+    said = told(rehearsal(environment=environment, method=method), spread=1.5)
+    advised = re.findall(r"\b(?:ls|iv|oe)(?:-[a-z]+)*\b", said)
+    assert set(advised) <= {item.name for item in METHODS}
+    assert "; --method  " not in said
+    assert ";  also" not in said
 
 
 def test_moduli_are_named_with_their_primitives():

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.estimation.methods import method_named
+from expdesign.estimation.methods import METHODS, method_named
 from expdesign.export.files import finite, strict_json
 from expdesign.export.tuning import TUNING
 from expdesign.rehearsal import Rehearsal, Validated
@@ -151,12 +151,17 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     wind = weather.wind_to.any() or weather.wind_std_mps > 0
     solver, _, allows = method.partition("-")
     if (current or wind) and not allows:
+        steady = f", {solver}-current for a steady current" if current and _there(solver, "current") else ""
         yield (
-            f"no current and wind. Method {method} removes only a constant; --method {solver}-air, {solver}-wind or "
-            f"{solver}-augmented accounts for weather" + (", iv-current for a steady current." if current else ".")
+            f"no current and wind. Method {method} removes only a constant; "
+            f"--method {_there(solver, 'air', 'wind', 'augmented')} accounts for weather{steady}."
         )
     if current and allows == "air":
-        yield f"no current. Method {method} accounts for measured wind only; {solver}-wind also for current."
+        also = _there(solver, "wind", "air-current")
+        yield f"no current. Method {method} accounts for measured wind only; {also} also for current."
+    if wind and allows == "current":
+        also = _there(solver, "air-current")
+        yield f"no wind. Method {method} accounts for a steady current only; {also} also for measured wind."
     if (current and allows == "no-current") or (wind and allows == "no-wind"):
         yield f"{allows.replace('-', ' ')}. Method {method} leaves it out; {solver}-augmented accounts for both."
     known = {"wind": "the current", "no-wind": "the current", "no-current": "the wind", "augmented": "current and wind"}
@@ -171,6 +176,13 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     drawn = weather.current_std_mps > 0 and not method_named(method).estimates_steady_current
     if drawn or weather.wind_std_mps > 0:
         yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
+
+
+def _there(solver: str, *allows: str) -> str:
+    """The methods of a solver that there are among those that account for some weather: "a, b or c"; "" for none."""
+    known = {method.name for method in METHODS}
+    *first, last = [name for name in (f"{solver}-{item}" for item in allows) if name in known] or [""]
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def validation_json(content: ValidationContent) -> str:

@@ -12,6 +12,7 @@ from expdesign.export.foresight_page import (
     OPERATION_HEADER,
     ForesightContent,
     OperationContent,
+    conclusions,
     foresight_html,
     foresight_json,
     foresight_rows,
@@ -151,6 +152,7 @@ def foresight_summary(content: ForesightContent) -> dict[str, object]:
         "causes_tested": len(found.weakest),
         "causes_missed": list(found.missed),
         "causes_not_seen": [cause for cause, _ in found.unseen],
+        "remarks": list(conclusions(found)),
         "not_told_apart": [f"{item.cause} ({item.name}) from {other.cause}" for item, other in found.not_told_apart],
     }
 
