@@ -19,7 +19,11 @@ MINUS, NB = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
 def duration(seconds: float) -> str:
-    """45 s, 3 min 20 s, 15 min, 1 h 05 min, 2 h."""
+    """45 s, 3 min 20 s, 15 min, 1 h 05 min, 2 h; with a minus sign below zero, "unknown" where it is no number."""
+    if not math.isfinite(seconds):
+        return "unknown"
+    if seconds < 0:
+        return f"{MINUS}{duration(-seconds)}"
     if seconds < 59.5:
         return f"{seconds:.3g}{NB}s"
     minutes, rest = divmod(round(seconds), 60)

@@ -242,13 +242,8 @@ def minutes_sentence(day: ShortestDay) -> str:
     return (
         f"Of the {words.duration(length.planned_s)} the way to the goal takes {words.duration(parts.way_s)} at transit "
         f"speed, runs {words.duration(parts.runs_s)} beyond their distance made good, and the legs between them "
-        f"{_signed(parts.legs_s)}{more if extra_s > 0 else ''}."
+        f"{words.duration(parts.legs_s)}{more if extra_s > 0 else ''}."
     )
-
-
-def _signed(seconds: float) -> str:
-    """A time that may be less than nothing."""
-    return words.duration(seconds) if seconds >= 0 else f"{words.MINUS}{words.duration(-seconds)}"
 
 
 def found_sentence(day: ShortestDay) -> str:
