@@ -19,8 +19,8 @@ from expdesign.workflows import Outcome
 from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.planned import plan_summary
 from export_case import plan
+from roll_files import KNOWN, UNKNOWN, stated, three
 from step_case import GUESS, STEPS, craft_columns, write_csv
-from test_workflows_roll_from_files import KNOWN, UNKNOWN, stated, three
 
 
 def steps_files(folder: Path) -> list[object]:
