@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +56,27 @@ def said_on_page(page: str) -> list[str]:
     return [" ".join(html.unescape(re.sub("<[^>]+>", "", text)).split()) for text in texts]
 
 
+def assert_agree(summary: Mapping[str, object], table: Mapping[str, object]) -> None:
+    """Numbers that a summary and a file name alike are alike."""
+    for key in summary.keys() & table.keys():
+        if isinstance(summary[key], float):
+            assert table[key] == pytest.approx(summary[key], rel=1e-9), key
+
+
 @pytest.mark.parametrize("asked", [steps_files, roll_files, load_plan, foreseen, validated])
 def test_what_a_page_says_first_is_on_the_terminal(
-    asked: Callable[[Path], list[object]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    asked: Callable[[Path], list[object]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    printed = list[Outcome]()
+
+    def both(outcome: Outcome) -> None:
+        printed.append(outcome)
+        print_summary(outcome)
+
+    monkeypatch.setattr("expdesign.cli.app.print_summary", both)
     words = [*map(str, asked(tmp_path)), "--out", str(tmp_path / "out")]
     assert main(words) == 0
     told = " ".join(capsys.readouterr().out.split())
@@ -67,6 +84,8 @@ def test_what_a_page_says_first_is_on_the_terminal(
     sentences = said_on_page(page.read_text())
     assert sentences
     assert [text for text in sentences if text not in told] == []
+    for path in (path for path in printed[0].files if path.suffix == ".json"):
+        assert_agree(printed[0].summary, json.loads(path.read_text()))
 
 
 def test_water_without_depths_is_said_with_the_plan() -> None:

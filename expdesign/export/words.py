@@ -102,6 +102,15 @@ def bearing(radians: float) -> str:
     return f"{round(math.degrees(radians)) % 360:03d}\N{DEGREE SIGN}"
 
 
+def place(pose: Array) -> str:
+    """A position north and east [m], counted from the centre of the area."""
+    north, east = pose[:2].tolist()
+    return (
+        f"{number(abs(north), 1)} m {'north' if north >= 0 else 'south'} and {number(abs(east), 1)} m "
+        f"{'east' if east >= 0 else 'west'} of the area's centre"
+    )
+
+
 def compass(radians: float) -> str:
     """The nearest of the eight compass points."""
     return COMPASS[round(math.degrees(radians) / 45) % 8]

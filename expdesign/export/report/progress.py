@@ -106,8 +106,10 @@ def _gain(known: Known) -> str:
     grown = known.after > known.so_far * (1.0 + TUNING.noticed)
     larger = [name for name, is_so in zip(known.parameters, grown, strict=True) if is_so]
     worse = f" Larger {'is that' if len(larger) == 1 else 'are those'} of {', '.join(larger)}." if larger else ""
-    smaller = ratio >= 1
+    factor = max(ratio, 1 / ratio)
+    size = f"{words.significant(factor, 3)} times {'smaller' if ratio > 1 else 'larger'} than"
+    change = "as large as" if factor < 1.0 + TUNING.noticed else size
     return (
-        f"After the rest, the expected standard deviations are {words.significant(ratio if smaller else 1 / ratio, 2)} "
-        f"times {'smaller' if smaller else 'larger'} than from the data so far (geometric mean).{worse * smaller}{more}"
+        f"After the rest, the expected standard deviations are {change} from the data so far (geometric mean)."
+        f"{worse * (ratio > 1)}{more}"
     )

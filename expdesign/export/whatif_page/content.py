@@ -165,8 +165,12 @@ def _accuracy(first: Case, case: Case, against: Against) -> str:
         return f"In {minutes:.1f} min its runs collect the information {theirs}."
     return (
         f"In {minutes:.1f} min its runs collect {_ratio(against.accuracy)} times the information {theirs}. "
-        f"The same accuracy takes {against.same_accuracy_s / 60:.1f} min."
+        f"The same accuracy takes {_minutes(against.same_accuracy_s)} min."
     )
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds / 60:.1f}" if seconds >= SAME_S else significant(seconds / 60, 1)
 
 
 def _ratio(value: float) -> str:
