@@ -17,6 +17,8 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.values import Array
 
+UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
+"""Of an area without charted depths."""
 DENSE = 10.0
 """Corners per clearance length of shore above which the clearance is eroded in steps."""
 ARC_SEGMENTS = 16

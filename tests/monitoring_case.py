@@ -57,7 +57,8 @@ def grams_from(columns: np.ndarray) -> Grams:
     counts = np.zeros((4, count))
     counts[0] = samples
     return Grams(
-        time_s=STRETCH_S * np.arange(count), products=products, counts=counts, budget=np.ones((count, CHANGES, 3)),
+        time_s=STRETCH_S * np.arange(count), duration_s=np.full(count, STRETCH_S), products=products,
+        counts=counts, budget=np.ones((count, CHANGES, 3)),
         kind=np.arange(count) % len(KINDS), stretch_s=STRETCH_S,
     )  # fmt: skip
 

@@ -1,7 +1,9 @@
-"""`expdesign explain` has every key that is read and every name that can be chosen; errors use its words."""
+"""`expdesign explain` has every key that is read and every name that can be chosen; --help shows what is written."""
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 import re
 from collections.abc import Iterator
@@ -9,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from expdesign import cli
 from expdesign.cli import main
+from expdesign.cli.commands import app
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.dictionary import FAMILIES
 from expdesign.durations import CRITERIA
@@ -50,6 +54,52 @@ def test_every_key_that_a_model_reads_is_explained() -> None:
         for name, field in model.fields().items():
             assert field.description, f"{model.__name__}.{name}"
             assert (name, field.description) in explained, f"{model.__name__}.{name}"
+
+
+INTERNAL = re.compile(r"Pydantic|<[a-z]+[ .>]| at 0x|\bNone\b|\bnan\b|\binf\b|functools|lambda")
+"""What only the program calls so."""
+
+
+@pytest.mark.parametrize("topic", ["", *TOPICS])
+def test_nothing_is_explained_in_words_of_the_program(topic: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", *([topic] if topic else [])]) == 0
+    assert not INTERNAL.findall(capsys.readouterr().out)
+
+
+def test_every_key_of_a_file_is_required_optional_or_has_a_default() -> None:
+    for name in ("scenario", "vessel", "dictionary", "area", "loads"):
+        for section in explain(name).sections:
+            assert all(entry.default for entry in section.entries)
+
+
+def written_helps() -> Iterator[str]:
+    """Every text that is written as help in the source of the command line, constants in parts."""
+    for path in Path(inspect.getfile(cli)).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.keyword) and node.arg == "help":
+                parts = node.value.values if isinstance(node.value, ast.JoinedStr) else [node.value]
+                yield from (part.value for part in parts if isinstance(part, ast.Constant))
+
+
+def shown_help(command: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """The help of a command on a wide terminal, as words with one space between."""
+    assert main([*([command] if command else []), "--help"]) == 0
+    return " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
+
+
+def test_help_shows_every_text_as_it_is_written(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "1000")
+    names = [registered.name or "" for registered in app.registered_commands]
+    shown = {name: shown_help(name, capsys) for name in ("", *names)}
+    for registered in app.registered_commands:
+        assert registered.callback is not None
+        assert " ".join((registered.callback.__doc__ or "").split()) in shown[registered.name or ""]
+    texts = {" ".join(text.split()) for text in written_helps()}
+    assert sum("[" in text for text in texts) > 5
+    for text in texts:
+        assert any(text in page for page in shown.values()), text
 
 
 def test_no_explanation_is_empty_or_ends_in_a_full_stop() -> None:

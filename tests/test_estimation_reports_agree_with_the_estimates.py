@@ -1,17 +1,20 @@
 """Fit, excitation condition and many trials at once: closed forms and round trips."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
+from expdesign.assessment.limits import Limits
 from expdesign.errors import Diverged
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
 from expdesign.estimation.fit import fit_percent
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.estimation.settings import Settings
+from expdesign.export.files.estimates import limit_entries
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble
 
@@ -110,3 +113,15 @@ def test_noise_of_many_trials_has_the_stated_spread() -> None:
     ):
         np.testing.assert_allclose(noise.std(axis=(0, 1)), std, rtol=5 / np.sqrt(2 * count))
         assert (np.abs(noise.mean(axis=(0, 1))) < 5 * np.array(std) / np.sqrt(count)).all()
+
+
+@pytest.mark.parametrize(("growth", "told"), [(3.0, True), (1e12, False)])
+def test_shares_of_a_misfit_are_told_only_where_they_add_up(growth: float, told: bool) -> None:
+    shares = {name: np.full(3, 1e10 if growth > 1e6 else 0.3) for name in ("constant", "slow", "quick", "parameters")}
+    rest = {name: np.full(3, 0.5) for name in ("ceiling_percent", "ahead_rms", "ahead_share")}
+    limits = Limits(outputs=("u", "v", "r"), **shares, **rest, growth=growth, duration_s=700.0)
+    run = SimpleNamespace(batch=SimpleNamespace(name="a"), problem="", fit_percent=np.array([90.0, 80.0, 70.0]))
+    (entry,) = limit_entries(SimpleNamespace(limits=(limits,), best=SimpleNamespace(runs=(run,)))).values()  # type: ignore[arg-type]
+    assert (entry["slow"] is not None) == told
+    assert entry["ahead_share"] == {"u": 0.5, "v": 0.5, "r": 0.5}
+    assert ("unstable" in entry["sentence"]) == (not told)

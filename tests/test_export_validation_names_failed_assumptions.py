@@ -1,12 +1,16 @@
 """Where simulated trials differ from predictions, the page says which assumption does not hold."""
 
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from design_case import example_dictionary, vessel
+from expdesign.estimation.methods import METHODS
 from expdesign.export.validation_page import ValidationContent, judgements
+from expdesign.export.validation_page.content import biased, off_theory, surely_biased
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Sensors, Vessel
@@ -77,6 +81,11 @@ def test_where_predictions_hold_no_assumption_is_blamed():
         ({"environment": CURRENT}, "no current and wind. Method iv removes only a constant"),
         ({"environment": WIND}, "--method iv-air, iv-wind or iv-augmented accounts for weather"),
         ({"environment": CURRENT, "method": "iv-air"}, "no current. Method iv-air accounts for measured wind only"),
+        ({"environment": WIND, "method": "iv-current"}, "iv-air-current also for measured wind"),
+        (
+            {"environment": CURRENT, "method": "oe"},
+            "--method oe-air accounts for weather, oe-current for a steady current",
+        ),
         ({"method": "iv-wind"}, "the current known. Method iv-wind estimates additional parameters"),
         ({"method": "iv-augmented"}, "current and wind known. Method iv-augmented estimates additional parameters"),
         ({"method": "ls"}, "the regressors have no noise"),
@@ -92,6 +101,16 @@ def test_each_assumption_that_fails_is_named(changes: dict[str, object], words: 
     said = told(rehearsal(**changes), spread=1.5)
     assert "predicted and observed standard deviations differ for X_u" in said
     assert words in said
+
+
+@pytest.mark.parametrize("method", [method.name for method in METHODS])
+@pytest.mark.parametrize("environment", [CURRENT, WIND, Environment(current_std_mps=0.1, wind_std_mps=1.0)])
+def test_methods_that_are_advised_are_methods(method: str, environment: Environment):
+    said = told(rehearsal(environment=environment, method=method), spread=1.5)
+    advised = re.findall(r"\b(?:ls|iv|oe)(?:-[a-z]+)*\b", said)
+    assert set(advised) <= {item.name for item in METHODS}
+    assert "; --method  " not in said
+    assert ";  also" not in said
 
 
 def test_moduli_are_named_with_their_primitives():
@@ -126,3 +145,27 @@ def test_wind_that_the_method_does_not_know_is_found_and_named():
     said = " ".join(judgements(content))
     assert "the bias exceeds half a standard deviation" in said
     assert "no current and wind. Method iv removes only a constant" in said
+
+
+def drawn(trials: int, seed: int, *, bias: float = 0.0, spread: float = 1.0) -> Validated:
+    """Estimates of ten parameters around the truth, in units of their predicted standard deviations."""
+    estimates = bias + spread * np.random.default_rng(seed).standard_normal((trials, 10))
+    return Validated(
+        design="optimised", parameters=tuple(f"p{number}" for number in range(10)), truth=np.zeros(10),
+        estimates=estimates, stated=np.ones((trials, 10)), forecast=np.ones(10), theory=np.ones(10), failed=0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("trials", [2, 3, 5, 10, 100])
+def test_few_trials_of_a_right_prediction_are_seldom_called_off_or_biased(trials: int):
+    seeds, allowed = 1000, 0.02  # 1 % each of wrong standard deviations and of biases
+    found = map(partial(drawn, trials), range(seeds))
+    called = [bool(surely_biased(item) or off_theory(item) or biased(item)) for item in found]
+    assert np.mean(called) < allowed + 3.0 * np.sqrt(allowed * (1.0 - allowed) / seeds)
+
+
+def test_a_wrong_prediction_is_noticed_by_enough_trials():
+    assert len(off_theory(drawn(400, 1, spread=1.5))) == 10
+    assert len(off_theory(drawn(400, 1, spread=0.6))) == 10
+    assert len(biased(drawn(400, 1, bias=1.0))) == 10
+    assert len(surely_biased(drawn(400, 1, bias=0.5))) == 10

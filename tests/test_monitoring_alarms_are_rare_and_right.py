@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from expdesign.export.monitor_page import Moment, MonitorContent, sentences
 from expdesign.monitoring import (
     TUNING,
     Alarm,
     Calibration,
+    Change,
     Grams,
     Rules,
     State,
@@ -168,7 +171,7 @@ def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration)
     columns[40:70, :, -1] += 8.0 * np.random.default_rng(0).standard_normal((30, 20))
     limit = threshold(CHANGES, 1e5)
     state, alarms, _ = watched(calibration, grams_from(columns), limit)
-    assert state.left_out == 30
+    assert state.left_out_s == 30 * STRETCH_S
     assert not alarms
 
 
@@ -176,7 +179,7 @@ def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibratio
     limit = threshold(CHANGES, 1e4)
     for quick, unlike in ((0.3, False), (3.0, True)):
         ends = [watched(calibration, drawn_grams(300, seed=80 + seed, quick=quick), limit) for seed in range(6)]
-        left, judged_count = (sum(getattr(state, name) for state, *_ in ends) for name in ("left_out", "judged"))
+        left, judged_count = (sum(getattr(state, name) for state, *_ in ends) for name in ("left_out_s", "judged_s"))
         assert (left > 9 * judged_count) if unlike else (judged_count > 9 * left)
         assert sum(bool(alarms) for _, alarms, _ in ends) <= 1
 
@@ -248,3 +251,57 @@ def test_a_change_under_way_after_a_port_call_is_an_alarm_even_if_it_is_one_of_l
         assert alarms[0].since_s == pytest.approx(8 * HOUR + 2 * CALL * STRETCH_S, abs=3 * STRETCH_S)
         assert alarms[-1].settled
         assert alarms[-1].change == number or number in alarms[-1].as_likely
+
+
+def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], tuple[Step, ...]], limit: float):
+    """What is told of a watch."""
+    state, alarms, steps = ends
+    changes = tuple(
+        Change(effect=f"theta:p{n}", size=0.1, unit=(0.01, "%"), words=f"parameter p{n}", whole=1.0)
+        for n in range(CHANGES)
+    )
+    moments = [
+        Moment(time_s=step.time_s, statistic=step.statistic, value=np.zeros(CHANGES), std=np.ones(CHANGES))
+        for step in steps
+        if step.compared
+    ]
+    return MonitorContent(
+        vessel="drawn", changes=changes, calibration=calibration, reference_s=0.0, state=state, limit=limit,
+        false_alarm_days=1.0, alarms=alarms, moments=tuple(moments), left_out_rows=0, unread_rows=0, notes=(),
+        command="", version="",
+    )  # fmt: skip
+
+
+def test_no_statistic_above_the_threshold_stands_beside_no_alarm(calibration: Calibration) -> None:
+    limit, passed = threshold(CHANGES, 1e3), 0
+    for seed in (101, 110, 128, 151, 152):  # squalls of four stretches, told at every moment
+        columns = drawn_columns(70, seed=seed, quick=0.5)
+        columns[50:54, :, -1] += 2.0 * columns[50:54, :, 0]
+        for count in (53, 54, 55, 58, 70):
+            ends = watched(calibration, grams_from(columns[:count]), limit)
+            state, alarms, steps = ends
+            words = " ".join(sentences(content_of(calibration, ends, limit)))
+            largest = max((step.statistic for step in steps if step.compared), default=0.0)
+            assert bool(alarms) == (largest > limit)
+            if not alarms and (told := re.search(r"statistic is ([\d.]+), the threshold ([\d.]+)\.", words)):
+                assert float(told[1]) <= float(told[2])
+            undecided, dismissed = state.undecided_s > 0, state.brief + state.by_weather > 0
+            passed += undecided or dismissed
+            assert undecided == ("too short to tell a change of the ship from weather" in words and not alarms)
+            assert dismissed == ("passed without an alarm" in words)
+            assert (largest > limit or undecided or dismissed) == any(step.statistic > limit for step in steps)
+    assert passed
+
+
+def test_a_size_that_was_known_stays_known_while_it_is_refined(calibration: Calibration) -> None:
+    change, since = np.array([0.0, 0.0, 3.0, 0.0]), 60
+    grams, limit = drawn_grams(140, seed=6, change=change, since=since), threshold(CHANGES, 1e4)
+    state, named = State.begun(calibration, time_s=0.0), list[tuple[float, float]]()
+    for index in range(len(grams)):
+        state, alarms, _ = watched(calibration, grams.part(slice(index, index + 1)), limit, state)
+        told = state.alarm or next(iter(alarms), None)
+        if told is not None and told.named:
+            named.append((told.value, told.std))
+    assert named
+    assert all(abs(value - change[2]) < 4.0 * std for value, std in named)
+    assert max(std for _, std in named) < 1.5 * named[0][1]

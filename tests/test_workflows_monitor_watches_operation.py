@@ -82,7 +82,7 @@ def test_a_ship_as_in_the_reference_raises_no_alarm(watched: Path) -> None:
 def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_stretch(watched: Path) -> None:
     told = told_in(watched)
     budget = {entry["kind"]: entry for entry in told["budget"]}
-    assert sum(entry["judged_h"] for entry in budget.values()) == pytest.approx(told["judged_h"])
+    assert sum(entry["compared_h"] for entry in budget.values()) == pytest.approx(told["judged_h"])
     steady, turning = budget["steady course"], budget["turning"]
     for effect in ("theta:N_r", "theta:N_mu", "inertia:r", "gyro"):
         assert turning["alarm_after_s"][effect] < steady["alarm_after_s"][effect]
@@ -247,6 +247,62 @@ def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tm
     assert told["rows_without_numbers"] == 3
     assert told["judged_h"] == pytest.approx(1.0 - 603 / HOUR, abs=0.06)
     assert told["alarms"] == []
+
+
+@pytest.mark.usefixtures("no_page")
+def test_no_more_hours_are_judged_than_there_are(voyages: dict[str, Path], tmp_path: Path) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    kept = [row for number, row in enumerate(rows) if number % 45 > 2]  # a gap within every stretch
+    path = tmp_path / "gaps.csv"
+    path.write_text(header + "".join(kept))
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    judged_h = told["judged_h"] + told["not_judged_h"]
+    assert 0.9 * len(kept) / HOUR < judged_h <= len(kept) / HOUR
+    assert sum(entry["compared_h"] for entry in told["budget"]) <= judged_h + 1e-9
+    assert told["history"][-1]["time_s"] <= len(rows)
+
+
+@pytest.mark.usefixtures("no_page")
+def test_a_stream_resumed_from_its_own_log_judges_nothing_twice(
+    voyages: dict[str, Path], watched: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    monkeypatch.setattr("sys.stdin", io.StringIO(header + "".join(rows[:2000])))
+    monitored(tmp_path, "-", "--reference", voyages["reference"])
+    told = [monitored(tmp_path, voyages["same"], "--resume")]
+    monkeypatch.setattr("sys.stdin", io.StringIO(header + "".join(rows)))
+    told.append(monitored(tmp_path, "-", "--resume"))
+    for one in told:
+        assert one["judged_h"] == pytest.approx(told_in(watched)["judged_h"])
+        assert one["history"][-1]["time_s"] <= HOUR
+
+
+@pytest.mark.usefixtures("no_page")
+def test_times_are_those_of_the_datas_clock(voyages: dict[str, Path], tmp_path: Path) -> None:
+    header, *rows = voyages["changed"].read_text().splitlines(keepends=True)
+    begin_s, column = 1714564800, header.strip().split(",").index("time_s")
+    path = tmp_path / "dated.csv"
+    path.write_text(header + "".join(shifted(row, column, begin_s - HOUR) for row in rows))
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    (alarm,) = told["alarms"]
+    assert begin_s <= alarm["since_s"] < alarm["time_s"] <= begin_s + 3 * HOUR // 4
+    assert any("Since 2024-05-01 12:" in sentence for sentence in told["verdict"])
+
+
+def shifted(row: str, column: int, later_s: float) -> str:
+    cells = row.strip().split(",")
+    cells[column] = f"{float(cells[column]) + later_s:.1f}"
+    return ",".join(cells) + "\n"
+
+
+@pytest.mark.parametrize("option", ["--size", "--false-alarm-days"])
+def test_a_watch_goes_on_with_the_options_it_was_begun_with(
+    voyages: dict[str, Path], watched: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    (tmp_path / "monitor-state.json").write_bytes((watched / "monitor-state.json").read_bytes())
+    words = [str(voyages["same"]), "--vessel", str(TENDER), "--out", str(tmp_path), "--resume", option, "0.3"]
+    assert main(["monitor", *words]) == 2
+    assert f"{option} is 0.3, but the watch was begun with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,11 @@ def shown_progress(*, quiet: bool) -> Iterator[Progress]:
     if quiet:
         yield silent
     elif console.is_interactive:
-        known = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-        with Bar(*known, TextColumn("{task.fields[left]}"), console=console, transient=True) as bar:
+        activity, left_column = (
+            TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[left]}")
+        )
+        known = (activity, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), left_column)
+        with Bar(*known, console=console, transient=True) as bar:
             task, left = bar.add_task("starting", total=1.0, left=""), _TimeLeft()
             yield lambda activity, share: bar.update(task, description=activity, completed=share, left=left.at(share))
     else:
@@ -183,7 +186,7 @@ def expdesign(
 ) -> None:
     """Plan full-scale manoeuvring trials of ships, and learn a ship's model from their data.
 
-    [bold]run[/bold] does everything from one scenario file: it simulates the manoeuvres,
+    run does everything from one scenario file: it simulates the manoeuvres,
     decides how long to run each, plans one trajectory from start to goal in
     allowed water, verifies it, and writes route files and a report. The other
     commands are its steps, and what follows when data have been measured.

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import threading
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from inspect import cleandoc
 from types import FrameType
+from typing import Any, TypeVar
 
 import typer
+from rich.markup import escape
 from typer.main import get_command
 
 from expdesign.cli.app import BUG
@@ -36,6 +40,9 @@ LISTS = (
 """Options that take several values."""
 FILE_LISTS = ("--test", "--data", "--reference")
 """Options of `LISTS` whose values are files."""
+LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")
+"""Within a paragraph."""
+Program = TypeVar("Program")
 DONE, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 2, 3, 130
 
 
@@ -73,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _invoke(arguments: list[str]) -> int:
     with interruptions_wait():  # annotations are evaluated: Python ends by the signal itself when that is broken off
-        command = get_command(app)
+        command = with_plain_help(get_command(app))
     try:
         with command.make_context("expdesign", arguments) as context:
             command.invoke(context)
@@ -81,6 +88,18 @@ def _invoke(arguments: list[str]) -> int:
     except typer.Exit as exit_request:
         return exit_request.exit_code
     return DONE
+
+
+def with_plain_help(program: Program) -> Program:
+    """The program with help texts that are shown as they are written: what stands in brackets is a unit or a table.
+
+    Lines of a paragraph are joined, but for examples, as the terminal wraps them.
+    """
+    commands: tuple[Any, ...] = (program, *getattr(program, "commands", {}).values())
+    for part in (part for command in commands for part in (command, *command.params)):
+        if text := getattr(part, "help", None):
+            part.help = escape(LINE_END.sub(" ", cleandoc(text)))
+    return program
 
 
 @contextmanager

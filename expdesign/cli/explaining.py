@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @app.command("explain")
 def explain(
     subject: Annotated[
-        str, typer.Argument(metavar="[TOPIC or NAME]", help="A topic, a key such as design.total_s, or a family.")
+        str, typer.Argument(metavar="TOPIC or NAME", help="A topic, a key such as design.total_s, or a family.")
     ] = "",
     json: Json = False,
 ) -> None:
@@ -74,6 +74,7 @@ def _lines(topic: Topic) -> list[str]:
 
 
 def _line(entry: Explained) -> str:
-    default = {"": "", "required": "required"}.get(entry.default, f"default {entry.default}")
+    stated = entry.default in ("", "required", "optional")
+    default = entry.default if stated else f"default {entry.default}"
     notes = "; ".join(note for note in (default, entry.allowed) if note)
     return f"{entry.name}: {entry.meaning}" + (f" ({notes})" if notes else "")

@@ -56,7 +56,7 @@ def durations(
     out: Out = None,
     grow: Annotated[
         bool,
-        typer.Option("--grow", help="Also search for manoeuvres to add, as the table \\[design.grow] does."),
+        typer.Option("--grow", help="Also search for manoeuvres to add, as the table [design.grow] does."),
     ] = False,
     monte_carlo: Annotated[
         int,

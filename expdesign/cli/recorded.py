@@ -184,7 +184,7 @@ def indices(
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Model, length and actuators of the ship.")
     ],
     data: Annotated[
-        list[Path] | None, typer.Argument(metavar="[DATA.csv ...]", help="Measured zig-zags, turning circles, stops.")
+        list[Path] | None, typer.Argument(metavar="DATA.csv ...", help="Measured zig-zags, turning circles, stops.")
     ] = None,
     speed: Annotated[
         float | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -14,23 +15,49 @@ from rich.table import Table
 if TYPE_CHECKING:
     from expdesign.workflows import Outcome, TextTable
 
-UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
+UNITS = {
+    "s": "s",
+    "m": "m",
+    "mps": "m/s",
+    "radps": "rad/s",
+    "rad": "rad",
+    "deg": "°",
+    "kn": "kn",
+    "rps": "1/s",
+    "kg": "kg",
+    "h": "h",
+}
 """Last part of a name -> printed unit."""
+SENTENCES = ("remarks", "judgements", "notes")
+"""Entries of a summary with sentences, one line each, that need no words before them; others end so or are notes."""
 LONGEST = 200
 """Characters of a value beside its name; longer ones are left to the tables."""
 
 
 def as_json(command: str, outcome: Outcome) -> str:
-    """One JSON object: `command`, `files` written, and the workflow's `summary`."""
+    """One JSON object: `command`, `files` written, the workflow's `summary`."""
     content = {"command": command, "files": [str(path) for path in outcome.files], "summary": outcome.summary}
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _known(value: object) -> object:
+    """A value with null for numbers that are not finite, as in files of results."""
+    if isinstance(value, Mapping):
+        return {key: _known(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_known(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_summary(outcome: Outcome) -> None:
-    """Key numbers as a table, then the files and the page to open."""
+    """Key numbers and tables, what the page finds and warns of beside them, then the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    shown = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
+    shown = {
+        key: value
+        for key, value in outcome.summary.items()
+        if not _is_told(key) and (not outcome.tables or _brief(value))
+    }
     for row in _rows(shown):
         table.add_row(*row)
     if table.row_count:
@@ -38,10 +65,28 @@ def print_summary(outcome: Outcome) -> None:
         console.print()
     for text in outcome.tables:
         _print_table(console, text)
+    lines = list(_unsaid(outcome))
+    for line in (*lines, *[""] * bool(lines)):
+        console.print(line)
     for folder, names in _by_folder(outcome.files).items():
         console.print(f"Written to {folder}: {', '.join(names)}")
     for page in (path for path in outcome.files if path.suffix == ".html"):
         console.print(f"Open {page} in a browser.")
+
+
+def _unsaid(outcome: Outcome) -> Iterator[str]:
+    """Notes and remarks of the summary that no table has, after what they are on."""
+    said = {cell for text in outcome.tables for row in text.rows for cell in row}
+    for key, value in outcome.summary.items():
+        if _is_told(key):
+            lines = (value,) if isinstance(value, str) else value
+            start = "" if key in SENTENCES else f"{key.replace('_', ' ')}: "
+            yield from (f"{start}{line}" for line in lines if line not in said)  # type: ignore[attr-defined]
+
+
+def _is_told(key: str) -> bool:
+    """Whether an entry has sentences, one line each."""
+    return key.startswith("note") or key.endswith(SENTENCES)
 
 
 def _brief(value: object) -> bool:
@@ -67,8 +112,6 @@ def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str
         label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
         if isinstance(value, Mapping):
             yield from _rows(value, f"{label}, ")
-        elif key.endswith("remarks") and isinstance(value, (list, tuple)):
-            yield from ((label if number == 0 else "", str(line)) for number, line in enumerate(value))
         else:
             yield label, _text(value) if value is None else f"{_text(value)} {unit}".rstrip()
 
@@ -78,6 +121,8 @@ def _text(value: object) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float) and not math.isfinite(value):
+        return "-"
     if isinstance(value, float):
         return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.5g}"
     if isinstance(value, Mapping):

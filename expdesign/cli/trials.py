@@ -213,7 +213,7 @@ def roll(
     ],
     vessel: Annotated[
         Path | None,
-        typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with \\[roll], in place of \\[ship] in LOADS.toml."),
+        typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll], in place of [ship] in LOADS.toml."),
     ] = None,
     rudder: Annotated[
         list[str] | None,
@@ -249,7 +249,7 @@ def roll(
 
 @command("incline")
 def incline(
-    vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with \\[roll].")],
+    vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll].")],
     mass: Annotated[
         list[float], typer.Option("--mass-kg", metavar="M ...", help="Weights on board that may be shifted.")
     ],

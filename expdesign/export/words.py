@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -10,11 +11,19 @@ from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.values import Array
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
+MOST_DECIMALS = 12
+HOUR = 3600.0
+SINCE_1970_S = 3e8
+"""From which times of the data can only count from 1970 [s]: they are later than 1979."""
 MINUS, NB = "\N{MINUS SIGN}", "\N{NO-BREAK SPACE}"
 
 
 def duration(seconds: float) -> str:
-    """45 s, 3 min 20 s, 15 min, 1 h 05 min, 2 h."""
+    """45 s, 3 min 20 s, 15 min, 1 h 05 min, 2 h; with a minus sign below zero, "unknown" where it is no number."""
+    if not math.isfinite(seconds):
+        return "unknown"
+    if seconds < 0:
+        return f"{MINUS}{duration(-seconds)}"
     if seconds < 59.5:
         return f"{seconds:.3g}{NB}s"
     minutes, rest = divmod(round(seconds), 60)
@@ -22,6 +31,18 @@ def duration(seconds: float) -> str:
         return f"{minutes}{NB}min{NB}{rest:02d}{NB}s" if rest else f"{minutes}{NB}min"
     hours, minutes = divmod(round(seconds / 60), 60)
     return f"{hours}{NB}h{NB}{minutes:02d}{NB}min" if minutes else f"{hours}{NB}h"
+
+
+def hours(time_s: float) -> str:
+    """A time in words."""
+    return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
+
+
+def when(time_s: float) -> str:
+    """A time of the data's clock: since its beginning, or the date where it counts from 1970."""
+    if time_s < SINCE_1970_S:
+        return hours(time_s)
+    return f"{datetime.fromtimestamp(time_s, tz=UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def clock(seconds: float) -> str:
@@ -56,16 +77,38 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as per cent: 97.2 %, 0.03 %, 264 %."""
+    """A share as per cent: 97.2 %, 0.03 %, 264 %; 100 % is the whole, and 99.9 % all but a little."""
     value = 100 * share
-    if value == 0 or value >= 99.95:
+    if value == 0 or value >= 100:
         return f"{value:.0f}{NB}%"
-    return f"{value:.1f}{NB}%" if value >= 1 else f"{significant(value, 1)}{NB}%"
+    return f"{min(value, 99.9):.1f}{NB}%" if value >= 1 else f"{significant(value, 1)}{NB}%"
+
+
+def told_apart(value: float, other: float, decimals: int = 1) -> tuple[str, str]:
+    """Two numbers with as many decimals as show which is larger."""
+    texts = number(value, decimals), number(other, decimals)
+    if texts[0] != texts[1] or value == other or decimals > MOST_DECIMALS:
+        return texts
+    return told_apart(value, other, decimals + 1)
+
+
+def times(count: int) -> str:
+    """Once, twice, 3 times."""
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
 def bearing(radians: float) -> str:
     """A direction as three-figure degrees clockwise from north."""
     return f"{round(math.degrees(radians)) % 360:03d}\N{DEGREE SIGN}"
+
+
+def place(pose: Array) -> str:
+    """A position north and east [m], counted from the centre of the area."""
+    north, east = pose[:2].tolist()
+    return (
+        f"{number(abs(north), 1)} m {'north' if north >= 0 else 'south'} and {number(abs(east), 1)} m "
+        f"{'east' if east >= 0 else 'west'} of the area's centre"
+    )
 
 
 def compass(radians: float) -> str:

@@ -199,7 +199,7 @@ def _one(
     least = math.sqrt(needed_noncentrality(TUNING.wanted_power, freedom, level) / max(noncentrality, 1e-300))
     shift, drawn = mixture @ A[index], rivals.noise[:, index] @ mixture
     exact = (drawn + noncentrality) ** 2 / max(noncentrality, 1e-300)
-    named, confusions = _against(effect, rivals, shift, exact, (noncentrality, freedom, level))
+    first, confusions = _against(effect, rivals, shift, exact, (noncentrality, freedom, level))
     return Foreseen(
         effect=effect,
         name=name if len(sizes) == 1 else effect_name(effect, known),
@@ -211,7 +211,7 @@ def _one(
         level=level,
         power=float(found),
         found=float(found) * shown,
-        named=named * shown if known_size else math.nan,
+        named=float(found) * shown * first if known_size else math.nan,
         least_change=change * least if known_size and noncentrality > 0 else math.inf,
         confusions=confusions if known_size else (),
     )
@@ -229,7 +229,7 @@ def effect_name(effect: HiddenEffect, known: Background) -> str:
 def _against(
     effect: HiddenEffect, rivals: Rivals, shift: Array, exact: Array, test: tuple[float, int, float]
 ) -> tuple[float, tuple[Confusion, ...]]:
-    """Probability that the right cause is significant and first, and how it is told apart from the others.
+    """Probability that the right cause, where it is significant, is first, and how it is told apart from the others.
 
     Args:
         effect: hidden.
@@ -247,7 +247,7 @@ def _against(
     significant = tested >= chi2.isf(level, freedom)
     mine = np.maximum(net[:, own].max(axis=1), tested - price_of(effect.candidate))
     cosine = imitation(rivals, shift, noncentrality)
-    first, confusions = significant.copy(), []
+    first, confusions = np.ones(len(significant), dtype=bool), []
     for cause in dict.fromkeys(item for item in rivals.causes if item != effect.cause):
         index = [number for number, name in enumerate(rivals.causes) if name == cause]
         lead, best = mine - net[:, index].max(axis=1), float(cosine[index].max())
@@ -261,4 +261,5 @@ def _against(
                 told_apart=float(apart.mean()) if len(apart) else 0.0,
             )
         )
-    return float(first.mean()), tuple(sorted(confusions, key=lambda item: item.told_apart))
+    judged = first[significant] if significant.any() else first
+    return float(judged.mean()), tuple(sorted(confusions, key=lambda item: item.told_apart))

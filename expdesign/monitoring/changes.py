@@ -35,7 +35,7 @@ class Change:
         """A value in words, e.g. "+12 +- 3 %"."""
         divisor, name = self.unit
         spread = "" if std is None else f" ± {abs(std / divisor):.2g}"
-        return f"{value / divisor:+.3g}{spread} {name}"
+        return f"{value / divisor + 0.0:+.3g}{spread} {name}"
 
 
 def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) -> tuple[Change, ...]:

@@ -57,33 +57,36 @@ def watch(
     stretches, nuisance, ship = stretches_of(grams, calibration.std), calibration.nuisance, state.shift
     for index, products in enumerate(stretches.products):
         begin_s, count = float(stretches.time_s[index]), float(stretches.counts[index])
-        if begin_s - state.judged_s >= rules.port_s:
+        duration_s = float(grams.duration_s[index])
+        if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
-        state = _waited(state, nuisance, begin_s + calibration.stretch_s)
+        state = _waited(state, nuisance, begin_s + duration_s)
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
         if misfit_of(float(one.quadratic), one.score, one.information, count) > calibration.misfit_limit:
-            state = replace(state, left_out=state.left_out + 1)
+            state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
         surprised = surprise(own, stretches.changes, state.known, one, loads) / calibration.surprise
         before = state.weather
-        state = _counted(state, one, surprised, int(grams.kind[index]), grams.budget[index])
+        state = _counted(state, one, surprised, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
             state = settling(state, state.alarm, one, calibration)
             if state.alarm is not None and state.alarm.settled:
                 alarms.append(state.alarm)
                 state = replace(state, alarm=None, pending=None, weather=1.0)
         else:
-            state, step = _summed(state, one, surprised, before, calibration)
-            steps.append(step)
-            state, alarm = _noticed(state, step, calibration, rules.limit, len(own) - 1 - stretches.changes)
+            state, step = _summed(state, one, surprised, before, begin_s, calibration)
+            state, alarm, compared = _noticed(
+                state, step, calibration, rules.limit, len(own) - 1 - stretches.changes, duration_s
+            )
+            steps.append(replace(step, compared=compared))
             alarms += [] if alarm is None else [alarm]
         if state.shift is not ship:
             return state, tuple(alarms), tuple(steps), index + 1
     return state, tuple(alarms), tuple(steps), len(grams)
 
 
-def _counted(state: State, one: Judged, surprised: float, kind: int, terms: Array) -> State:
+def _counted(state: State, one: Judged, surprised: float, duration_s: float, kind: int, terms: Array) -> State:
     """The state with a stretch added to the sums over the whole watch.
 
     It is not judged where the weather is beyond the reference, unless a change that was noticed explains it.
@@ -92,30 +95,37 @@ def _counted(state: State, one: Judged, surprised: float, kind: int, terms: Arra
     beyond = weather > TUNING.weather_limit and state.alarm is None
     return replace(
         state,
-        judged=state.judged + (not beyond),
-        left_out=state.left_out + beyond,
-        beyond=state.beyond + 1 if beyond else 0,
+        judged_s=state.judged_s + duration_s * (not beyond),
+        left_out_s=state.left_out_s + duration_s * beyond,
+        beyond_s=state.beyond_s + duration_s if beyond else 0.0,
         weather=weather,
         whole=state.whole.added(one)[0],
         load=replace(state.load, judged=state.load.judged + 1),
-        budget=state.budget.added(kind, terms, np.diag(one.information)),
+        budget=state.budget.added(kind, duration_s, terms, np.diag(one.information)),
     )
 
 
 def _noticed(
-    state: State, step: Step, calibration: Calibration, limit: float, forces: int
-) -> tuple[State, Alarm | None]:
-    """Raise an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew."""
-    if step.statistic <= limit or _doubtful(state):
-        return with_load(state, calibration), None
+    state: State, step: Step, calibration: Calibration, limit: float, forces: int, duration_s: float
+) -> tuple[State, Alarm | None, bool]:
+    """Raise an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew.
+
+    Returns also whether the sum was compared with the limit.
+    """
+    if step.statistic <= limit:
+        brief = state.brief + (state.undecided_s > 0)
+        return with_load(replace(state, brief=brief, undecided_s=0.0), calibration), None, True
+    if _doubtful(state):
+        return with_load(replace(state, undecided_s=state.undecided_s + duration_s), calibration), None, False
+    state = replace(state, undecided_s=0.0)
     if not _by_weather(state, calibration, forces):
         state, alarm = raised(state, step, calibration)
-        explained = min(state.beyond, state.largest.count)
-        return replace(state, judged=state.judged + explained, left_out=state.left_out - explained, beyond=0), alarm
+        explained_s = min(state.beyond_s, state.until_s - float(state.largest.since_s[0]))
+        judged_s, left_out_s = state.judged_s + explained_s, state.left_out_s - explained_s
+        return replace(state, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, True
     every = np.ones(len(state.ratios), dtype=bool)
-    return replace(
-        state, ratios=np.zeros(len(every)), sums=state.sums.again(every, state.judged_s, state.weather)
-    ), None
+    sums = state.sums.again(every, state.until_s, state.weather)
+    return replace(state, ratios=np.zeros(len(every)), sums=sums, by_weather=state.by_weather + 1), None, False
 
 
 def _doubtful(state: State) -> bool:
@@ -147,11 +157,11 @@ def _less(products: Array, change: Array) -> Array:
 
 def _waited(state: State, nuisance: Force, until_s: float) -> State:
     """The state at the beginning of the stretch that ends then, with the force's memory faded over the gap."""
-    gap_s = until_s - state.judged_s
+    gap_s = until_s - state.until_s
     keep = nuisance.memory(gap_s)
     return replace(
         state,
-        judged_s=until_s,
+        until_s=until_s,
         known=after_gap(state.known, nuisance, gap_s),
         sums=state.sums.later(keep),
         whole=state.whole.later(keep),
@@ -159,7 +169,9 @@ def _waited(state: State, nuisance: Force, until_s: float) -> State:
     )
 
 
-def _summed(state: State, one: Judged, surprised: float, before: float, calibration: Calibration) -> tuple[State, Step]:
+def _summed(
+    state: State, one: Judged, surprised: float, before: float, begin_s: float, calibration: Calibration
+) -> tuple[State, Step]:
     """Add a stretch to all sums, or begin a sum with it where that is larger; sums below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
@@ -175,9 +187,8 @@ def _summed(state: State, one: Judged, surprised: float, before: float, calibrat
     ended = (ratios <= 0.0) | ~np.tile(calibration.watched, 2)
     ratios = np.where(ended, 0.0, ratios)
     place = int(np.argmax(ratios))
-    step = Step(time_s=state.judged_s, statistic=float(ratios[place]), change=place % m)
+    step = Step(time_s=state.until_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
-        begin_s = state.judged_s - calibration.stretch_s
         sums = sums.first(late & ~ended, one, begin_s, surprised, before)
     known = after_stretch(state.known, one)
-    return replace(state, known=known, ratios=ratios, sums=sums.again(ended, state.judged_s, state.weather)), step
+    return replace(state, known=known, ratios=ratios, sums=sums.again(ended, state.until_s, state.weather)), step

@@ -46,15 +46,17 @@ class Grams:
 
     Attributes:
         time_s: (w,) beginning of each stretch, since the data began [s].
+        duration_s: (w,) measured time in it [s]: `stretch_s`, or less where the data end or pause.
         products: (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading.
         counts: (4, w) measured samples.
         budget: (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of
             inertia, the acceleration itself; zero for changes that are no term.
         kind: (w,) number in `KINDS`.
-        stretch_s: their length [s].
+        stretch_s: length of a whole one [s].
     """
 
     time_s: Array
+    duration_s: Array
     products: Array
     counts: Array
     budget: Array
@@ -62,7 +64,7 @@ class Grams:
     stretch_s: float
 
     def __post_init__(self) -> None:
-        seal(self, time_s="w", products="4 w c c", counts="4 w", budget="w m 3")
+        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3")
 
     @property
     def changes(self) -> int:
@@ -77,6 +79,7 @@ class Grams:
         return replace(
             self,
             time_s=self.time_s[stretches],
+            duration_s=self.duration_s[stretches],
             products=self.products[:, stretches],
             counts=self.counts[:, stretches],
             budget=self.budget[stretches],
@@ -120,6 +123,7 @@ def grams_of(
     begin_s = begins[windows.batch.astype(int)] + windows.first * windows.step_s
     return Grams(
         time_s=begin_s[keep],
+        duration_s=_durations(seen, windows.sample_s)[keep],
         products=table[:, keep] @ np.swapaxes(table[:, keep], 2, 3),
         counts=seen.sum(axis=1).T[:, keep],
         budget=budget[keep],
@@ -139,6 +143,12 @@ def _whole_stretches(record: Record, begins_s: Sequence[float], stretch_s: float
                 parts.append(batch.cut(part))
                 begins.append(begin_s + part.start * batch.sample_time_s)
     return replace(record, batches=tuple(parts)), np.array(begins)
+
+
+def _durations(seen: NDArray[np.bool_], sample_s: float) -> Array:
+    """(w,) time to the end of the last sample [s] that has a measured channel in (w, s, 4)."""
+    numbered = np.arange(1, seen.shape[1] + 1)[:, None] * seen.any(axis=2, keepdims=True)
+    return np.asarray(sample_s * numbered.max(axis=(1, 2)))
 
 
 def _columns(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Sequence[Change]) -> Array:
@@ -188,6 +198,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
     """Stretches of several records as one."""
     return Grams(
         time_s=np.concatenate([part.time_s for part in parts]),
+        duration_s=np.concatenate([part.duration_s for part in parts]),
         products=np.concatenate([part.products for part in parts], axis=1),
         counts=np.concatenate([part.counts for part in parts], axis=1),
         budget=np.concatenate([part.budget for part in parts]),

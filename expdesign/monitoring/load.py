@@ -26,7 +26,7 @@ def called(state: State, calibration: Calibration, until_s: float) -> State:
     more, taken = np.zeros(len(state.known.mean)), np.zeros(len(state.shift))
     more[first:] = calibration.load[loads] ** 2
     taken[loads] = -state.known.mean[first:]
-    load = Load(since_s=until_s, stay_s=until_s - state.judged_s, judged=0, rounds=0, taken=taken)
+    load = Load(since_s=until_s, stay_s=until_s - state.until_s, judged=0, rounds=0, taken=taken)
     known = replace(state.known, covariance=state.known.covariance + np.diag(more))
     return replace(state, known=known, load=load, calls=calls_of(state, calibration))
 

@@ -12,6 +12,9 @@ from expdesign.monitoring.changes import Change
 from expdesign.monitoring.force import Force, Known
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
+COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "weather")
+"""Numbers of a state that are added up."""
+
 
 def saved(value: Any) -> Any:
     """Numbers, texts, lists and tables of a value of this room; infinite numbers as texts."""
@@ -35,7 +38,7 @@ def restored_state(table: dict[str, Any]) -> State:
     """A state, read from what `saved` made of it."""
     alarm, pending = table["alarm"], table["pending"]
     return State(
-        judged_s=table["judged_s"],
+        until_s=table["until_s"],
         known=Known(**_arrays(table["known"])),
         ratios=_array(table["ratios"]),
         sums=Sums(**_arrays(table["sums"])),
@@ -49,10 +52,7 @@ def restored_state(table: dict[str, Any]) -> State:
         ),
         alarm=None if alarm is None else restored_alarm(alarm),
         pending=None if pending is None else Sums(**_arrays(pending)),
-        judged=table["judged"],
-        left_out=table["left_out"],
-        beyond=table["beyond"],
-        weather=table["weather"],
+        **{name: table[name] for name in COUNTED},
     )
 
 

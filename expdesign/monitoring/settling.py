@@ -17,10 +17,8 @@ from expdesign.values import Array
 def raised(state: State, step: Step, calibration: Calibration) -> tuple[State, Alarm]:
     """Raise an alarm of the largest sum."""
     pending = state.largest
-    alarm = Alarm(
-        time_s=state.judged_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change
-    )
-    alarm = _attributed(alarm, pending, calibration, state.judged_s)
+    alarm = Alarm(time_s=state.until_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change)
+    alarm = _attributed(alarm, pending, calibration, state.until_s)
     return replace(state, alarm=alarm, pending=pending, before=state.shift), alarm
 
 
@@ -32,15 +30,17 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
     """
     assert state.pending is not None
     pending = state.pending.added(one)[0]
-    known = after_stretch(state.known, one)
+    known, before = after_stretch(state.known, one), alarm
     named = alarm.change if alarm.named else None
-    alarm = _attributed(alarm, pending, calibration, state.judged_s, named=named, so_far=state.shift - state.before)
+    alarm = _attributed(alarm, pending, calibration, state.until_s, named=named, so_far=state.shift - state.before)
     state = replace(state, alarm=alarm, pending=pending, known=known)
     enough = pending.information[0][alarm.change, alarm.change] / calibration.common >= TUNING.settled * (
         TUNING.patience if alarm.as_likely else 1.0
     )
     if not enough or pending.count < TUNING.settling_stretches:
-        return state
+        if before.named and abs(alarm.value - before.value) < TUNING.clear * alarm.std:  # few data since the last size
+            alarm = replace(alarm, value=before.value, std=before.std)
+        return replace(state, alarm=alarm)
     together = np.array([alarm.change, *alarm.as_likely])
     inner = pending.information[0][np.ix_(together, together)] + np.eye(len(together))
     found = np.linalg.solve(inner, pending.score[0][together])
@@ -52,11 +52,11 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
         state,
         known=replace(known, mean=known.mean - pending.taken[0][:, together] @ found),
         ratios=np.zeros(2 * m),
-        sums=state.sums.again(every, state.judged_s),
-        whole=state.whole.again(every[:1], state.judged_s),
+        sums=state.sums.again(every, state.until_s),
+        whole=state.whole.again(every[:1], state.until_s),
         shift=shift,
         alarm=replace(alarm, named=True, settled=bool(np.abs(found).max() < TUNING.refined)),
-        pending=pending.again(every[:1], state.judged_s),
+        pending=pending.again(every[:1], state.until_s),
     )
 
 

@@ -175,12 +175,14 @@ class Budget:
     """What terms contributed and what was told, by kind of stretch.
 
     Attributes:
-        stretches: (k,) that were judged, for each of `KINDS`.
+        stretches: (k,) that were judged or left out for their weather, for each of `KINDS`.
+        duration_s: (k,) of them [s].
         terms: (k, m, 3) sums of their `Grams.budget`.
         information: (k, m) sums of the information about every change, in inverse squared sizes.
     """
 
     stretches: Array
+    duration_s: Array
     terms: Array
     information: Array
 
@@ -189,14 +191,16 @@ class Budget:
         """Nothing yet."""
         kinds = len(KINDS)
         return cls(
-            stretches=np.zeros(kinds), terms=np.zeros((kinds, changes, 3)), information=np.zeros((kinds, changes))
-        )
+            stretches=np.zeros(kinds), duration_s=np.zeros(kinds), terms=np.zeros((kinds, changes, 3)),
+            information=np.zeros((kinds, changes)),
+        )  # fmt: skip
 
-    def added(self, kind: int, terms: Array, information: Array) -> Budget:
+    def added(self, kind: int, duration_s: float, terms: Array, information: Array) -> Budget:
         """The budget with a stretch added."""
         where = np.arange(len(self.stretches)) == kind
         return Budget(
             stretches=self.stretches + where,
+            duration_s=self.duration_s + duration_s * where,
             terms=self.terms + where[:, None, None] * terms,
             information=self.information + where[:, None] * information,
         )
@@ -207,7 +211,7 @@ class State:
     """State of a watch between two stretches.
 
     Attributes:
-        judged_s: end of the last stretch that was looked at [s].
+        until_s: end of the last stretch that was looked at [s].
         known: of the unmeasured force and the load, then.
         ratios: (2 m,) sums of log-likelihood ratios, of increases and then of decreases.
         sums: since they began, 2 m of them.
@@ -216,12 +220,15 @@ class State:
         load: since the last port call; calls: those before, the latest of them.
         budget: of the stretches judged.
         alarm: the alarm that is not yet settled, or None; pending: sums since its change.
-        judged, left_out: stretches that were judged, and those whose error or weather was beyond the reference.
-        beyond: the latest of those left out for their weather; a change that is noticed may explain them yet.
+        judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
+            beyond the reference [s].
+        beyond_s: the latest of that left out for its weather; a change that is noticed may explain it yet [s].
+        undecided_s: how long the largest sum has been above the threshold and too short to be judged [s].
+        brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged.
         weather: of late, the `surprise` of stretches in that of the reference.
     """
 
-    judged_s: float
+    until_s: float
     known: Known
     ratios: Array
     sums: Sums
@@ -233,9 +240,12 @@ class State:
     calls: tuple[Call, ...] = ()
     alarm: Alarm | None = None
     pending: Sums | None = None
-    judged: int = 0
-    left_out: int = 0
-    beyond: int = 0
+    judged_s: float = 0.0
+    left_out_s: float = 0.0
+    beyond_s: float = 0.0
+    undecided_s: float = 0.0
+    brief: int = 0
+    by_weather: int = 0
     weather: float = 1.0
 
     @property
@@ -248,7 +258,7 @@ class State:
         """The state at the beginning of a watch."""
         m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
         return cls(
-            judged_s=time_s,
+            until_s=time_s,
             known=known,
             ratios=np.zeros(2 * m),
             sums=Sums.begun(2 * m, m, len(known.mean), time_s),
@@ -281,8 +291,11 @@ class Step:
         time_s: its end [s].
         statistic: the largest of all sums.
         change: whose.
+        compared: whether it is compared with the threshold: not where it is above and too short to tell a change of
+            the ship from weather, or where weather explains it.
     """
 
     time_s: float
     statistic: float
     change: int
+    compared: bool = True

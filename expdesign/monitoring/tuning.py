@@ -25,6 +25,7 @@ class Tuning:
         unexplained_share: of the surprise, that the effects of large changes leave as they are not linear.
         settling_stretches: fewest from which the size of a change is told.
         refined: change of the size, in sizes that matter, below which it is refined no further.
+        clear: standard errors from which a size from the data since the last refinement takes the place of that one.
         largest_size: of changes that are told from errors unlike the reference's, in sizes that matter.
         as_likely: difference of log-likelihood up to which another change explains the data as well.
         settled: information, in inverse squared sizes, from which a change is settled; patience: factor of it where
@@ -61,6 +62,7 @@ class Tuning:
     unexplained_share: float = 0.1
     settling_stretches: int = 20
     refined: float = 0.2
+    clear: float = 2.0
     settled: float = 60.0
     patience: float = 10.0
     known_within: float = 6.0

@@ -53,8 +53,14 @@ class Taken:
     last_s: float
 
     def continues(self, other: Taken) -> bool:
-        """Whether this is the same source, read further; a stream is one however often it is opened."""
-        return self.source == other.source and (self.begins == other.begins or self.source == STREAM.name)
+        """Whether this is the same source, read further.
+
+        A stream is one however often it is opened, and the file that it was logged into begins as it did.
+        """
+        stream = STREAM.name in (self.source, other.source)
+        return (self.source == other.source and stream) or (
+            self.begins == other.begins and (self.source == other.source or stream)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,7 +156,7 @@ def pieces(
         every: Iterator[str] = itertools.chain(first, lines)
         if known is None:
             rows = 0
-        elif source == STREAM:
+        elif STREAM.name in (source.name, known.source):
             every, rows = _after(every, columns, known.last_s)
         else:
             every, rows = itertools.islice(every, known.rows, None), known.rows

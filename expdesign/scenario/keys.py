@@ -23,7 +23,7 @@ class Key:
     Attributes:
         name: dotted; entries of a list of tables are marked as in "no_go[].name".
         meaning: its description, with unit.
-        default: as in a file; "required", or "" for no default.
+        default: as in a file; "required"; or "optional", for one that has no value where it is not given.
         allowed: its allowed values.
     """
 
@@ -65,9 +65,9 @@ def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
 def _default(field: FieldInfo, inner: type[Table] | None) -> str:
     if field.is_required():
         return "required"
-    value = field.default
-    if inner is not None or value is None or value in ({}, []):
-        return ""
+    value = None if inner is not None else field.get_default(call_default_factory=True, validated_data={})
+    if value is None or value in ({}, [], ""):
+        return "optional"
     return f"[{', '.join(map(shown, value))}]" if isinstance(value, list) else shown(value)
 
 

@@ -61,8 +61,8 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
     table = signals(ship, at)
     if kind in ("gain", "asymmetry"):
         return ahead_force(table, ship.model), f"ahead force, {ahead_force_text(ship.model)}"
-    own = {one.name: one for one in ship.model.terms}
-    term = {**found.extended.library, **ship.library, **own}[rest]  # unlisted terms are those that were found
+    known = (*ship.library.values(), *found.extended.model.terms, *ship.model.terms)  # unlisted ones are those found
+    term = {one.name: one for one in known}[rest]
     names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *ship.model.inputs)))
     values = parse_expression(term.expression, signals=names).evaluate(table, NUMPY)
     return np.broadcast_to(values, at["time"].shape), f"{term.name}: {term.expression}"

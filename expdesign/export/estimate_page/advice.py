@@ -22,7 +22,8 @@ def summary(content: EstimateContent) -> list[str]:
     fixed = f" Fixed parameters: {', '.join(found.fixed)}." if found.fixed else ""
     return [
         f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name}, from "
-        f"{words.counted(len(batches), 'run')} with {samples} samples in {words.duration(seconds)}.{apart}{fixed}",
+        f"{words.counted(len(batches), 'run')} with {words.counted(samples, 'sample')} in {words.duration(seconds)}."
+        f"{apart}{fixed}",
         f"The file vessel-estimated.toml holds the estimate by {best.method.title} ({best.method.name}).",
         _fit_sentence(best),
     ]
@@ -39,10 +40,9 @@ def _fit_sentence(best: Assessed) -> str:
                 for name, column in zip(best.model.outputs, fits.T, strict=True)
                 if np.isfinite(column).any()
             )
-            parts.append(f"{medians} on the {use} runs")
-        failed = sum(bool(run.problem) for run in runs)
-        if failed:
-            parts.append(f"{failed} of {len(runs)} {use} runs diverge")
+            parts.append(f"{medians} on the {use} runs{' that do not diverge' * (len(fits) < len(runs))}")
+        if len(fits) < len(runs):
+            parts.append(f"{len(runs) - len(fits)} of {words.counted(len(runs), f'{use} run')} diverged")
     return f"Fit of its simulations, median over runs: {'; '.join(parts)}." if parts else "No run could be simulated."
 
 

@@ -41,10 +41,11 @@ def breach_sentences(breaches: Sequence[Breach], runs: int) -> list[str]:
         same = [breach for breach in breaches if breach.inside == inside]
         share = sum(len(breach.samples) for breach in same) / sum(breach.count for breach in same)
         worst = max(breach.margin for breach in same)
+        broken, parameters = {b.batch for b in same}, dict.fromkeys(name for b in same for name in b.parameters)
         nearer = f"changes sign or comes closer to zero than {worst:.3g}" if worst > 0 else "changes sign"
         sentences.append(
             f"The excitation condition does not hold for {inside}, inside an absolute value in the term of "
-            f"{', '.join(same[0].parameters)}. It {nearer} in {len(same)} of {words.counted(runs, 'run')} and "
+            f"{', '.join(parameters)}. It {nearer} in {len(broken)} of {words.counted(runs, 'run')} and "
             f"{words.percent(share)} of their samples. Noise and disturbances then bias these parameters."
         )
     return sentences

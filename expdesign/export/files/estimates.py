@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from expdesign.assessment import Assessed, Assessment, RunCheck, sentence
+from expdesign.assessment import Assessed, Assessment, Limits, RunCheck, sentence
 from expdesign.assessment.runs import ESTIMATION, TEST
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
@@ -93,11 +93,17 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
 
 def limit_entries(found: Assessment) -> dict[str, Any]:
     """Run -> causes of misfit of its simulation with the chosen estimate: numbers and a sentence."""
-    shares = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
+    shares, ahead = ("constant", "slow", "quick", "parameters", "ceiling_percent"), ("ahead_rms", "ahead_share")
+
+    def entry(limits: Limits, name: str) -> dict[str, float | None]:
+        return named_finite(limits.outputs, getattr(limits, name))
+
     return {
         run.batch.name: {
             "sentence": sentence(limits, run),
-            **{name: named_finite(limits.outputs, getattr(limits, name)) for name in shares},
+            # an error that has grown many times over has no shares that add up
+            **{name: None if limits.unstable else entry(limits, name) for name in shares},
+            **{name: entry(limits, name) for name in ahead},
             "growth_of_an_error": finite(limits.growth),
             "doubling_s": finite(limits.doubling_s),
         }

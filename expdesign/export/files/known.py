@@ -98,7 +98,7 @@ def replan_json(known: Known) -> str:
         {
             "data": list(known.data),
             "sailed_s": known.sailed_s,
-            "total_s": known.total_s,
+            "whole_trial_s": known.total_s,
             "remaining_s": finite(known.remaining_s),
             "remaining_stated": known.remaining_stated,
             "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),

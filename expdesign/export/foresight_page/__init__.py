@@ -1,6 +1,13 @@
 """What a diagnosis would find, before the trial is sailed: page, JSON and table."""
 
-from expdesign.export.foresight_page.content import HEADER, ForesightContent, foresight_json, foresight_rows, size_text
+from expdesign.export.foresight_page.content import (
+    HEADER,
+    ForesightContent,
+    conclusions,
+    foresight_json,
+    foresight_rows,
+    size_text,
+)
 from expdesign.export.foresight_page.operation import (
     OPERATION_HEADER,
     OperationContent,
@@ -16,6 +23,7 @@ __all__ = [
     "OPERATION_HEADER",
     "ForesightContent",
     "OperationContent",
+    "conclusions",
     "foresight_html",
     "foresight_json",
     "foresight_rows",

@@ -11,6 +11,7 @@ from expdesign.export.files import finite, strict_json
 from expdesign.foresight import TOLD_APART, AddedRuns, Foreseen, Foresight
 
 NONE = "\N{EN DASH}"
+HALF = 0.5
 MOST_LISTED = 5
 """Largest number of causes in a sentence."""
 HEADER = (
@@ -97,21 +98,24 @@ def _sentences(found: Foresight) -> Iterator[str]:
         f"{100 * found.wanted_power:g} %, wherever they act and at the smallest size that matters."
     )
     missed = sorted((item for item in least if item.found < found.wanted_power), key=lambda item: item.found)
-    if missed:
-        listed = ", ".join(
-            f"{item.cause} as {item.name} ({words.percent(item.found)})" for item in missed[:MOST_LISTED]
-        )
-        rest = f" and {len(missed) - MOST_LISTED} more" if len(missed) > MOST_LISTED else ""
-        yield f"It would probably miss {listed}{rest}."
+    likely = [item for item in missed if item.found >= HALF]
+    for text, items in (("It would probably miss", missed[: len(missed) - len(likely)]), ("It may miss", likely)):
+        if items:
+            listed = ", ".join(
+                f"{item.cause} as {item.name} ({words.percent(item.found)})" for item in items[:MOST_LISTED]
+            )
+            rest = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
+            yield f"{text} {listed}{rest}."
     within = list(dict.fromkeys(item.cause for item in found.effects if item.needs_runs and item.within_std))
     if within:
         yield (
             f"No data would show {', '.join(within)} at that size in every case: that is within the standard "
             "deviations in the vessel file."
         )
-    pairs = list(dict.fromkeys((item.cause, other.cause) for item, other in found.not_told_apart))
+    pairs = dict.fromkeys((f"{item.cause} as {item.name}", other.cause) for item, other in found.not_told_apart)
     if pairs:
-        yield "It would find, but not distinguish: " + ", ".join(f"{one} from {other}" for one, other in pairs) + "."
+        listed = ", ".join(f"{one} from {other}" for one, other in pairs)
+        yield f"Their tests would notice, but not distinguish: {listed}."
     if found.together is not None:
         more = runs_text(found.together)
         yield f"With {more} more, its tests would also accept what runs of this dictionary can show."

@@ -62,15 +62,15 @@ def operation_sentences(found: OperationForesight) -> tuple[str, ...]:
 def _sentences(found: OperationForesight) -> Iterator[str]:
     low, high = interval(found.false_alarms, found.nominal)
     yield (
-        f"Of {found.nominal} voyages of {words.duration(found.voyage_s)} without a change, {found.false_alarms} raised "
-        f"an alarm (95 % interval of the share: {100 * low:.0f} to {100 * high:.0f} %). The threshold allows one in "
-        f"{found.false_alarm_days:g} days at most."
+        f"Of {words.counted(found.nominal, 'voyage')} of {words.duration(found.voyage_s)} without a change, "
+        f"{found.false_alarms or 'none'} raised an alarm (95 % interval of the share: {100 * low:.0f} to "
+        f"{100 * high:.0f} %). The threshold allows one in {found.false_alarm_days:g} days at most."
     )
     for change in dict.fromkeys(item.change for item in found.rows):
         own = sorted((item for item in found.rows if item.change == change), key=lambda item: item.size)
         first = next((item for item in own if item.found >= FINDS * item.voyages), None)
         if first is None:
-            yield f"{_named(own[-1])} is not found in half of the voyages."
+            yield f"{_named(own[-1])} is found in {own[-1].found} of {own[-1].voyages} voyages only."
             continue
         yield (
             f"{_named(first)} is found in {first.found} of {first.voyages} voyages, after "
@@ -79,9 +79,11 @@ def _sentences(found: OperationForesight) -> Iterator[str]:
     for item in found.rows:
         if item.taken_for and item.found - item.named > FINDS * item.found:
             name, count = item.taken_for[0]
+            wrong, told = item.found - item.named, item.likely - item.named
             yield (
-                f"{_named(item)} is mostly taken for another change: {name} in {count} of {item.found}. In "
-                f"{item.likely} of them the alarm says that the right one explains the data as well."
+                f"{_named(item)} is mostly taken for another change: in {wrong} of "
+                f"{words.counted(item.found, 'alarm')}, most often for {name} ({count}). Of these, {told or 'none'} "
+                "say that the right one explains the data as well."
             )
     if found.not_watched:
         yield f"These sensors and voyages give no information about {', '.join(found.not_watched)}."

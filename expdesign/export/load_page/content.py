@@ -10,6 +10,7 @@ import numpy as np
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.pages import page_template
+from expdesign.export.words import counted
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
 
@@ -102,8 +103,8 @@ def _sentences(content: LoadContent) -> Iterator[str]:
     plan = content.plan
     count, total = len(content.options), sum(content.time_s(case) for case in range(len(content.options)))
     yield (
-        f"{count} load case{'s' * (count > 1)} with {int(plan.repeats.sum())} runs in {total:.0f} s determine "
-        f"{', '.join(plan.question.free)}: {'; '.join(option.name for option in content.options)}."
+        f"{counted(count, 'load case')} with {counted(int(plan.repeats.sum()), 'run')} in {total:.0f} s tell most "
+        f"about {', '.join(plan.question.free)}: {'; '.join(option.name for option in content.options)}."
     )
     if len(plan.steps) > 1:
         yield (

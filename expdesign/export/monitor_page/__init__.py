@@ -1,7 +1,23 @@
 """Results of a watch over a ship in operation: JSON, sentences and a page."""
 
 from expdesign.export.monitor_page.budget import budget_entries
-from expdesign.export.monitor_page.content import Moment, MonitorContent, monitor_json, monitor_tables, sentences
+from expdesign.export.monitor_page.content import (
+    Moment,
+    MonitorContent,
+    monitor_header,
+    monitor_json,
+    monitor_tables,
+    sentences,
+)
 from expdesign.export.monitor_page.page import monitor_html
 
-__all__ = ["Moment", "MonitorContent", "budget_entries", "monitor_html", "monitor_json", "monitor_tables", "sentences"]
+__all__ = [
+    "Moment",
+    "MonitorContent",
+    "budget_entries",
+    "monitor_header",
+    "monitor_html",
+    "monitor_json",
+    "monitor_tables",
+    "sentences",
+]

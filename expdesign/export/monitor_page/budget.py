@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.export.files import finite
-from expdesign.export.monitor_page.content import HOUR, MonitorContent, hours
+from expdesign.export.monitor_page.content import MonitorContent
 from expdesign.export.pages.figures import LINES, light_grid, new_figure, page_figure, plain, svg
+from expdesign.export.words import HOUR, hours
 from expdesign.monitoring import KINDS
 from expdesign.values import Array
 
@@ -67,8 +68,8 @@ def budget_header() -> tuple[str, ...]:
 
 def budget_tables(content: MonitorContent) -> list[tuple[str, ...]]:
     """A row for each change that is watched for: time to an alarm in stretches of each kind."""
-    stretches, delays = content.state.budget.stretches, delays_s(content)
-    rows = [("in the data", *(hours(n * content.calibration.stretch_s) for n in stretches.tolist()))]
+    delays = delays_s(content)
+    rows = [("in the data", *(hours(value) for value in content.state.budget.duration_s.tolist()))]
     for number, change in enumerate(content.changes):
         if content.calibration.watched[number]:
             rows.append((change.words, *(_after(value) for value in delays[:, number].tolist())))
@@ -82,13 +83,16 @@ def _after(delay_s: float) -> str:
 
 
 def budget_entries(content: MonitorContent) -> list[dict[str, object]]:
-    """The budget for a file, by kind of stretch; accelerations in m/s2 and rad/s2."""
+    """The budget for a file, by kind of stretch; accelerations in m/s2 and rad/s2.
+
+    Compared are stretches that are judged and those that are not for their weather.
+    """
     budget, delays = content.state.budget, delays_s(content)
     mean = budget.terms / np.maximum(budget.stretches, 1.0)[:, None, None]
     return [
         {
             "kind": name,
-            "judged_h": float(budget.stretches[kind] * content.calibration.stretch_s / HOUR),
+            "compared_h": float(budget.duration_s[kind] / HOUR),
             "mean_accelerations": {
                 change.effect: dict(zip(EQUATIONS, mean[kind, number].tolist(), strict=True))
                 for number, change in enumerate(content.changes)

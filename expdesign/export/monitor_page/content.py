@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.monitor_page.roll import roll_entry, roll_sentences
+from expdesign.export.words import HOUR, counted, hours, percent, times, told_apart, when
 from expdesign.monitoring import Alarm, Calibration, Call, Change, RollWatch, State, calls_of
 from expdesign.values import Array
 
@@ -20,8 +21,7 @@ SHOWN_CALLS = 5
 """Largest number of port calls that are listed, the latest."""
 CLEAR_LOAD = 2.0
 """Standard errors from which a change of the load is reported."""
-MUCH_LEFT_OUT = 0.05
-HOUR = 3600.0
+MUCH_LEFT_OUT, HALF = 0.05, 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,11 +89,6 @@ class MonitorContent:
         return calls_of(self.state, self.calibration)
 
 
-def hours(time_s: float) -> str:
-    """A time in words."""
-    return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
-
-
 def size_in_words(content: MonitorContent, alarm: Alarm) -> str:
     """The size of a change in words."""
     change = content.changes[alarm.change]
@@ -107,40 +102,67 @@ def sentences(content: MonitorContent) -> tuple[str, ...]:
 
 def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
-    judged_h = state.judged * content.calibration.stretch_s / HOUR
     rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
-    total = state.judged + state.left_out
-    if 2 * state.left_out > total:
-        yield (
-            f"Most of the data, {100 * state.left_out / total:.0f} %, differ from the reference in a way that no "
-            "change explains that is watched for. Whether it is the same ship is not known: try expdesign diagnose."
-        )
+    left_out = state.left_out_s / max(state.judged_s + state.left_out_s, 1e-300)
+    if left_out > HALF:
+        unlike = f"Most of the data, {percent(left_out)}, differ from the reference in a way that no change explains"
+        unknown = "" if found else " Whether it is the same ship is not known: try expdesign diagnose."
+        yield f"{unlike} that is watched for.{unknown}"
     elif not found:
-        largest = max((moment.statistic for moment in content.moments), default=0.0)
-        where = " in surge, sway and yaw" if content.roll is not None else ""
-        yield (
-            f"No alarm in {judged_h:.1f} h{where}: the ship is the one of the reference, {rate}. The largest "
-            f"statistic is {largest:.1f}, the threshold {content.limit:.1f}."
-        )
+        yield _no_alarm(content, rate)
     for alarm in found:
         yield _alarm(content, alarm)
     if found:
         yield f"Alarms are raised {rate}. For the cause, give the rows since the change to expdesign diagnose."
-    if MUCH_LEFT_OUT * total < state.left_out <= total / 2:
+    yield from _passed(content)
+    if MUCH_LEFT_OUT < left_out <= HALF:
         yield (
-            f"{100 * state.left_out / total:.0f} % of the data were not judged: their error is beyond what the "
-            "reference shows and looks like no change that is watched for. Weather, waves or a sensor may be others."
+            f"{percent(left_out)} of the data were not judged: their error is beyond what the reference shows and "
+            "looks like no change that is watched for. Weather, waves or a sensor may be others."
         )
     for call in content.calls[-SHOWN_CALLS:]:
         yield _call(content, call)
     if content.unread_rows:
-        yield f"{content.unread_rows} rows could not be read and were not judged: see the notes."
+        yield f"{counted(content.unread_rows, 'row')} could not be read and so not be judged: see the notes."
     yield from _baseline(content)
+
+
+def _no_alarm(content: MonitorContent, rate: str) -> str:
+    """What no alarm means: nothing yet where a sum is undecided, or where the data are too short for any change."""
+    state, watched = content.state, np.flatnonzero(content.calibration.watched).tolist()
+    largest = max((moment.statistic for moment in content.moments), default=0.0)
+    statistic, limit = told_apart(largest, content.limit)
+    no_alarm = f"No alarm in {hours(state.judged_s)}{' in surge, sway and yaw' * (content.roll is not None)}"
+    numbers = f"The largest statistic is {statistic}, the threshold {limit}."
+    if state.undecided_s:
+        return (
+            f"{no_alarm}, but the data end before it is known: a sum has been above the threshold of {limit} for "
+            f"{hours(state.undecided_s)}, too short to tell a change of the ship from weather."
+        )
+    soonest_s = min(delay_s(content, number) for number in watched)
+    if state.judged_s < soonest_s:
+        return (
+            f"{no_alarm}, which is too short to notice a change of a size that is watched for: the first would take "
+            f"{hours(soonest_s)}. {numbers}"
+        )
+    return f"{no_alarm}: the ship is the one of the reference, {rate}. {numbers}"
+
+
+def _passed(content: MonitorContent) -> Iterator[str]:
+    """How often a sum was above the threshold without an alarm."""
+    state = content.state
+    reasons = [
+        f"{times(state.brief)} by a sum that fell again before a change of the ship could be told from weather",
+        f"{times(state.by_weather)} by one that weather unlike the reference explains",
+    ]
+    told = [text for text, count in zip(reasons, (state.brief, state.by_weather), strict=True) if count]
+    if told:
+        yield f"The threshold was passed without an alarm: {', '.join(told)}."
 
 
 def _call(content: MonitorContent, call: Call) -> str:
     clear = np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE)
-    text = f"A port call until {hours(call.time_s)} took {hours(call.stay_s)}. "
+    text = f"A port call until {when(call.time_s)} took {hours(call.stay_s)}. "
     if not clear.any():
         return text + "The ship carries the same load afterwards, as far as the data show."
     parts = [
@@ -153,9 +175,10 @@ def _call(content: MonitorContent, call: Call) -> str:
 
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
+    statistic, limit = told_apart(alarm.statistic, content.limit)
     text = (
-        f"Since {hours(alarm.since_s)} the ship is another: {change.words} by {size_in_words(content, alarm)}. "
-        f"The alarm came at {hours(alarm.time_s)}, with the statistic {alarm.statistic:.1f}."
+        f"Since {when(alarm.since_s)} the ship is another: {change.words} by {size_in_words(content, alarm)}. "
+        f"The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
     )
     if alarm.as_likely:
         others = ", ".join(content.changes[number].words for number in alarm.as_likely)
@@ -194,11 +217,16 @@ def delay_s(content: MonitorContent, number: int) -> float:
     return float(np.ceil(2.0 * content.limit / rate)) * content.calibration.stretch_s if rate > 0 else float("inf")
 
 
-HEADER = ("change", "size watched for", "alarm after", "since the watch began", "not distinguishable from")
+def monitor_header(content: MonitorContent) -> tuple[str, ...]:
+    """Header of `monitor_tables`."""
+    since_s = float(content.state.whole.since_s[0])
+    anew = any(alarm.since_s < since_s for alarm in content.found)
+    since = f"since {when(since_s)}" if anew else "since the watch began"
+    return ("change", "size watched for", "alarm after", since, "not distinguishable from")
 
 
 def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
-    """A row for each change, under `HEADER`."""
+    """A row for each change, under `monitor_header`."""
     last = content.moments[-1] if content.moments else None
     rows: list[tuple[str, ...]] = []
     for number, change in enumerate(content.changes):
@@ -225,8 +253,8 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
         {
             "verdict": sentences(content),
             "vessel": content.vessel,
-            "judged_h": state.judged * content.calibration.stretch_s / HOUR,
-            "not_judged_h": state.left_out * content.calibration.stretch_s / HOUR,
+            "judged_h": state.judged_s / HOUR,
+            "not_judged_h": state.left_out_s / HOUR,
             "rows_without_numbers": content.left_out_rows,
             "rows_not_read": content.unread_rows,
             "threshold": content.limit,
@@ -250,6 +278,11 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
                 for number, change in enumerate(content.changes)
             ],
             "budget": budget,
+            "threshold_passed_without_alarm": {
+                "brief": state.brief,
+                "weather": state.by_weather,
+                "undecided_s": state.undecided_s,
+            },
             "history": [{"time_s": m.time_s, "statistic": m.statistic} for m in content.moments],
             "notes": content.notes,
             **roll_entry(content.roll, false_alarm_days=content.false_alarm_days),

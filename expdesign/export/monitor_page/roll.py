@@ -7,9 +7,9 @@ from typing import Any
 
 from expdesign.export.files import finite
 from expdesign.export.roll_words import change_words, stability_words
+from expdesign.export.words import HOUR, hours, when
 from expdesign.monitoring import RollEvent, RollWatch
 
-HOUR = 3600.0
 SHOWN = 5
 
 
@@ -25,19 +25,17 @@ def _sentences(watch: RollWatch, days: float) -> Iterator[str]:
         return
     if not watch.alarms:
         yield (
-            f"She rolls as in the reference, in {watch.judged_s / HOUR:.2g} h that were judged, with at most one false "
+            f"She rolls as in the reference, in {hours(watch.judged_s)} that were judged, with at most one false "
             f"alarm of any kind in {days:g} days on average."
         )
     yield from (_event(event) for event in watch.events[-SHOWN:])
     if watch.left_out_s > watch.judged_s:
-        yield f"{watch.left_out_s / HOUR:.2g} h give no information about roll; the last reason: {watch.reason}."
+        yield f"{hours(watch.left_out_s)} give no information about roll; the last reason: {watch.reason}."
 
 
 def _event(event: RollEvent) -> str:
-    when = f"between {event.since_s / HOUR:.2f} h and {event.time_s / HOUR:.2f} h"
     call = ", after a port call, which raises no alarm" if event.after_call else ""
-    call = ", after a port call, which raises no alarm" if event.after_call else ""
-    text = f"She rolls otherwise since a time {when}{call}: "
+    text = f"She rolls otherwise since a time between {when(event.since_s)} and {when(event.time_s)}{call}: "
     if not event.causes:
         return text + "no cause that is watched for explains it; expdesign roll estimates all."
     text += change_words(event.causes, event.sizes, event.stds, load=event.load, values=event.values) + ". "

@@ -39,6 +39,7 @@ from expdesign.export.report.progress import known_rows, known_sentences
 from expdesign.export.report.trust import chain
 from expdesign.plan.legs import through_water
 from expdesign.plan.values import DayLength, LatticeProof
+from expdesign.sea_area import UNKNOWN_DEPTH
 
 GLOSSARY: tuple[tuple[str, str], ...] = (
     ("Manoeuvre", "a primitive of the dictionary: a short motion with stated commands from a stated initial velocity"),
@@ -82,7 +83,6 @@ SUBTRACTION = {
 
 
 MORE_THAN_OPTIMAL = " It is more than 100 % because the legs between the runs inform, too."
-UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.export import words
 from expdesign.export.files import Known, Purchase
+from expdesign.export.tuning import TUNING
 from expdesign.sea_area import LocalFrame
 
 
@@ -102,7 +103,13 @@ def _gain(known: Known) -> str:
     first = np.isnan(known.so_far) & np.isfinite(known.after)
     names = [name for name, untold in zip(known.parameters, first, strict=True) if untold]
     more = f" The data so far cannot determine {', '.join(names)}; the rest can." if names else ""
+    grown = known.after > known.so_far * (1.0 + TUNING.noticed)
+    larger = [name for name, is_so in zip(known.parameters, grown, strict=True) if is_so]
+    worse = f" Larger {'is that' if len(larger) == 1 else 'are those'} of {', '.join(larger)}." if larger else ""
+    factor = max(ratio, 1 / ratio)
+    size = f"{words.significant(factor, 3)} times {'smaller' if ratio > 1 else 'larger'} than"
+    change = "as large as" if factor < 1.0 + TUNING.noticed else size
     return (
-        f"After the rest, the expected standard deviations are {words.significant(ratio, 2)} times smaller than from "
-        f"the data so far (geometric mean).{more}"
+        f"After the rest, the expected standard deviations are {change} from the data so far (geometric mean)."
+        f"{worse * (ratio > 1)}{more}"
     )

@@ -15,7 +15,7 @@ from expdesign.plan.values import Leg, Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
 
-REST_MPS, REST_RADPS = 0.02, 0.0005
+REST_MPS, REST_RADPS, AT_REST = 0.02, 0.0005, "at rest"
 NEARLY_ZERO = 1e-9
 """In SI; smaller settings are rounding errors."""
 
@@ -173,7 +173,7 @@ def motion(velocity: Array) -> str:
     """A velocity (3,) in words."""
     u, v, r = velocity.tolist()
     if np.hypot(u, v) < REST_MPS and abs(r) < REST_RADPS:
-        return "at rest"
+        return AT_REST
     parts = [f"{words.speed(abs(u))} {'ahead' if u >= 0 else 'astern'}"]
     if abs(v) >= REST_MPS:
         parts.append(f"{words.speed(abs(v))} to {'starboard' if v > 0 else 'port'}")
@@ -242,13 +242,8 @@ def minutes_sentence(day: ShortestDay) -> str:
     return (
         f"Of the {words.duration(length.planned_s)} the way to the goal takes {words.duration(parts.way_s)} at transit "
         f"speed, runs {words.duration(parts.runs_s)} beyond their distance made good, and the legs between them "
-        f"{_signed(parts.legs_s)}{more if extra_s > 0 else ''}."
+        f"{words.duration(parts.legs_s)}{more if extra_s > 0 else ''}."
     )
-
-
-def _signed(seconds: float) -> str:
-    """A time that may be less than nothing."""
-    return words.duration(seconds) if seconds >= 0 else f"{words.MINUS}{words.duration(-seconds)}"
 
 
 def found_sentence(day: ShortestDay) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.pages import page_template
+from expdesign.export.words import percent
 from expdesign.roll import (
     G_MPS2,
     MEANINGS,
@@ -28,6 +29,8 @@ PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
 SCALED_HEADER = ("parameter", "at full scale", "95 % interval", "unit")
 CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
 NORMAL = 1.96
+LEAST_CHANCE = 1e-4
+"""Smallest probability that is written out."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,8 +108,7 @@ def roll_sentences(content: RollContent) -> tuple[str, ...]:
 def _sentences(content: RollContent) -> Iterator[str]:
     estimate, report, body = content.estimate, content.report, content.estimate.problem.body
     if "m" in estimate.problem.free:
-        low, high = interval(content, "m")
-        yield f"The unknown load is {estimate.values['m']:.4g} kg, 95 % interval {low:.4g} to {high:.4g} kg."
+        yield _load(content)
     for case in estimate.problem.cases:
         right = stiffness(estimate.theta, body, case.load)
         hertz = roll_frequency(estimate.theta, body, case.load)
@@ -135,7 +137,7 @@ def _sentences(content: RollContent) -> Iterator[str]:
     if estimate.answering:
         yield (
             "The rudder seems to answer what rolls the ship: it follows the noise of roll, as one that answers nothing "
-            f"does by chance in {100 * estimate.unanswered:.1g} % of trials. Estimates then lean towards what the "
+            f"does by chance in {_chance(estimate.unanswered)} of trials. Estimates then lean towards what the "
             "helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
         )
     for name in estimate.reached:
@@ -147,6 +149,21 @@ def _sentences(content: RollContent) -> Iterator[str]:
         yield "Least squares is biased where waves or sensors disturb, and its intervals do not say so; use iv."
     if not estimate.trusted:
         yield "The 95 % intervals are not to be trusted, for what is said above; they may be far too short."
+
+
+def _load(content: RollContent) -> str:
+    """The unknown load, where the data tell it."""
+    estimate, (low, high) = content.estimate, interval(content, "m")
+    value = f"{estimate.values['m']:.4g} kg"
+    if "m" in estimate.held:
+        return f"The unknown load is not known: the load cases do not determine it, and {value} is its start value."
+    if "m" in estimate.reached:
+        return f"The unknown load is not known: its search ended at a bound, {value}."
+    known = f"95 % interval {low:.4g} to {high:.4g} kg"
+    only = f", for {' and '.join(estimate.held)} as held" if "m" in content.report.undetermined else ""
+    if not estimate.trusted:
+        return f"The unknown load is not known: the estimate of {value} with the {known}{only} is not to be trusted."
+    return f"The unknown load is {value}, {known}{only}."
 
 
 def _open(content: RollContent) -> Iterator[str]:
@@ -162,12 +179,16 @@ def _open(content: RollContent) -> Iterator[str]:
         yield f"The data would be the same if these changed together: {one}. So none of them is known by itself."
 
 
+def _chance(p_value: float) -> str:
+    return percent(p_value) if p_value >= LEAST_CHANCE else f"less than {percent(LEAST_CHANCE)}"
+
+
 def _filtered(content: RollContent) -> str:
     used = content.filter
     if len(used.taps) == 1:
         return f"No filter; {used.samples_per_period:.0f} samples in a period of roll."
     return (
-        f"The low-pass filter has a bandwidth of {used.bandwidth_hz:.3g} Hz and passes {100 * used.passed:.1f} % of "
+        f"The low-pass filter has a bandwidth of {used.bandwidth_hz:.3g} Hz and passes {percent(used.passed)} of "
         f"roll at {used.roll_hz:.3g} Hz; {used.samples_per_period:.0f} samples in its period."
     )
 

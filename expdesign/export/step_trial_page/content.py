@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import finite, strict_json
+from expdesign.export.words import counted
 from expdesign.step_trials import CHANNELS, NO_BEND, TUNING, StepSample, StepTrial, Surface
 from expdesign.step_trials.live import StepList
 from expdesign.values import Array
@@ -99,10 +100,11 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
     trial = content.trial
     asked = sum(one.hold.channel is not None for one in trial.samples)
     steady = sum(one.plateau is not None for one in trial.samples)
+    turned = ", negative for turns to starboard; the model counts it the other way" * (trial.rudder_sign < 0)
     yield (
-        f"{len(trial.counted)} of {asked} steps give an inertia; {steady} of {len(trial.holds)} holds were steady and "
-        f"give a damping. Throttle is {trial.controls.words[0]}, rudder {trial.controls.words[1]}"
-        f"{', negative for turns to starboard; the model counts it the other way' if trial.rudder_sign < 0 else ''}."
+        f"{len(trial.counted)} of {counted(asked, 'step')} give an inertia; {steady} of "
+        f"{counted(len(trial.holds), 'hold')} were steady and give a damping. Throttle is {trial.controls.words[0]}, "
+        f"rudder {trial.controls.words[1]}{turned}."
     )
     delays = [
         f"{name} {value:.2f} \N{PLUS-MINUS SIGN} {std:.2f} s"
@@ -115,7 +117,7 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
         fits = [
             f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.tests
         ]
-        yield f"It fits {'; '.join(fits)}, which was held out."
+        yield f"It fits {'; '.join(fits)}, which {'was' if len(fits) == 1 else 'were'} held out."
     if again := to_repeat(content):
         numbers = ", ".join(str(one.hold.number) for one in again)
         yield f"Repeat {'step' if len(again) == 1 else 'steps'} {numbers}; the reasons are below."
@@ -125,8 +127,8 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
     outside = [one for one in trial.samples if one.plateau is not None and not one.plateau.turns]
     if len(outside) > steady / 2:
         yield (
-            f"{len(outside)} of {steady} steady holds lasted less than a whole turn: a current would be in their "
-            "speeds. In a current hold each step for a whole turn."
+            f"{len(outside)} of {counted(steady, 'steady hold')} lasted less than a whole turn: a current would be in "
+            "their speeds. In a current hold each step for a whole turn."
         )
 
 

@@ -147,12 +147,10 @@ def _steps_json(listed: Sequence[Listed], steps: StepList) -> list[dict[str, obj
 def live_sentences(content: LiveContent) -> list[str]:
     """The findings."""
     state, count = content.state, len(content.steps.steps)
-    found = [f"{len(state.finished)} of {count} steps count."]
+    found = [f"Steps that count: {len(state.finished)} of {count}."]
     if state.left:
         unsailed = sum(not step.attempts for step in state.left)
-        found.append(
-            f"{len(state.left)} are to be sailed: {unsailed} were not begun, {len(state.left) - unsailed} were bad."
-        )
+        found.append(f"{len(state.left)} to be sailed: {unsailed} not begun, {len(state.left) - unsailed} to repeat.")
     if state.left_out:
         found.append(
             "Left out after repeated failures: " + ", ".join(str(step.number) for step in state.left_out) + "."

@@ -9,13 +9,15 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.estimation.methods import method_named
+from expdesign.estimation.methods import METHODS, method_named
 from expdesign.export.files import finite, strict_json
 from expdesign.export.tuning import TUNING
+from expdesign.export.words import significant
 from expdesign.rehearsal import Rehearsal, Validated
+from expdesign.values import Array
 
 CHANCE = 0.01
-"""Probability that a bias is reported where there is none."""
+"""Probability that a bias, or a wrong standard deviation, is reported where there is none."""
 ERROR_LIMIT = 1.5
 """Normalised error below which the thesis calls a trial good."""
 
@@ -46,23 +48,42 @@ def chance(result: Validated) -> float:
     return float(1.0 / np.sqrt(2.0 * len(result.estimates)))
 
 
+def sampling_error(result: Validated) -> tuple[float, float]:
+    """Least and largest ratio of observed to true standard deviations by chance, at the level of `CHANCE` for all."""
+    freedom, tail = len(result.estimates) - 1, _tail(result.theory)
+    least, most = (float(np.sqrt(scipy.special.chdtri(freedom, share) / freedom)) for share in (1.0 - tail, tail))
+    return least, most
+
+
 def off_theory(result: Validated) -> list[str]:
-    """Parameters whose observed and predicted standard deviations differ significantly; none without a prediction."""
-    allowed = TUNING.agreeing_std + 2.0 * chance(result)
-    return _named(result, np.abs(result.found / result.theory - 1.0) > allowed)
+    """Parameters whose observed and predicted standard deviations differ by more than agreement and chance allow.
+
+    None without a prediction.
+    """
+    (least, most), ratio = sampling_error(result), result.found / result.theory
+    agreeing = TUNING.agreeing_std
+    return _named(result, (ratio > (1.0 + agreeing) * most) | (ratio < (1.0 - agreeing) * least))
 
 
 def biased(result: Validated) -> list[str]:
-    """Parameters with a significant bias relative to their standard deviation."""
-    allowed = TUNING.biased + 2.0 / np.sqrt(len(result.estimates))
-    return _named(result, np.abs(result.bias) > allowed * result.found)
+    """Parameters whose bias surely is more than a share of their standard deviation."""
+    standard_error = result.found / np.sqrt(len(result.estimates))
+    return _named(result, np.abs(result.bias) > TUNING.biased * result.found + _limit(result) * standard_error)
 
 
 def surely_biased(result: Validated) -> list[str]:
     """Parameters whose bias is more than chance: 1 % for all parameters of a design together, by Bonferroni."""
-    known = np.isfinite(result.truth)
-    limit = -float(scipy.special.ndtri(CHANCE / (2 * max(1, int(known.sum())))))
-    return _named(result, known & (result.bias_deviations > limit))
+    return _named(result, result.bias_deviations > _limit(result))
+
+
+def _limit(result: Validated) -> float:
+    """Standard errors of a mean that chance exceeds seldom, for all parameters together."""
+    return -float(scipy.special.stdtrit(len(result.estimates) - 1, _tail(result.truth)))
+
+
+def _tail(values: Array) -> float:
+    """Probability of one tail for each of the known values."""
+    return CHANCE / (2 * max(1, int(np.isfinite(values).sum())))
 
 
 def _named(result: Validated, chosen: NDArray[np.bool_]) -> list[str]:
@@ -93,10 +114,12 @@ def _judged(result: Validated) -> Iterator[str]:
         yield f"{result.design.capitalize()}: {result.failed} of {trials} trials gave no estimate."
     off, shifted = off_theory(result), biased(result)
     if np.isfinite(result.theory).all() and not off:
+        least, most = sampling_error(result)
         yield (
             f"{result.design.capitalize()}: every observed standard deviation is within "
             f"{100 * TUNING.agreeing_std:g} % of the predicted one, apart from a sampling error of "
-            f"{200 * chance(result):.0f} %."
+            f"{significant(100 * (least - 1), 2)} to +{significant(100 * (most - 1), 2)} % "
+            f"({100 * CHANCE:g} % for all parameters together)."
         )
     if off:
         yield f"{result.design.capitalize()}: predicted and observed standard deviations differ for {', '.join(off)}."
@@ -151,12 +174,17 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     wind = weather.wind_to.any() or weather.wind_std_mps > 0
     solver, _, allows = method.partition("-")
     if (current or wind) and not allows:
+        steady = f", {solver}-current for a steady current" if current and _there(solver, "current") else ""
         yield (
-            f"no current and wind. Method {method} removes only a constant; --method {solver}-air, {solver}-wind or "
-            f"{solver}-augmented accounts for weather" + (", iv-current for a steady current." if current else ".")
+            f"no current and wind. Method {method} removes only a constant; "
+            f"--method {_there(solver, 'air', 'wind', 'augmented')} accounts for weather{steady}."
         )
     if current and allows == "air":
-        yield f"no current. Method {method} accounts for measured wind only; {solver}-wind also for current."
+        also = _there(solver, "wind", "air-current")
+        yield f"no current. Method {method} accounts for measured wind only; {also} also for current."
+    if wind and allows == "current":
+        also = _there(solver, "air-current")
+        yield f"no wind. Method {method} accounts for a steady current only; {also} also for measured wind."
     if (current and allows == "no-current") or (wind and allows == "no-wind"):
         yield f"{allows.replace('-', ' ')}. Method {method} leaves it out; {solver}-augmented accounts for both."
     known = {"wind": "the current", "no-wind": "the current", "no-current": "the wind", "augmented": "current and wind"}
@@ -171,6 +199,13 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
     drawn = weather.current_std_mps > 0 and not method_named(method).estimates_steady_current
     if drawn or weather.wind_std_mps > 0:
         yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
+
+
+def _there(solver: str, *allows: str) -> str:
+    """The methods of a solver that there are among those that account for some weather: "a, b or c"; "" for none."""
+    known = {method.name for method in METHODS}
+    *first, last = [name for name in (f"{solver}-{item}" for item in allows) if name in known] or [""]
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def validation_json(content: ValidationContent) -> str:

@@ -9,10 +9,14 @@ import numpy as np
 
 from expdesign.export.files import strict_json
 from expdesign.export.tuning import TUNING
+from expdesign.export.words import percent, significant
 from expdesign.values import Array
 
 DAY = ("day_s", "day_median_s", "day_95_s")
 """Keys of a plan's length from start to goal, as planned and in simulated trials."""
+
+SAME_S = 3.0
+"""Difference of days that is zero in tenths of a minute [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,24 +164,30 @@ def _accuracy(first: Case, case: Case, against: Against) -> str:
     if abs(against.accuracy - 1) < TUNING.noticed:
         return f"In {minutes:.1f} min its runs collect the information {theirs}."
     return (
-        f"In {minutes:.1f} min its runs collect {against.accuracy:.2f} times the information {theirs}. "
-        f"The same accuracy takes {against.same_accuracy_s / 60:.1f} min."
+        f"In {minutes:.1f} min its runs collect {_ratio(against.accuracy)} times the information {theirs}. "
+        f"The same accuracy takes {_minutes(against.same_accuracy_s)} min."
     )
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds / 60:.1f}" if seconds >= SAME_S else significant(seconds / 60, 1)
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.2f}" if value >= 0.1 else significant(value, 2)
 
 
 def _parameters(against: Against) -> Iterator[str]:
     ratios = np.array(against.ratios)
     if np.abs(ratios - 1).max() < TUNING.noticed:
-        yield "No standard deviation changes by more than 2 %."
+        yield f"No standard deviation changes by {percent(TUNING.noticed)} or more."
         return
     best, worst = int(ratios.argmin()), int(ratios.argmax())
     if ratios.max() / ratios.min() < 1 + 2 * TUNING.noticed:
-        yield f"All standard deviations are about {np.median(ratios):.2f} times those of the scenario."
+        yield f"All standard deviations are about {_ratio(float(np.median(ratios)))} times those of the scenario."
         return
-    yield (
-        f"Standard deviations are between {ratios.min():.2f} ({against.common[best]}) and {ratios.max():.2f} "
-        f"({against.common[worst]}) times those of the scenario."
-    )
+    least, most = (f"{_ratio(float(ratios[place]))} ({against.common[place]})" for place in (best, worst))
+    yield f"Standard deviations are between {least} and {most} times those of the scenario."
 
 
 def _runs(first: Case, case: Case) -> Iterator[str]:
@@ -193,12 +203,11 @@ def _plan(first: Case, case: Case, against: Against) -> Iterator[str]:
     key = "day_s"
     if key in first.plan and key in case.plan:
         difference = float(str(case.plan[key])) - float(str(first.plan[key]))
-        yield (
-            f"The whole day, repositioning included, takes {abs(difference) / 60:.1f} min "
-            f"{'more' if difference > 0 else 'less'}."
-        )
+        change = f"{abs(difference) / 60:.1f} min {'more' if difference > 0 else 'less'}"
+        takes = "as long as" if abs(difference) < SAME_S else f"{change} than"
+        yield f"The whole day, repositioning included, takes {takes} the scenario's."
     if against.track is not None:
-        yield f"Legs included, the day has {against.track:.2f} times the information of the scenario's day."
+        yield f"Legs included, the day has {_ratio(against.track)} times the information of the scenario's day."
 
 
 def whatif_json(content: WhatIfContent) -> str:

@@ -116,6 +116,7 @@ def yaw_grams(
     step_s = record.batches[0].sample_time_s
     return Grams(
         time_s=(np.asarray(begins_s)[batch.astype(int)] + first * step_s)[calm],
+        duration_s=np.full(len(columns), k * data.sample_time_s),
         products=products,
         counts=counts,
         budget=_budget(ship, data)[calm],

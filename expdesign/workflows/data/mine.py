@@ -117,6 +117,11 @@ def mine(
     return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),))
 
 
+SYMMETRIC = "symmetric part of the information"
+MAGNITUDE = "magnitude of the determinant: with this nominal model the symmetric part is not definite"
+MAY_FALL = "that of more batches may be less, and that of some more than 100 %: it is the magnitude of a determinant"
+
+
 def _stated(piece_s: float | None) -> float:
     if piece_s is None:
         raise InputError("--labels needs --piece, the length of a piece in seconds")
@@ -218,9 +223,7 @@ def _content(
         "efficiency": subset.efficiency,
         "efficiency_bound": subset.bound if np.isfinite(subset.bound) else None,
         "all_subsets_tried": subset.exact,
-        "counts": "symmetric part of the information"
-        if subset.symmetric
-        else "magnitude of the determinant: with this nominal model the symmetric part is not definite",
+        "counts": SYMMETRIC if subset.symmetric else MAGNITUDE,
         "batches": [
             {
                 "rank": rank,
@@ -239,7 +242,9 @@ def _content(
 
 def _summary(content: Mapping[str, object]) -> dict[str, object]:
     shown = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
-    return {name: content[name] for name in shown}
+    # without a symmetric part that is definite, more data may hold less
+    note = {} if content["counts"] == SYMMETRIC else {"note_on_information": MAY_FALL}
+    return {**{name: content[name] for name in shown}, **note}
 
 
 def _table(subset: Subset, batches: Sequence[BatchInformation]) -> TextTable:

@@ -19,12 +19,13 @@ from expdesign.export.monitor_page import (
     Moment,
     MonitorContent,
     budget_entries,
+    monitor_header,
     monitor_html,
     monitor_json,
     monitor_tables,
     sentences,
 )
-from expdesign.export.monitor_page.content import HEADER
+from expdesign.export.words import counted
 from expdesign.monitoring import (
     TUNING,
     RollWatch,
@@ -171,7 +172,7 @@ def monitor(
         "--model": model, "--out": out, "--resume": resume,
     }  # fmt: skip
     command = command_text("monitor", data, options, usual=USUAL)
-    now = _resumed(folder / STATE) if resume else _with_reference(Watch(), reference, asked, progress)
+    now = _resumed(folder / STATE, asked) if resume else _with_reference(Watch(), reference, asked, progress)
     work = _Work(asked=asked, folder=folder, command=command)
     for number, source in enumerate(data):
         rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
@@ -185,7 +186,7 @@ def monitor(
     if isinstance(now.phase, Ready):
         raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
     content = _content(now.phase, now, asked, command)
-    written = write_files(folder, _files(content, now))
+    written = write_files(folder, _files(content, now, asked))
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
@@ -211,8 +212,10 @@ def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: b
     for piece, read in ahead(prepared, (asked,), tasks):
         now = with_piece(now, piece, read, asked)
         done += len(piece.text)
-        alarms = len(now.phase.alarms) if isinstance(now.phase, Watching) else 0
-        progress(f"watching {source.name}, {alarms} alarms", min(done / size_bytes if size_bytes else 0.0, 0.99))
+        alarms = sum(not one.settled for one in now.phase.alarms) if isinstance(now.phase, Watching) else 0
+        progress(
+            f"watching {source.name}, {counted(alarms, 'alarm')}", min(done / size_bytes if size_bytes else 0.0, 0.99)
+        )
         if not piece.again and (alarms, time.monotonic()) >= due:
             _save(now, source, work)
             due = (alarms, time.monotonic() + WRITTEN_EVERY_S)
@@ -222,9 +225,9 @@ def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: b
 def _save(now: Watch, source: Path, work: _Work) -> None:
     """Results so far; of a stream that is learnt from, the rows, as they cannot be read again."""
     if isinstance(now.phase, Watching):
-        write_files(work.folder, _files(_content(now.phase, now, work.asked, work.command), now))
+        write_files(work.folder, _files(_content(now.phase, now, work.asked, work.command), now, work.asked))
     elif isinstance(now.phase, Ready) or source == STREAM:
-        write_files(work.folder, {STATE: _state(now)})
+        write_files(work.folder, {STATE: _state(now, work.asked)})
 
 
 def _check(
@@ -283,47 +286,57 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
     )
 
 
-def _files(content: MonitorContent, now: Watch) -> dict[str, Content]:
+def _files(content: MonitorContent, now: Watch, asked: Asked) -> dict[str, Content]:
     assert isinstance(now.phase, Watching)
     files: dict[str, Content] = {
         "monitor.html": partial(monitor_html, content),
         "monitor.json": monitor_json(content, budget_entries(content)),
-        STATE: _state(now),
+        STATE: _state(now, asked),
     }
     if now.phase.changed:
         files["since-change.csv"] = "".join(now.phase.changed)
     return files
 
 
-def _state(now: Watch) -> str:
+def _kept(asked: Asked) -> dict[str, float]:
+    """Options that a watch keeps: its statistics were compared with the threshold that follows from them."""
+    return {"--false-alarm-days": asked.false_alarm_days, "--size": asked.size}
+
+
+def _state(now: Watch, asked: Asked) -> str:
     """The watch as a file; one that learns goes on from its rows, as if they had not been read."""
     if isinstance(now.phase, Learning):
         lines = (*now.phase.lines, *now.reading.pending[bool(now.phase.lines) :])
         reading = replace(now.reading, pending=lines, now_s=-np.inf, offset_s=0.0)
         now = replace(now, phase=Learning(), reading=reading, roll=RollWatch())
-    return json.dumps({**saved(now), "version": __version__})
+    return json.dumps({**saved(now), "version": __version__, "options": _kept(asked)})
 
 
-def _resumed(path: Path) -> Watch:
+def _resumed(path: Path, asked: Asked) -> Watch:
     """A watch from its file.
 
     Raises:
         FileError: there is none, or it is of another kind or version.
+        InputError: it was begun with other options.
     """
     try:
         table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         if table["version"] != __version__:
             raise ValueError("of another version")
-        return restored_watch(table)
+        now, begun = restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
     except FileNotFoundError:
         raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
     except (KeyError, TypeError, ValueError, AttributeError):
         raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
+    for name, value in _kept(asked).items():
+        if begun[name] != value:
+            raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")
+    return now
 
 
 def _summary(content: MonitorContent) -> dict[str, object]:
     return {
-        "judged_h": content.state.judged * content.calibration.stretch_s / HOUR,
+        "judged_h": content.state.judged_s / HOUR,
         "alarms": len(content.found) + (0 if content.roll is None else len(content.roll.alarms)),
         "remarks": list(sentences(content)),
     }
@@ -333,5 +346,7 @@ def _tables(content: MonitorContent) -> tuple[TextTable, ...]:
     verdict = tuple((sentence,) for sentence in sentences(content))
     return (
         TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=verdict),
-        TextTable(title="Changes that are watched for", header=HEADER, rows=tuple(monitor_tables(content))),
+        TextTable(
+            title="Changes that are watched for", header=monitor_header(content), rows=tuple(monitor_tables(content))
+        ),
     )

@@ -260,7 +260,7 @@ def calibrated(now: Watch) -> Watch:
             "well enough to watch for it: take a longer one, or one with more manoeuvres, or watch for larger "
             f"changes, {larger:.2g} times as large at least (--size), for {now.changes[best].words}"
         )
-    end_s = max((float(part.time_s[-1]) for part in learnt if len(part)), default=0.0) + calibration.stretch_s
+    end_s = max((float(part.time_s[-1] + part.duration_s[-1]) for part in learnt if len(part)), default=0.0)
     return replace(now, phase=Ready(calibration=calibration, reference_s=end_s))
 
 
@@ -309,8 +309,8 @@ def _hour(on: Watching, grams: Grams, rules: Rules) -> tuple[Watching, list[Alar
     """Watch the stretches of one moment of the page; returns the alarms raised and the number of stretches used."""
     state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules)
     value, std = estimates(state, on.calibration)
-    statistic = max((step.statistic for step in steps), default=0.0)
-    moment = Moment(time_s=state.judged_s, statistic=statistic, value=value, std=std)
+    statistic = max((step.statistic for step in steps if step.compared), default=0.0)
+    moment = Moment(time_s=state.until_s, statistic=statistic, value=value, std=std)
     on = replace(on, state=state, alarms=(*on.alarms, *alarms), moments=(*on.moments, moment))
     return on, [alarm for alarm in alarms if not alarm.settled], used
 

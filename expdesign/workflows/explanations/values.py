@@ -12,7 +12,7 @@ class Explained:
     Attributes:
         name: as it is written; keys are dotted.
         meaning: what it is, with its unit.
-        default: what stands in for it; "required", or "".
+        default: what stands in for it; "required", "optional", or "".
         allowed: the values it may have, or "".
     """
 

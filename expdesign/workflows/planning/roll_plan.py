@@ -113,7 +113,7 @@ def roll_plan(
         placing = within(limited, 0.3, 1.0)
         placed = _placed(case, information, content, seed, placing) if place else ()
     names = {_runs_name(number): repeats_json(content, number) for number in range(len(plan.repeats))}
-    files = {
+    files: dict[str, Content] = {
         "roll-plan.json": load_plan_json(content), "roll-plan.html": partial(load_plan_html, content),
         "loads.toml": loads_toml(content), **names,
     }  # fmt: skip

@@ -24,6 +24,7 @@ from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
+from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.signals import AUXILIARY
 from expdesign.vessel import NOT_SUPPORTED
 
@@ -119,6 +120,7 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
+        **({} if plan.area.depths else {"note_on_depths": UNKNOWN_DEPTH}),
         **({"chart_remarks": list(plan.area.notes)} if plan.area.notes else {}),
     }
 

@@ -12,6 +12,7 @@ from expdesign.conventions import OUTPUTS, to_n_frame
 from expdesign.dictionary import build_primitive
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.errors import Diverged, FileError, InputError, NoAnswer, UnknownName, Unreachable
+from expdesign.export.words import place
 from expdesign.information import estimated_parameters
 from expdesign.plan.values import UnderWay
 from expdesign.progress import Progress, silent
@@ -137,8 +138,7 @@ def present_pose(fix: Fix, ship: Vessel, first: Scenario) -> Array:
     problem = berth_problem(pose, ship, area, first.plan.clearance_m, degrees=fix.degrees)
     if problem:
         lat, lon = area.frame.to_degrees(pose[:2])
-        place = f"{pose[0]:.1f} m north, {pose[1]:.1f} m east"
-        where = f"{lat:.6f}, {lon:.6f}" if np.isfinite([lat, lon]).all() else place
+        where = f"{lat:.6f}, {lon:.6f}" if np.isfinite([lat, lon]).all() else place(pose)
         raise FileError(fix.path, f"row {fix.row}", f"the ship's last position ({where}) {problem}")
     return pose
 

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import FileError, InputError
+from expdesign.export import Content
 from expdesign.export.foresight_page import (
     HEADER,
     OPERATION_HEADER,
     ForesightContent,
     OperationContent,
+    conclusions,
     foresight_html,
     foresight_json,
     foresight_rows,
@@ -92,7 +94,10 @@ def foresee(
         version=__version__,
     )
     progress("writing the page", 0.95)
-    files = {"foresee.json": foresight_json(content), "foresee.html": partial(foresight_html, content)}
+    files: dict[str, Content] = {
+        "foresee.json": foresight_json(content),
+        "foresee.html": partial(foresight_html, content),
+    }
     return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
 
 
@@ -112,7 +117,10 @@ def _operation(
         command=command_text("foresee", [scenario], {"--operation": voyages, "--seed": seed}),
         version=__version__,
     )
-    files = {"operation.json": operation_json(content), "operation.html": partial(operation_html, content)}
+    files: dict[str, Content] = {
+        "operation.json": operation_json(content),
+        "operation.html": partial(operation_html, content),
+    }
     summary = {"voyages_without_change": found.nominal, "false_alarms": found.false_alarms}
     sentences = tuple((text,) for text in operation_sentences(found))
     tables = (
@@ -152,6 +160,7 @@ def foresight_summary(content: ForesightContent) -> dict[str, object]:
         "causes_tested": len(found.weakest),
         "causes_missed": list(found.missed),
         "causes_not_seen": [cause for cause, _ in found.unseen],
+        "remarks": list(conclusions(found)),
         "not_told_apart": [f"{item.cause} ({item.name}) from {other.cause}" for item, other in found.not_told_apart],
     }
 

@@ -16,6 +16,8 @@ from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
 from expdesign.export.files import Known, replan_json
+from expdesign.export.report.tables import AT_REST, motion
+from expdesign.export.words import place
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
@@ -210,7 +212,7 @@ def _summary(known: Known) -> dict[str, object]:
         "weather": known.weather,
         "current_to_north_mps": float(known.environment.current_to[0]),
         "current_to_east_mps": float(known.environment.current_to[1]),
-        "start": f"{known.pose[0]:.1f} m north, {known.pose[1]:.1f} m east, {_motion(known)}",
+        "start": f"{place(known.pose)}, {_motion(known)}",
         "new_parameters": list(known.new),
         "notes": [*left, *known.notes],
     }
@@ -219,8 +221,8 @@ def _summary(known: Known) -> dict[str, object]:
 def _motion(known: Known) -> str:
     if known.under_way is None:
         return "assumed to be stopped"
-    u, v, r = known.under_way.velocity.tolist()
-    return f"under way at {u:.2f} m/s ahead, {v:.2f} m/s to starboard, {r:.4f} rad/s"
+    moves = motion(known.under_way.velocity)
+    return "at rest over ground" if moves == AT_REST else f"under way at {moves}"
 
 
 def _table(known: Known) -> TextTable:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import InputError, UnknownName
-from expdesign.export import vessel_toml, write_files
+from expdesign.export import Content, vessel_toml, write_files
 from expdesign.export.roll_page import (
     CURE_HEADER,
     PARAMETER_HEADER,
@@ -110,7 +110,7 @@ def roll(
         scale=scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
-    files = {"roll.json": roll_json(content), "roll.html": partial(roll_html, content)}
+    files: dict[str, Content] = {"roll.json": roll_json(content), "roll.html": partial(roll_html, content)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)

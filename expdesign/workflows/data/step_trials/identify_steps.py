@@ -177,7 +177,7 @@ def _summary(content: StepTrialContent) -> dict[str, object]:
         "fit": {
             part.name: {"U": part.fit_percent[0], "r": part.fit_percent[1]} for part in (*content.own, *content.tests)
         },
-        "remarks": list(sentences(content)),
+        "remarks": [*sentences(content), *content.notes],
     }
 
 

@@ -288,7 +288,7 @@ def _summary(content: LiveContent) -> dict[str, object]:
         "steps_that_count": len(state.finished),
         "steps_to_do": [step.number for step in state.left],
         "steps_left_out": [step.number for step in state.left_out],
-        "remarks": live_sentences(content),
+        "remarks": [*live_sentences(content), *content.notes],
     }
 
 
