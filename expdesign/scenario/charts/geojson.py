@@ -114,6 +114,19 @@ def polygon_rings(geometry: object, entry: Entry) -> list[list[Any]]:
     return polygons
 
 
+def positions_in(geometry: Mapping[str, Any]) -> Iterator[list[float]]:
+    """[longitude, latitude] of every corner of a geometry that was checked."""
+    for part in geometry.get("geometries", []):
+        yield from positions_in(part)
+    parts = [geometry.get("coordinates", [])]
+    while parts:
+        part = parts.pop()
+        if part and not isinstance(part[0], list):
+            yield part[:2]
+        else:
+            parts += part
+
+
 def _read_json(path: Path) -> object:
     entry = Entry(path)
     _check_format(path, entry)

@@ -19,9 +19,17 @@ from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
 from expdesign.scenario.charts.chart import Chart, read_layers
 from expdesign.scenario.charts.dangers import ChartedObject, ShipRules, closed_water
-from expdesign.scenario.charts.geojson import UNNAMED, Feature, read_features
+from expdesign.scenario.charts.geojson import UNNAMED, Feature, positions_in, read_features
 from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
-from expdesign.scenario.charts.metres import Box, around, in_metres
+from expdesign.scenario.charts.metres import (
+    Box,
+    around,
+    beside,
+    far_outside,
+    in_metres,
+    off_km,
+    swapped_inside,
+)
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, shown
 from expdesign.sea_area import LocalFrame
@@ -41,6 +49,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
         unused = [area for area, before in zip(areas, charted, strict=True) if not kind_of(before, table)]
         chart = _read_chart(table, features, areas, depths, given, entry)
         objects = dangers(features, table, (chart.extent[0] + chart.extent[2]) / 2)
+    used = _used_layers(table, depths)
     signs = _sign_of_depths(depths, objects, path, table, entry)
     rules = ShipRules(
         needed_m=rule_text(file.depth, draught_m)[0],
@@ -49,6 +58,8 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
     )
 
     def zones(box: Box, frame: LocalFrame) -> ChartZones:
+        with _or_skipped(path, table, entry):
+            _check_order([item for item in features if item.layer in used or kind_of(item, table)], box)
         deep, rule = _deep_water(file, depths, draught_m, entry)
         found = closed_water(objects, rules, around(box), frame)
         return ChartZones(
@@ -70,7 +81,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
                         *chart.notes,
                         *found.notes,
                         *taken_for(features, table),
-                        *not_used(unused, _used_layers(table, depths)),
+                        *not_used(unused, used),
                     )
                 ),
                 *_beyond_chart(box, chart, table, deep),
@@ -92,6 +103,18 @@ def _or_skipped(path: Path, table: ChartTable, entry: Entry) -> Iterator[None]:
         numbers = ", ".join(map(repr, (*table.skip_features, int(found[1]))))
         way_out = f"or skip_features = [{numbers}] below [chart] of {entry.path.name}, which leaves it out"
         raise FileError(path, error.key, f"{error.problem}; {way_out}") from None
+
+
+def _check_order(features: Sequence[Feature], box: Box) -> None:
+    """Refuse a feature far outside the bounds that lies in them with longitude and latitude swapped."""
+    first = beside(np.array([next(positions_in(feature.geometry)) for feature in features]), box)
+    for index in np.flatnonzero(far_outside(first, box)).tolist():
+        feature = features[index]
+        if swapped_inside(np.array(list(positions_in(feature.geometry))), box).any():
+            raise feature.entry.error(
+                f"lies {off_km(shapely.Point(first[index]), box):.4g} km outside the bounds, expected [longitude, "
+                "latitude]: with the two swapped it lies in them"
+            )
 
 
 def _is_charted(feature: Feature, table: ChartTable) -> bool:
