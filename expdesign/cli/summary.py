@@ -30,7 +30,7 @@ def print_summary(outcome: Outcome) -> None:
     """Key numbers as a table, then the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    shown = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
+    shown = {key: value for key, value in outcome.summary.items() if not outcome.tables or _shown(key, value)}
     for row in _rows(shown):
         table.add_row(*row)
     if table.row_count:
@@ -44,9 +44,10 @@ def print_summary(outcome: Outcome) -> None:
         console.print(f"Open {page} in a browser.")
 
 
-def _brief(value: object) -> bool:
-    """Whether a value gets a line beside tables."""
-    return not isinstance(value, Mapping) and value != [] and len(_text(value)) < LONGEST
+def _shown(key: str, value: object) -> bool:
+    """Whether a value gets a line beside tables: what a user must hear does, however long."""
+    heard = key.startswith("note") or key.endswith(("notes", "remarks"))
+    return not isinstance(value, Mapping) and value != [] and (heard or len(_text(value)) < LONGEST)
 
 
 def _print_table(console: Console, text: TextTable) -> None:

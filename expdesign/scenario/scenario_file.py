@@ -86,6 +86,13 @@ class PlanTable(Table):
         description="the least share of simulated trials that stay in allowed water, with randomly drawn ships, "
         "currents and winds",
     )
+    aborted_most: float = Field(
+        default=PlanSettings.aborted_most,
+        ge=0,
+        le=0.5,
+        description="the share of these trials that may be aborted because a run cannot be begun or the goal is not "
+        "reached; a plan with more of them is written, but not called verified, and none is from half of them on",
+    )
     time_budget_s: Positive = Field(
         default=PlanSettings.time_budget_s,
         description="the work budget for other placements [s] on a usual computer; work is counted, not timed, so that "
