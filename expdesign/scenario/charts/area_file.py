@@ -10,7 +10,7 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
-from expdesign.scenario.charts.metres import KM_PER_DEGREE, Box, beside, far_outside, in_metres, off_km, swapped_inside
+from expdesign.scenario.charts.metres import KM_PER_DEGREE, Box, beside, far_outside, in_metres, off_km, swapped_meets
 from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import OpenChart
 from expdesign.scenario.tables import Entry, check_table, read_toml, shown
@@ -124,7 +124,7 @@ def _no_go(
         place = entry.item(index).at("polygon")
         for number, (lat, lon) in enumerate(zone.polygon, start=1):
             if not (abs(lat) <= 90 and -180 <= lon <= 360):
-                swapped = LAT_LON_SWAPPED if swapped_inside(np.array([[lon, lat]]), box).all() else ""
+                swapped = LAT_LON_SWAPPED if swapped_meets(np.array([[lon, lat]]), box) else ""
                 raise place.item(number).error(
                     f"is [{lat:g}, {lon:g}], expected [latitude, longitude] in degrees{swapped}"
                 )
@@ -147,10 +147,12 @@ def _check_near(corners: Array, name: str, box: Box, place: Entry) -> None:
     A zone outside the bounds may well be meant, but closes nothing.
     """
     off = off_km(shapely.MultiPoint(corners).convex_hull, box)
-    swapped = shapely.MultiPoint(beside(corners[:, ::-1], box)).convex_hull.intersects(shapely.box(*box))
+    swapped = swapped_meets(corners, box)
     if off > 0 and (swapped or off > TUNING.largest_extent_km):
         expected = LAT_LON_SWAPPED if swapped else ", expected corners [latitude, longitude] near them"
         raise place.error(f"of {name!r} lies {off:.4g} km outside the bounds{expected}")
-    for number in np.flatnonzero(swapped_inside(corners, box) & far_outside(corners, box)).tolist():
+    for number in np.flatnonzero(far_outside(corners, box)).tolist():
+        if not swapped_meets(corners[number : number + 1], box):
+            continue
         (lon, lat), off = corners[number], off_km(shapely.Point(corners[number]), box)
         raise place.item(number + 1).error(f"is [{lat:g}, {lon:g}], {off:.4g} km outside the bounds{LAT_LON_SWAPPED}")

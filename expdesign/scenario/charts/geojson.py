@@ -63,13 +63,16 @@ class Feature:
         return self.geometry["type"] in POLYGON_TYPES
 
 
-def read_features(path: Path, *, layer_property: str = "layer", skip: Sequence[int | str] = ()) -> tuple[Feature, ...]:
+def read_features(
+    path: Path, *, layer_property: str = "layer", skip: Sequence[int | str] = (), stated_at: Entry | None = None
+) -> tuple[Feature, ...]:
     """The features of a GeoJSON file: a FeatureCollection, a Feature or a bare geometry.
 
     Args:
         path: the file.
         layer_property: the property that names the layer of a feature.
         skip: numbers, from 1, and types of geometry of features to leave out unread.
+        stated_at: the list of these in another file.
 
     Raises:
         FileError: unreadable, not GeoJSON, not in longitude and latitude, or without features.
@@ -86,6 +89,8 @@ def read_features(path: Path, *, layer_property: str = "layer", skip: Sequence[i
     rows = content.get("features") if kind == "FeatureCollection" else [content]
     if not isinstance(rows, list):
         raise entry.at("features").error("is missing or no list, expected a list of features")
+    if stated_at is not None:
+        _check_skipped(rows, skip, stated_at)
     features = tuple(_features(rows, path, layer_property, skip))
     if not features:
         found = "hold no geometry that is not skipped" if rows else "is empty"
@@ -174,21 +179,36 @@ def _way_on(text: str, path: Path) -> str:
     return text.format(stem=path.stem, name=path.name)
 
 
+def _check_skipped(rows: list[Any], skip: Sequence[int | str], entry: Entry) -> None:
+    """Raise for a number or a type of geometry that no feature has."""
+    kinds = sorted({str(kind) for row in rows if (kind := _geometry_type(row)) is not None})
+    for index, item in enumerate(skip, start=1):
+        if isinstance(item, str) and item not in kinds:
+            raise entry.item(index).unknown(item, kinds)
+        if isinstance(item, int) and not 1 <= item <= len(rows):
+            raise entry.item(index).error(f"is {item}, expected 1 to {len(rows)}, the number of a feature")
+
+
+def _geometry_type(row: object) -> Any:
+    geometry = row.get("geometry") if isinstance(row, dict) else None
+    return geometry.get("type") if isinstance(geometry, dict) else None
+
+
 def _features(rows: list[Any], path: Path, key: str, skip: Sequence[int | str]) -> Iterator[Feature]:
     """Features that have a geometry and are not to be left out."""
     for number, row in enumerate(rows, start=1):
         entry = Entry(path, f"feature {number}")
-        geometry = row.get("geometry") if isinstance(row, dict) else None
-        if number in skip or (isinstance(geometry, dict) and geometry.get("type") in skip):
+        if number in skip or _geometry_type(row) in skip:
             continue
         if not isinstance(row, dict) or row.get("type") != "Feature":
             raise entry.error("is no GeoJSON feature, expected an object with type 'Feature'")
         layer = _properties(row).get(key, UNNAMED)
         if not isinstance(layer, str | None):
             raise entry.error(f"has the {key} {shown(layer)}, expected the name of its layer")
+        geometry = row.get("geometry")
         if geometry is None:
             continue
-        if not isinstance(geometry, dict) or geometry.get("type") not in GEOMETRY_TYPES:
+        if _geometry_type(row) not in GEOMETRY_TYPES:
             found = shown(geometry.get("type") if isinstance(geometry, dict) else geometry)
             raise entry.error(f"has a geometry of type {found}, expected Polygon or MultiPolygon")
         yield Feature(_named(path, number, layer or UNNAMED), layer or UNNAMED, geometry, _properties(row))

@@ -28,7 +28,7 @@ from expdesign.scenario.charts.metres import (
     far_outside,
     in_metres,
     off_km,
-    swapped_inside,
+    swapped_meets,
 )
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, shown
@@ -42,7 +42,12 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
     """The chart that an area file names with `chart.geojson`."""
     table, path = file.chart, _chart_path(file.chart, entry)
     with _or_skipped(path, table, entry):
-        features = read_features(path, layer_property=table.layer_property, skip=table.skip_features)
+        features = read_features(
+            path,
+            layer_property=table.layer_property,
+            skip=table.skip_features,
+            stated_at=entry.at("skip_features"),
+        )
         charted = [feature for feature in features if _is_charted(feature, table)]
         _check_unnamed(charted, path, table, entry)
         areas, depths = _with_depths(charted, table, entry)
@@ -110,7 +115,7 @@ def _check_order(features: Sequence[Feature], box: Box) -> None:
     first = beside(np.array([next(positions_in(feature.geometry)) for feature in features]), box)
     for index in np.flatnonzero(far_outside(first, box)).tolist():
         feature = features[index]
-        if swapped_inside(np.array(list(positions_in(feature.geometry))), box).any():
+        if swapped_meets(np.array(list(positions_in(feature.geometry))), box):
             raise feature.entry.error(
                 f"lies {off_km(shapely.Point(first[index]), box):.4g} km outside the bounds, expected [longitude, "
                 "latitude]: with the two swapped it lies in them"

@@ -41,10 +41,10 @@ def beside(points: Array, box: Box) -> Array:
     return np.column_stack([points[:, 0] + 360 * turns, points[:, 1]])
 
 
-def swapped_inside(points: Array, box: Box) -> np.ndarray:
-    """(k,) which positions (k, 2) [deg] would lie in the bounds with their two numbers swapped."""
-    lon, lat = beside(points[:, ::-1], box).T
-    return np.asarray((box[0] <= lon) & (lon <= box[2]) & (box[1] <= lat) & (lat <= box[3]))
+def swapped_meets(points: Array, box: Box) -> bool:
+    """Whether what positions (k, 2) [deg] span would meet the bounds with their two numbers swapped."""
+    span = shapely.MultiPoint(beside(points[:, ::-1], box)).convex_hull
+    return bool(span.intersects(shapely.box(*box)))
 
 
 def far_outside(points: Array, box: Box) -> np.ndarray:
