@@ -168,6 +168,12 @@ def test_heights_are_depths_with_the_other_sign_and_are_asked_for(loaded):
         loaded(*negative, chart="depth_property = 'z'\ndepth_positive = 'down'")
 
 
+def test_soundings_alone_are_no_chart_of_depths(loaded):
+    spots = [{**plain([0.001 * k, 0.0], kind="Point"), "properties": {"z": -6.8}} for k in range(3)]
+    with pytest.raises(FileError, match=r"chart\.depth_property: is 'z', which only points state"):
+        loaded(feature("land", square(0.02), square(0.008)[::-1]), *spots, chart="depth_property = 'z'")
+
+
 def test_single_depths_above_water_are_said(loaded):
     area = loaded(sea(12.0, 0.008), sea(6.0, 0.003), sea(-0.5, 0.001), chart="depth_property = 'z'")
     assert "chart.geojson: 1 of 3 depths are negative, which count as above water" in area.notes

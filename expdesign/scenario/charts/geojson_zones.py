@@ -50,7 +50,7 @@ def open_geojson(file: AreaTable, *, draught_m: float, given: Box | None, entry:
         )
         charted = [feature for feature in features if _is_charted(feature, table)]
         _check_unnamed(charted, path, table, entry)
-        areas, depths = _with_depths(charted, table, entry)
+        areas, depths = _with_depths(charted, features, table, entry)
         unused = [area for area, before in zip(areas, charted, strict=True) if not kind_of(before, table)]
         chart = _read_chart(table, features, areas, depths, given, entry)
         objects = dangers(features, table, (chart.extent[0] + chart.extent[2]) / 2)
@@ -156,9 +156,12 @@ def _chart_path(chart: ChartTable, entry: Entry) -> Path:
 
 
 def _with_depths(
-    features: Sequence[Feature], chart: ChartTable, entry: Entry
+    features: Sequence[Feature], spots: Sequence[Feature], chart: ChartTable, entry: Entry
 ) -> tuple[tuple[Feature, ...], dict[str, float]]:
-    """The features, those with a depth among their properties in a layer of that depth; and layers with their depth."""
+    """The features, those with a depth among their properties in a layer of that depth; and layers with their depth.
+
+    `spots` are all features, soundings among them.
+    """
     key = chart.depth_property
     if key is None:
         return tuple(features), {name: chart.below(depth) for name, depth in (chart.depth_layers or {}).items()}
@@ -175,6 +178,11 @@ def _with_depths(
             feature = replace(feature, layer=layer)
         sorted_out.append(feature)
     if not depths:
+        if any(kind_of(item, chart) == "SOUNDG" for item in spots):
+            found = (
+                f"is {shown(key)}, which only points state, expected areas of water with it: soundings close what is "
+            )
+            raise entry.at("depth_property").error(f"{found}shallow, and leave the depth between them open")
         raise entry.at("depth_property").unknown(key, sorted({name for item in features for name in item.properties}))
     return tuple(sorted_out), depths
 

@@ -167,6 +167,7 @@ def _described(
         covariance=covariance,
         plan=plan,
         legs_count=case.design.accuracy is not None,
+        remarks=case.remarks,
     )
 
 
