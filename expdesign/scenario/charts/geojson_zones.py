@@ -31,7 +31,7 @@ from expdesign.scenario.charts.metres import (
     swapped_meets,
 )
 from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
-from expdesign.scenario.tables import LARGEST, Entry, shown
+from expdesign.scenario.tables import LARGEST, Entry, offer, shown
 from expdesign.sea_area import LocalFrame
 
 ROUNDING = 1e-9
@@ -179,10 +179,10 @@ def _with_depths(
         sorted_out.append(feature)
     if not depths:
         if any(kind_of(item, chart) == "SOUNDG" for item in spots):
-            found = (
-                f"is {shown(key)}, which only points state, expected areas of water with it: soundings close what is "
+            raise entry.at("depth_property").error(
+                f"is {shown(key)}, which only points state, expected areas of water with it: what lies between "
+                "soundings is not known"
             )
-            raise entry.at("depth_property").error(f"{found}shallow, and leave the depth between them open")
         raise entry.at("depth_property").unknown(key, sorted({name for item in features for name in item.properties}))
     return tuple(sorted_out), depths
 
@@ -250,7 +250,8 @@ def _check_layers(chart: ChartTable, known: list[str], entry: Entry) -> None:
     optional = bool(chart.depth_property or chart.water_layers or chart.outlines)
     for index, name in enumerate(chart.land_layers, start=1):
         if name not in known and not (optional and "land_layers" not in chart.model_fields_set):
-            raise entry.at("land_layers").item(index).unknown(name, known)
+            other = "; water_layers and depth_layers name those of water"
+            raise entry.at("land_layers").item(index).error(f"is {shown(name)}, {offer(name, tuple(known))}{other}")
     for index, name in enumerate(chart.water_layers, start=1):
         if name not in known:
             raise entry.at("water_layers").item(index).unknown(name, known)
