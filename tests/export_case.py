@@ -197,9 +197,11 @@ def report_content(**changes: object) -> ReportContent:
     return ReportContent(**(given | changes))
 
 
-def plan_files() -> dict[str, str]:
-    text = plan_json(plan(), scenario="test-sound", vessel=tug(), environment=ENVIRONMENT, clearance_m=CLEARANCE_M)
-    return {"plan.json": text, "track.csv": track_csv(plan()), "commands.csv": commands_csv(plan())}
+def plan_files(made: Plan | None = None) -> dict[str, str]:
+    """The files of the plan, or of a variant of it."""
+    made = made or plan()
+    text = plan_json(made, scenario="test-sound", vessel=tug(), environment=ENVIRONMENT, clearance_m=CLEARANCE_M)
+    return {"plan.json": text, "track.csv": track_csv(made), "commands.csv": commands_csv(made)}
 
 
 def planned() -> PlannedTrack:

@@ -68,7 +68,7 @@ def waters_of(problem):
 
 def plan_in(problem, water):
     plan = plan_trial(replace(problem, area=replace(problem.area, water=shapely.multipolygons([*water]))))
-    assert plan.verification.verified
+    assert plan.verification.passed
     assert plan.leave_water_probability <= 1 - problem.settings.confidence
     return plan
 

@@ -81,7 +81,7 @@ def changed_all(commands: Commands, column: int, by: float) -> Commands:
 
 def test_a_sound_plan_has_no_problems_and_its_true_clearance():
     found = check(sound())
-    assert found.verified
+    assert found.passed
     assert found.clearance_min_m == pytest.approx(85.0)  # 100 m astern of the origin, 15 m of hull
     assert found.reproduction_error_m < 1e-3
 
@@ -113,7 +113,7 @@ def test_a_sound_plan_has_no_problems_and_its_true_clearance():
 def test_each_flaw_is_named(spoil, word):
     plan = sound()
     found = check({**plan, **spoil(plan)})
-    assert not found.verified
+    assert not found.passed
     assert any(word in problem for problem in found.problems), found.problems
 
 
@@ -193,4 +193,4 @@ def test_legs_go_no_faster_through_water_than_stated_whatever_the_current(curren
 
 def test_runs_and_legs_from_faster_runs_may_be_faster_than_stated():
     plan = sound()
-    assert check({**plan, "transit_mps": 0.5}).verified
+    assert check({**plan, "transit_mps": 0.5}).passed

@@ -18,7 +18,6 @@ WRONG_CHARTS = [
     ({"type": "FeatureCollection"}, "features", "is missing or no list"),
     (collection(), "features", "is empty, expected at least one polygon"),
     (collection(3), "feature 1", "is no GeoJSON feature"),
-    (collection(feature(None, square(1.0)), feature("land", square(1.0))), "feature 1", "has no property 'layer'"),
     (collection(feature(7, square(1.0))), "feature 1", "has the layer 7, expected the name"),
     (
         collection(feature("land", [[0, 0], [1, 1], [1, 0]], kind="LineString")),
@@ -45,12 +44,12 @@ WRONG_CHARTS = [
     ),
     (collection(feature("land", square(0.1), BOW_TIE)), "feature 1 (layer 'land')", "crosses itself at 0.00200 N"),
     (collection(feature("land", square(0.1), square(0.1, lon_deg=1.0))), None, "has a hole outside its outline"),
-    ({"type": "Polygon", "coordinates": [BOW_TIE]}, "feature 1 (layer 'land')", "crosses itself"),
+    (collection(feature("land", BOW_TIE)), "feature 1 (layer 'land')", "crosses itself"),
     (collection(feature("land", square(0.1), square(0.05), square(0.05))), None, "crosses itself"),
     (collection(feature("land", square(0.1), square(0.05), square(0.02))), None, "has a hole inside a hole"),
     (collection(feature("land", square(0.1)), feature("land", [[0, 0], [1, 1], [2, 2], [0, 0]])), None, "no area"),
     (collection(feature("land", square(0.1), square(0.1))), "feature 1 (layer 'land')", "encloses no area"),
-    ({"type": "Polygon", "coordinates": [[[-180, -80], [180, -80], [180, 80], [-180, 80]]]}, None, "encloses no area"),
+    (collection(feature("land", [[-180, -80], [180, -80], [180, 80], [-180, 80]])), None, "encloses no area"),
     ({**square_chart(), "crs": {"properties": {"name": "EPSG:25832"}}}, "crs", "is 'EPSG:25832', expected longitude"),
 ]
 
@@ -96,6 +95,7 @@ def test_wrong_charts_are_refused_in_one_line(area, chart, key, words):
     ],
 )
 def test_charts_that_are_not_json_are_refused_in_one_line(area, text, words):
+    _with_keys(area, 'outlines = "land"')
     _write(area, text)
     with pytest.raises(FileError) as caught:
         load_area(area, draught_m=1.0)
@@ -174,6 +174,7 @@ def test_overlapping_parts_count_once_and_islands_in_lakes_in_islands_alternate(
     twice = _water(area, collection(*2 * [feature("land", rings[0], rings[1]), feature("land", rings[2], rings[3])]))
     assert twice.water.symmetric_difference(nested.water).area < 1e-6
     parts = [[rings[0], rings[1]], [rings[2], rings[3]]]
+    _with_keys(area, 'outlines = "land"')
     together = _water(area, {"type": "MultiPolygon", "coordinates": parts})
     assert together.water.symmetric_difference(nested.water).area < 1e-6
 
@@ -204,12 +205,16 @@ def test_bounds_over_the_antimeridian_meet_parts_on_both_sides(area):
     assert abs(loaded.frame.lon_deg) == pytest.approx(180.0)
 
 
-def test_bare_polygons_and_features_without_layers_are_land(area):
+def test_bare_polygons_and_features_without_layers_are_what_the_area_file_says(area):
+    _with_keys(area, 'outlines = "land"')
     coordinates = [square(0.02), square(0.008)]
     bare = _water(area, {"type": "Polygon", "coordinates": coordinates})
     plain = {"type": "Feature", "properties": None, "geometry": {"type": "Polygon", "coordinates": coordinates}}
     for chart in (plain, collection(plain, {"type": "Feature", "properties": {}, "geometry": None})):
         assert _water(area, chart).water.equals(bare.water)
+    _with_keys(area)
+    named = _water(area, collection(feature("land", *coordinates)))
+    assert named.water.equals(bare.water)
 
 
 def test_bounds_beyond_the_chart_are_noted(tmp_path):
@@ -285,16 +290,15 @@ def test_the_layer_may_stand_under_another_name(area):
         load_area(area, draught_m=1.0)
     _with_keys(area, 'depth_property = "DRVAL1"')
     _write(area, collection(_of_depth("ten", square(0.01))))
-    with pytest.raises(FileError, match=r"feature 1 .*has DRVAL1 = 'ten', expected a depth in metres"):
+    with pytest.raises(FileError, match=r"feature 1: has DRVAL1 = 'ten', expected a depth in metres"):
         load_area(area, draught_m=1.0)
 
 
 def test_a_chart_without_layers_says_that_all_of_it_counts_as_land(area):
     """Depth areas of a chart whose layers are not named would else only be a puzzle."""
+    _with_keys(area, 'outlines = "land"')
     _write(area, collection(_of_depth(10, square(0.01))))
-    with pytest.raises(
-        NoPlan, match=r"all of it is land; chart.geojson: no feature names its layer, so 1 count as land"
-    ):
+    with pytest.raises(NoPlan, match=r"all of it is land; chart.geojson: 1 polygons name no layer and enclose land"):
         load_area(area, draught_m=1.0)
 
 

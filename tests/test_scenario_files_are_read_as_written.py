@@ -43,7 +43,9 @@ def test_the_place_an_error_offers_is_accepted(tmp_path, east_m, degrees):
     spoil(path, "north_m = 200\neast_m = -400.0", bad)
     with pytest.raises(FileError) as caught:
         load_scenario(path)
-    offered = re.search(r"the nearest place with room is (\w+ = \S+), (\w+ = \S+)$", str(caught.value))
+    offered = re.search(
+        r"the nearest place with room and a way to the goal is (\w+ = \S+), (\w+ = \S+)$", str(caught.value)
+    )
     spoil(path, bad, f"{offered[1]}\n{offered[2]}")
     load_scenario(path)
 

@@ -75,7 +75,6 @@ DISC = shapely.Point(0, 0).buffer(MARGIN_M, quad_segs=8).area
         danger("rocks", depth=None),
         danger("rocks", depth=30.0, VALSOU=1.0),
         danger("SOUNDG", at=[*PLACE, 2.0]),
-        danger("SOUNDG", at=[*PLACE, -9.0]),
         danger("rocks", "MultiPoint", [PLACE]),
         danger("rocks", at=[*PLACE, 40.0]),
         {**danger("rocks"), "geometry": {"type": "GeometryCollection", "geometries": [danger()["geometry"]]}},

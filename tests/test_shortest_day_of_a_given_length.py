@@ -32,7 +32,7 @@ def test_the_plan_is_no_longer_and_tells_what_it_says(asked, monkeypatch):
     problem, accuracy = asked
     monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=1))
     found = fullest_day(problem, accuracy, DAY_S)
-    assert found.plan.verification.verified
+    assert found.plan.verification.passed
     assert found.plan.commands.duration_s <= DAY_S
     assert found.most_s == DAY_S
     fitting = [item.information for item in found.tried if item.day_s <= DAY_S]

@@ -154,3 +154,13 @@ def test_where_legs_count_whole_days_are_compared_and_not_runs():
     assert against.accuracy == against.track == pytest.approx(1.0)
     assert against.same_accuracy_s is None
     assert "Legs count in its accuracy, so whole days are compared." in whatif_html(content)
+
+
+def test_what_a_case_does_not_use_is_said_of_it_and_of_all_only_once(tmp_path, capsys):
+    calm = variant(tmp_path, "windy", "[environment]\nwind_to = {north_mps = 5.0, east_mps = 0.0}\n")
+    assert main(["whatif", str(MODEL_SHIP), str(calm), "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
+    (wind,) = (line for line in load_variant(MODEL_SHIP, calm).scenario.remarks if "wind" in line)
+    told, page = capsys.readouterr().out, (tmp_path / "out" / "whatif.html").read_text(encoding="utf-8")
+    assert load_scenario(MODEL_SHIP).remarks == ()
+    for text in (told, page.replace("&#39;", "'")):
+        assert text.count(f"Note: {wind}.") == 1

@@ -34,7 +34,7 @@ def verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Veri
         goal=problem.goal,
         under_way=problem.under_way,
     )
-    if not verification.verified:
+    if not verification.passed:
         error = NoPlan(
             "the plan found does not pass its own verification: " + "; ".join(verification.problems),
             what="verification",
@@ -49,8 +49,9 @@ def drawn_risk(
 ) -> tuple[RiskEstimate, Trials]:
     """The risk of the plan of some attempt; random streams are independent of planning and of other attempts."""
     rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
-    draws = trials_needed(problem.settings.confidence)
-    return estimate_risk(water, sailed, rng=rng, draws=draws, progress=progress)
+    settings = problem.settings
+    draws = trials_needed(settings.confidence)
+    return estimate_risk(water, sailed, rng=rng, draws=draws, aborted_most=settings.aborted_most, progress=progress)
 
 
 def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Array:

@@ -53,7 +53,6 @@ class Tuning:
         sample_s: one sample of some hundred drawn ships there [s].
         work: how long phases take beside each other, on average of the examples on two cores: measuring the water,
             trying transitions, placing runs, sailing them, verifying and sailing drawn trials.
-        many_aborted: share of drawn trials aborted above which a warning leads the report.
     """
 
     most_runs: int = 1000
@@ -95,7 +94,6 @@ class Tuning:
     iteration_s: float = 2e-4
     sample_s: float = 2.5e-3
     work: tuple[float, float, float, float, float] = (1.0, 3.0, 1.0, 2.5, 4.0)
-    many_aborted: float = 0.2
 
 
 PLAN = Tuning()

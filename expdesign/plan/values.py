@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from expdesign.plan.tuning import PLAN
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
@@ -22,6 +21,7 @@ class PlanSettings:
     Attributes:
         clearance_m: least distance from the hull to anything forbidden [m].
         confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
+        aborted_most: share of drawn trials that may be aborted in a plan that counts as verified.
         time_budget_s: for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs
             cost more [s]. Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a
             search that is stuck ends after five times the budget. A plan whose drawn trials leave the water is made
@@ -34,6 +34,7 @@ class PlanSettings:
 
     clearance_m: float = 20.0
     confidence: float = 0.95
+    aborted_most: float = 0.1
     time_budget_s: float = 60.0
     transit_speed_mps: float | None = None
     turning_radius_m: float | None = None
@@ -148,7 +149,7 @@ class Verification:
         clearance_time_s: when [s].
         reproduction_error_m: largest distance between the track and the re-simulated commands [m].
         limit_excess: largest violation of an actuator limit or rate, relative to its range.
-        problems: one sentence for each failed check; empty when the plan is verified.
+        problems: one sentence for each failed check; empty when the plan passes.
         heel_max_rad: largest roll angle of the re-simulated commands, in still water; None without [roll].
     """
 
@@ -160,7 +161,7 @@ class Verification:
     heel_max_rad: float | None = None
 
     @property
-    def verified(self) -> bool:
+    def passed(self) -> bool:
         """True when every check passed."""
         return not self.problems
 
@@ -198,6 +199,7 @@ class RiskEstimate:
         left: share in which the hull left allowed water, on a run or on a leg.
         left_most: the share is below this with 95 % confidence (Clopper and Pearson 1934).
         aborted: share aborted in allowed water because a run could not be begun within tolerance.
+        aborted_most: the share that may be.
         reasons: one sentence for each leg on which trials were aborted, most first.
         extra_median_s, extra_most_s: median and 95th percentile of the time beyond the plan's, over the trials that
             reached the goal [s]; nan when none did.
@@ -217,6 +219,7 @@ class RiskEstimate:
     heading_rad: float
     yaw_rate_radps: float
     legs: tuple[LegOutcome, ...]
+    aborted_most: float = PlanSettings.aborted_most
 
     @property
     def error(self) -> float:
@@ -226,9 +229,12 @@ class RiskEstimate:
 
     @property
     def note(self) -> str:
-        """Warning about a plan of which many drawn trials are aborted; "" where they are few."""
-        if self.aborted <= PLAN.many_aborted:
-            return ""
+        """Warning about a plan of which more drawn trials are aborted than may be; "" for others."""
+        return "" if self.aborted <= self.aborted_most else self.aborted_note
+
+    @property
+    def aborted_note(self) -> str:
+        """How many drawn trials are aborted, and where most of them; for a plan of which some are."""
         return (
             f"{self.aborted:.1%} of {self.trials} drawn trials, about {10 * self.aborted:.0f} in 10, were aborted "
             f"because a run could not be begun or the goal not reached, most of them {self.reasons[0]}"
@@ -286,6 +292,23 @@ class Plan:
     risk: RiskEstimate | None = None
     lattice: LatticeProof | None = None
     standing: Array | None = None
+
+    @property
+    def verified(self) -> bool:
+        """Whether the independent check passed and no more drawn trials were aborted than may be."""
+        return self.verification.passed and not (self.risk and self.risk.note)
+
+    @property
+    def verdict(self) -> str:
+        """The outcome of check and drawn trials in a few words."""
+        if not self.verification.passed:
+            return f"not verified: {'; '.join(self.verification.problems)}"
+        if self.risk is None or self.verified:
+            return "verified"
+        return (
+            f"kept in allowed water; {100 * self.risk.aborted:.4g} % of {self.risk.trials} drawn trials were aborted, "
+            f"above the limit of {100 * self.risk.aborted_most:.4g} % (plan.aborted_most)"
+        )
 
     @property
     def sailed(self) -> SailedTrial:

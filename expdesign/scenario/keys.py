@@ -77,7 +77,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
     if origin is Annotated:
         return _allowed(arguments[0], [*arguments[1:], *metadata])
     if origin in (Union, types.UnionType):
-        return _allowed(next(part for part in arguments if part is not type(None)), metadata)
+        return " or ".join(_allowed(part, metadata) for part in arguments if part is not type(None))
     if origin is Literal:
         return " or ".join(map(shown, arguments))
     limits = [part for item in metadata for part in getattr(item, "metadata", [item])]
@@ -101,5 +101,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
 
 def _plural(kind: str) -> str:
     """`list of 2 numbers` -> `lists of 2 numbers`."""
+    if kind.startswith("whole number"):
+        return kind.replace("whole number", "whole numbers", 1)
     first, *rest = kind.split(" ", 1)
     return " ".join([f"{first}s", *rest])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +14,8 @@ from pydantic import Field
 from shapely.ops import nearest_points
 
 from expdesign.conventions import to_n_frame
-from expdesign.errors import FileError
+from expdesign.errors import FileError, NoPlan
+from expdesign.plan.control import capability
 from expdesign.plan.values import PlannerName, PlanSettings, UnderWay
 from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import design_settings
@@ -83,6 +85,13 @@ class PlanTable(Table):
         lt=1,
         description="the least share of simulated trials that stay in allowed water, with randomly drawn ships, "
         "currents and winds",
+    )
+    aborted_most: float = Field(
+        default=PlanSettings.aborted_most,
+        ge=0,
+        le=0.5,
+        description="the share of these trials that may be aborted because a run cannot be begun or the goal is not "
+        "reached; a plan with more of them is written, but not called verified, and none is from half of them on",
     )
     time_budget_s: Positive = Field(
         default=PlanSettings.time_budget_s,
@@ -172,9 +181,10 @@ def build_scenario(content: Mapping[str, Any], entry: Entry, *, vessel: Path | N
     dictionary = load_dictionary(entry.at("scenario.dictionary").file(file.scenario.dictionary))
     plan = PlanSettings(**file.plan.model_dump())
     area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=ship.draught_m)
-    poses = {key: _pose(place, area) for key, place in places.items()}
-    for key, place in places.items():
-        problem = berth_problem(poses[key], ship, area, plan.clearance_m, degrees=place.lat_deg is not None)
+    berths = {key: _berth(place, area) for key, place in places.items()}
+    for key, other in (("start", "goal"), ("goal", "start")):
+        way = f"a way {'to' if other == 'goal' else 'from'} the {other}"
+        problem = berth_problem(berths[key], ship, area, plan, end=berths[other].pose, way=way)
         if problem:
             raise entry.at(key).error(problem)
     return Scenario(
@@ -187,7 +197,8 @@ def build_scenario(content: Mapping[str, Any], entry: Entry, *, vessel: Path | N
         plan=plan,
         environment=build_environment(file.environment),
         under_way=_under_way(file.start, ship, entry.at("start")),
-        **poses,
+        start=berths["start"].pose,
+        goal=berths["goal"].pose,
     )
 
 
@@ -224,34 +235,60 @@ def _check_position(place: PoseTable, entry: Entry) -> None:
         raise entry.error(f"{found}, expected lat_deg and lon_deg, or north_m and east_m")
 
 
-def _pose(place: PoseTable, area: SeaArea) -> Array:
-    """(3,) north m, east m, heading rad in the area's frame."""
-    if place.lat_deg is None:
-        return np.array([place.north_m, place.east_m, math.radians(place.heading_deg)], dtype=float)
-    north_east = area.frame.to_metres(np.array([place.lat_deg, place.lon_deg], dtype=float))
-    return np.array([*north_east, math.radians(place.heading_deg)])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Berth:
+    """A place for the ship as somebody states it.
+
+    Attributes:
+        pose: (3,) in the area's frame [north m, east m, heading rad].
+        stated: (2,) the position in the order stated: latitude and longitude, or north and east.
+        degrees: whether it is latitude and longitude.
+    """
+
+    pose: Array
+    stated: Array
+    degrees: bool
+
+    def swapped(self, area: SeaArea) -> shapely.Point:
+        """Where it would be with its two numbers swapped (east_m, north_m)."""
+        other = self.stated[::-1]
+        return shapely.Point((area.frame.to_metres(other) if self.degrees else other)[::-1])
 
 
-def berth_problem(pose: Array, vessel: Vessel, area: SeaArea, clearance_m: float, *, degrees: bool) -> str:
-    """What is wrong with a pose as start or goal, or "" when the hull keeps its clearance there.
+def _berth(place: PoseTable, area: SeaArea) -> Berth:
+    degrees = place.lat_deg is not None
+    stated = np.array([place.lat_deg, place.lon_deg] if degrees else [place.north_m, place.east_m], dtype=float)
+    return build_berth(stated, math.radians(place.heading_deg), area, degrees=degrees)
+
+
+def build_berth(stated: Array, heading_rad: float, area: SeaArea, *, degrees: bool) -> Berth:
+    """A place by latitude and longitude, or by north and east in an area's frame."""
+    north_east = area.frame.to_metres(stated) if degrees else stated
+    return Berth(pose=np.array([*north_east, heading_rad]), stated=stated, degrees=degrees)
+
+
+def berth_problem(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSettings, *, end: Array, way: str) -> str:
+    """What is wrong with a start or goal, or "" when the hull keeps its clearance there.
 
     Args:
-        pose: (3,) north m, east m, heading rad.
+        berth: the place.
         vessel: gives the hull rectangle.
         area: allowed water.
-        clearance_m: least distance of the hull from anything forbidden [m].
-        degrees: whether the remedy is put in latitude and longitude or in metres.
+        settings: with the least distance of the hull from anything forbidden.
+        end: (3,) pose at the other end of the trial.
+        way: to it or from it, e.g. "a way to the goal".
     """
+    pose, clearance_m = berth.pose, settings.clearance_m
+    swapped = f", {ORDER[berth.degrees]} swapped it is in the area" if area.water.covers(berth.swapped(area)) else ""
     if not np.isfinite(pose).all():
-        return f"is thousands of kilometres from the area {area.name!r}, expected a position in it"
+        return f"is thousands of kilometres from the area {area.name!r}{swapped}, expected a position in it"
     hull = shapely.Polygon(to_n_frame(vessel.hull_b, pose)[:, ::-1])
     centre = shapely.Point(pose[1], pose[0])
     if area.land.covers(centre):
-        problem = f"is on land, {_metres(centre.distance(area.water))} from allowed water"
+        problem = f"is on land, {_metres(centre.distance(area.water))} from allowed water{swapped}"
     elif not area.water.covers(centre):
-        problem = (
-            f"is outside the allowed water (bounds, depth, no-go zones), {_metres(centre.distance(area.water))} from it"
-        )
+        off = _metres(centre.distance(area.water))
+        problem = f"is outside the allowed water (bounds, depth, no-go zones), {off} from it{swapped}"
     elif not area.water.covers(hull):
         distance = centre.distance(area.water.boundary)
         problem = f"is {_metres(distance)} from forbidden water, less than the hull of {vessel.length_m:g} m needs"
@@ -260,21 +297,48 @@ def berth_problem(pose: Array, vessel: Vessel, area: SeaArea, clearance_m: float
         if distance >= clearance_m:
             return ""
         problem = f"leaves {_metres(distance)} between the hull and forbidden water"
-    remedy = _remedy(centre, vessel, area, clearance_m, degrees)
+    remedy = _remedy(berth, vessel, area, settings, end, way)
     return f"{problem}, expected at least clearance_m = {clearance_m:g} around the hull; {remedy}"
 
 
-def _remedy(centre: shapely.Point, vessel: Vessel, area: SeaArea, clearance_m: float, degrees: bool) -> str:
-    """The nearest position with room at any heading, rounded as printed."""
+ORDER = {True: "with latitude and longitude", False: "with north and east"}
+"""What may be swapped, by whether a place is in degrees."""
+
+
+def _remedy(berth: Berth, vessel: Vessel, area: SeaArea, settings: PlanSettings, end: Array, way: str) -> str:
+    """The nearest position with room at any heading and a way to the other end, rounded as printed."""
     radius = float(np.hypot(vessel.length_m, vessel.beam_m)) / 2
-    roomy = area.safe_water(clearance_m + radius + (1.0 if degrees else 0.01))
+    roomy = area.safe_water(settings.clearance_m + radius + (1.0 if berth.degrees else 0.01))
     if roomy.is_empty:
         return "nowhere in the area is there that much room"
-    point = nearest_points(roomy, centre)[0]
-    if not degrees:
-        return f"the nearest place with room is north_m = {point.y:.2f}, east_m = {point.x:.2f}"
+    connected = _connected(area.safe_water(settings.clearance_m + _spare_m(vessel, settings)), roomy, end)
+    roomy = shapely.intersection(roomy, connected)
+    if roomy.is_empty:
+        return f"nowhere with {way} is there that much room"
+    point = nearest_points(roomy, shapely.Point(berth.pose[1], berth.pose[0]))[0]
+    found = f"the nearest place with room and {way} is"
+    if not berth.degrees:
+        return f"{found} north_m = {point.y:.2f}, east_m = {point.x:.2f}"
     lat, lon = area.frame.to_degrees(np.array([point.y, point.x]))
-    return f"the nearest place with room is lat_deg = {lat:.6f}, lon_deg = {lon:.6f}"
+    return f"{found} lat_deg = {lat:.6f}, lon_deg = {lon:.6f}"
+
+
+def _connected(ways: shapely.MultiPolygon, roomy: shapely.MultiPolygon, end: Array) -> shapely.Geometry:
+    """The part of the water that legs may use with a pose in it; with none, the nearest part that has room."""
+    if not np.isfinite(end).all():
+        return ways
+    point = shapely.Point(end[1], end[0])
+    around = [part for part in ways.geoms if part.covers(point)]
+    with_room = (part for part in ways.geoms if part.intersects(roomy))
+    return around[0] if around else min(with_room, key=point.distance, default=shapely.MultiPolygon())
+
+
+def _spare_m(vessel: Vessel, settings: PlanSettings) -> float:
+    """The distance beyond the clearance that centre lines of legs keep from the shore [m]."""
+    try:
+        return float(capability(vessel, settings).path_spares_m(vessel)[-1])
+    except NoPlan:  # the planner says why
+        return vessel.beam_m / 2
 
 
 def _metres(distance: float) -> str:

@@ -211,6 +211,7 @@ BOUND_WORDS = {
 }
 KIND_WORDS = {
     "float_type": "a number",
+    "int_type": "a whole number",
     "finite_number": "a finite number",
     "string_type": "text in quotes",
     "string_too_short": "text that is not empty",
@@ -221,10 +222,16 @@ KIND_WORDS = {
 }
 
 
+UNION_PARTS = ("int", "constrained-str")
+"""Steps of a place that name an alternative type, no key."""
+
+
 def _dotted(place: Iterable[str | int]) -> str:
     """A place in a file, e.g. ("actuators", 1, "kind") -> "actuators[2].kind"."""
     text = ""
     for step in place:
+        if step in UNION_PARTS:
+            continue
         part = f"[{step + 1}]" if isinstance(step, int) else _key_text(step)
         text += part if isinstance(step, int) or not text else f".{part}"
     return text

@@ -13,7 +13,7 @@ from expdesign.sea_area import SeaArea
 from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel
+from expdesign.vessel import Vessel, column_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,3 +121,25 @@ class Scenario:
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the files state and the trial does not use, or what it takes as certain; one line each."""
+        model, weather = self.vessel.model, self.environment
+        unread = [column_name(name) for name in model.unread_inputs]
+        wind = weather.wind_to.any() or weather.wind_std_mps or weather.wind_variation.std_mps
+        current = weather.current_to.any() or weather.current_std_mps or weather.current_variation.std_mps
+        still = [name for name in ("u", "v") if name not in model.read_signals(name)] if current else []
+        certain = [name for name, std in zip(model.names, model.parameter_std.tolist(), strict=True) if not std]
+        known = f"{', '.join(certain)} (no model.parameter_std)"
+        if len(certain) == len(model.names):
+            known = f"every parameter of the model (no model.parameter_std): {', '.join(certain)}"
+        return (
+            *(["environment.wind_to moves no ship here: no term of the vessel's model reads the wind"]
+              if wind and not {"u_q", "v_q"} & model.read_signals() else []),
+            *(f"environment.current_to does not act on {name}: no term of {name} in the vessel's model reads {name}"
+              for name in still),
+            *([f"no term of the vessel's model reads {', '.join(unread)}, so that these commands and their limits move "
+               "no ship"] if unread else []),
+            *([f"exactly known in drawn trials: {known}"] if certain else []),
+        )  # fmt: skip

@@ -126,6 +126,26 @@ class VesselModel:
         """Whether a term reads a velocity through air."""
         return any({"u_q", "v_q"} & set(expression.signals) for expression in self.expressions)
 
+    def read_signals(self, equation: str = "") -> frozenset[str]:
+        """Signals read by the terms, of one equation or of all, whose parameter is not zero for certain."""
+        acting = (self.parameters != 0) | (self.parameter_std > 0)
+        terms = zip(self.terms, self.expressions, acting.tolist(), strict=True)
+        return frozenset(
+            name for term, expression, acts in terms if acts and term.equation.startswith(equation)
+            for name in expression.signals
+        )  # fmt: skip
+
+    @property
+    def unread_inputs(self) -> tuple[str, ...]:
+        """Actuator signals that move no ship: neither they nor the forces they give are read."""
+        read = self.read_signals()
+
+        def acts(actuator: Actuator) -> bool:
+            forces = actuator.force(dict.fromkeys(actuator.signals, 1.0), NUMPY)
+            return any(force and name in read for force, name in zip(forces, FORCE_SIGNALS, strict=True))
+
+        return tuple(name for one in self.actuators for name in one.signals if name not in read and not acts(one))
+
     @property
     def reads_depth(self) -> bool:
         """Whether a term depends on the depth of the water."""

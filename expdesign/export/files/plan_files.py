@@ -79,7 +79,8 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
             **({} if check.heel_max_rad is None else {"heel_max_rad": check.heel_max_rad}),
-            "verified": check.verified,
+            "verified": plan.verified,
+            "verdict": plan.verdict,
             "verification": {
                 "clearance_time_s": check.clearance_time_s,
                 "reproduction_error_m": check.reproduction_error_m,
@@ -125,6 +126,7 @@ def _risk_entry(risk: RiskEstimate | None) -> dict[str, Any] | None:
         "leave_water_standard_error": risk.error,
         "leave_water_upper_95": risk.left_most,
         "aborted_share": risk.aborted,
+        "aborted_most": risk.aborted_most,
         "aborted_where": list(risk.reasons),
         "note_on_broken_off": risk.note or None,
         "extra_time_median_s": finite(risk.extra_median_s),

@@ -97,8 +97,8 @@ def _risk_checks(risk: RiskEstimate, allowed: float) -> list[Check]:
         Check(
             what="Trials aborted because a run could not start within its tolerances",
             found=aborted_words(risk),
-            required="",
-            passed=None,
+            required=f"at most {words.percent(risk.aborted_most)}",
+            passed=not risk.note,
         ),
         Check(
             what="Time in addition to the plan, for returning to the start of each run",

@@ -41,6 +41,7 @@ class ReportContent:
         known: the state of a trial in progress, or None for a new trial.
         growth: additions to the dictionary, or None without a search.
         day: how the day was found to be the shortest, or None where total_s decides.
+        remarks: what the files state and the trial does not use, or takes as certain; one line each.
     """
 
     scenario: str
@@ -62,6 +63,7 @@ class ReportContent:
     known: Known | None = None
     growth: Growth | None = None
     day: ShortestDay | None = None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

@@ -103,7 +103,7 @@ def report_html(content: ReportContent) -> str:
         content=content,
         plan=content.plan,
         design=content.design,
-        verified=content.plan.verification.verified,
+        verified=content.plan.verified,
         runs=primitive_runs(content.plan),
         summary=summary(content),
         facts=facts(content),
@@ -174,10 +174,10 @@ def summary(content: ReportContent) -> list[str]:
         "in any order and place."
     )
     verdict = (
-        f"The plan is verified. An independent simulation of its commands keeps the hull at least "
+        f"The plan is {plan.verdict}. An independent simulation of its commands keeps the hull at least "
         f"{words.distance(check.clearance_min_m)} from forbidden water ({words.distance(content.clearance_m)} "
         "required)."
-        if check.verified
+        if check.passed
         else f"The plan is NOT verified and must not be sailed: {'; '.join(check.problems)}."
     )
     depths = [] if plan.area.depths else [UNKNOWN_DEPTH]
@@ -189,6 +189,7 @@ def summary(content: ReportContent) -> list[str]:
         *([day] if (day := day_sentence(plan)) else []),
         verdict,
         *depths,
+        *([f"Not used, or taken as certain: {'; '.join(content.remarks)}."] if content.remarks else []),
         _design_sentence(content),
     ]
 

@@ -74,6 +74,11 @@ class _Fence(_Entry):
     outside: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
+class _DrawnTrials(_Entry):
+    aborted_share: float = Field(default=0.0, ge=0, le=1)
+    aborted_most: float = Field(default=1.0, ge=0, le=1)
+
+
 class PlanFile(_Entry):
     """The entries of plan.json."""
 
@@ -87,6 +92,13 @@ class PlanFile(_Entry):
     clearance_required_m: float = Field(ge=0)
     fence: _Fence | None = None
     verified: bool
+    drawn_trials: _DrawnTrials | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the plan passed its checks, though perhaps more drawn trials were aborted than may be."""
+        drawn = self.drawn_trials
+        return self.verified or (drawn is not None and drawn.aborted_share > drawn.aborted_most)
 
 
 def environment_of(file: _Environment) -> Environment:

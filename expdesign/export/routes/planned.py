@@ -74,10 +74,10 @@ def planned_track(
 
 
 def require_verified(plan: Plan) -> None:
-    """A plan that failed a check never becomes a file that somebody could sail.
+    """A plan that failed a check never becomes a file that somebody could sail; one often aborted does, and says so.
 
     Raises:
         NoPlan: naming the failed checks.
     """
-    if not plan.verification.verified:
+    if not plan.verification.passed:
         raise NoPlan(f"the plan is not verified and is not written: {'; '.join(plan.verification.problems)}")

@@ -1,6 +1,6 @@
 """Reading a plan back from plan.json with the track.csv and commands.csv beside it.
 
-The three files must agree, and the plan must be verified.
+The three files must agree, and the plan must have passed its checks.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ def read_plan(path: Path) -> PlannedTrack:
     """The plan of plan.json, with track.csv and commands.csv from the same folder.
 
     Raises:
-        FileError: a file is missing or garbled, the files contradict each other, or the plan is not verified.
+        FileError: a file is missing or garbled, the files contradict each other, or the plan failed its checks.
     """
     file = _parse(path)
-    if not file.verified:
+    if not file.passed:
         raise FileError(path, "verified", "is false: the plan failed its checks, plan again before using it")
     frame = LocalFrame(file.frame.origin.lat_deg, file.frame.origin.lon_deg)
     if file.frame.projection != frame.definition:

@@ -37,6 +37,7 @@ class Case:
         plan: numbers of the planned trial, units in the names; empty when none was planned.
         track: (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known.
         legs_count: whether the accuracy asked for is that of the whole track, not of the runs alone.
+        remarks: what its files state and it does not use, or takes as certain; one line each.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Case:
     plan: Mapping[str, object]
     track: Array | None = None
     legs_count: bool = False
+    remarks: tuple[str, ...] = ()
 
     @property
     def std(self) -> Array:
@@ -129,8 +131,17 @@ def _gain(mine: Array, theirs: Array) -> float:
 
 
 def explanations(content: WhatIfContent) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """(variant, sentences) of every variant."""
-    return tuple((case.name, tuple(_sentences(content, case))) for case in content.cases[1:])
+    """(case, sentences) of every variant, and of the scenario where something is to be said of it."""
+    first = content.cases[0]
+    said = [
+        (first.name, _remarks(first)),
+        *((case.name, tuple(_sentences(content, case))) for case in content.cases[1:]),
+    ]
+    return tuple((name, sentences) for name, sentences in said if sentences)
+
+
+def _remarks(case: Case) -> tuple[str, ...]:
+    return tuple(f"Note: {line}." for line in case.remarks)
 
 
 def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
@@ -154,6 +165,7 @@ def _sentences(content: WhatIfContent, case: Case) -> Iterator[str]:
     if added:
         yield f"It also estimates {', '.join(added)}."
     yield from _plan(first, case, against)
+    yield from (sentence for sentence in _remarks(case) if sentence not in _remarks(first))
 
 
 def _accuracy(first: Case, case: Case, against: Against) -> str:

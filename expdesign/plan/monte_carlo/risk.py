@@ -17,7 +17,7 @@ from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
-from expdesign.plan.values import Leg, LegOutcome, RiskEstimate, SailedTrial
+from expdesign.plan.values import Leg, LegOutcome, PlanSettings, RiskEstimate, SailedTrial
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Trajectory
@@ -36,6 +36,7 @@ def estimate_risk(
     *,
     rng: np.random.Generator,
     draws: int = MONTE_CARLO.trials,
+    aborted_most: float = PlanSettings.aborted_most,
     progress: Progress = silent,
 ) -> tuple[RiskEstimate, Trials]:
     """Estimate the risk of a plan by drawn trials.
@@ -59,6 +60,7 @@ def estimate_risk(
         heading_rad=within.heading_rad,
         yaw_rate_radps=within.yaw_rate_radps,
         legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
+        aborted_most=aborted_most,
     )
     return found, trials
 
@@ -89,7 +91,7 @@ def failed_chance_constraint(
             f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
             f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
-    return "" if found.aborted < MONTE_CARLO.no_plan_aborted else found.note
+    return "" if found.aborted < MONTE_CARLO.no_plan_aborted else found.aborted_note
 
 
 def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:

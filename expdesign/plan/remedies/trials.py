@@ -63,7 +63,7 @@ def for_verification(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     def passes(other: PlanProblem) -> bool:
         made = first_sailed(other)
         try:
-            return made is not None and verified(other, *made).verified
+            return made is not None and verified(other, *made).passed
         except NoPlan:
             return False
 

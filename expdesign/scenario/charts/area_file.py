@@ -10,13 +10,14 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
-from expdesign.scenario.charts.metres import Box, in_metres
+from expdesign.scenario.charts.metres import KM_PER_DEGREE, Box, beside, far_outside, in_metres, off_km, swapped_meets
 from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import OpenChart
 from expdesign.scenario.tables import Entry, check_table, read_toml, shown
 from expdesign.sea_area import LocalFrame, SeaArea, Zones, build_sea_area
+from expdesign.values import Array
 
-KM_PER_DEGREE = 111.2
+LAT_LON_SWAPPED = ", expected [latitude, longitude]: with the two swapped it lies in the area"
 
 
 def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
@@ -40,13 +41,15 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
     box = _checked_bounds(given, chart, entry.at("bounds"))
     frame = _frame(box)
     found = chart.zones(box, frame)
+    no_go, without_effect = _no_go(file.no_go, box, frame, entry.at("no_go"))
     zones = Zones(
         bounds=in_metres(shapely.box(*box), frame),
         land=found.land,
-        no_go=shapely.union(_no_go(file.no_go, frame, entry.at("no_go")), found.closed),
+        no_go=shapely.union(no_go, found.closed),
         deep=found.deep,
         depths=found.depths,
     )
+    notes = (*found.notes, *without_effect)
     source = f"{chart.path.name}. {file.chart.notice}".strip()
     try:
         return build_sea_area(
@@ -54,11 +57,11 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
             frame=frame,
             zones=zones,
             depth_rule=found.depth_rule,
-            notes=found.notes,
+            notes=notes,
             source=source,
         )
     except NoPlan as error:
-        raise NoPlan("; ".join((f"{path}: {error}", *found.notes))) from None
+        raise NoPlan("; ".join((f"{path}: {error}", *notes))) from None
 
 
 def _open_chart(file: AreaTable, draught_m: float, given: Box | None, entry: Entry) -> OpenChart:
@@ -96,9 +99,14 @@ def _checked_bounds(given: Box | None, chart: OpenChart, entry: Entry) -> Box:
         size = f"{height_km:.0f} x {width_km:.0f} km from latitude {south:.4g} to {north:.4g}"
         raise entry.error(f"{found} {size}, expected at most {TUNING.largest_extent_km:g} km and no pole")
     chart_west, chart_south, chart_east, chart_north = chart.extent
-    if given and (west > chart_east or east < chart_west or south > chart_north or north < chart_south):
+    extent = shapely.box(*chart.extent)
+    if given and not shapely.box(*given).intersects(extent):
         covered = f"{chart_south:.5g} to {chart_north:.5g} and longitudes {chart_west:.5g} to {chart_east:.5g}"
-        raise entry.error(f"do not meet the chart, expected an overlap with its latitudes {covered}")
+        swapped = "; with latitudes and longitudes swapped, here or in the chart, they meet"
+        meet = shapely.box(south, west, north, east).intersects(extent)
+        raise entry.error(
+            f"do not meet the chart, expected an overlap with its latitudes {covered}{swapped if meet else ''}"
+        )
     return west, south, east, north
 
 
@@ -107,17 +115,44 @@ def _frame(box: Box) -> LocalFrame:
     return LocalFrame((south + north) / 2, ((west + east) / 2 + 180) % 360 - 180)
 
 
-def _no_go(zones: list[NoGoTable], frame: LocalFrame, entry: Entry) -> shapely.Geometry:
-    polygons = []
+def _no_go(
+    zones: list[NoGoTable], box: Box, frame: LocalFrame, entry: Entry
+) -> tuple[shapely.Geometry, tuple[str, ...]]:
+    """The zones in metres, and one sentence for each that closes nothing."""
+    polygons, notes = [], []
     for index, zone in enumerate(zones, start=1):
         place = entry.item(index).at("polygon")
-        corners = np.array(zone.polygon)
         for number, (lat, lon) in enumerate(zone.polygon, start=1):
             if not (abs(lat) <= 90 and -180 <= lon <= 360):
-                raise place.item(number).error(f"is [{lat:g}, {lon:g}], expected [latitude, longitude] in degrees")
-        corners[:, 1] += 360 * np.round((frame.lon_deg - corners[:, 1]) / 360)
-        polygon = shapely.Polygon(corners[:, ::-1])
+                swapped = LAT_LON_SWAPPED if swapped_meets(np.array([[lon, lat]]), box) else ""
+                raise place.item(number).error(
+                    f"is [{lat:g}, {lon:g}], expected [latitude, longitude] in degrees{swapped}"
+                )
+        corners = beside(np.array(zone.polygon)[:, ::-1], box)
+        _check_near(corners, zone.name, box, place)
+        polygon = shapely.Polygon(corners)
         if not shapely.is_valid(polygon) or polygon.area == 0:
             raise place.error(f"of {zone.name!r} crosses itself or has no area, expected a simple outline")
-        polygons.append(in_metres(polygon, frame))
-    return shapely.union_all(polygons)
+        if polygon.intersects(shapely.box(*box)):
+            polygons.append(in_metres(polygon, frame))
+        else:
+            off = f"{off_km(polygon, box):.3g} km outside the bounds"
+            notes.append(f"no-go zone {zone.name!r} lies {off} and closes nothing")
+    return shapely.union_all(polygons), tuple(notes)
+
+
+def _check_near(corners: Array, name: str, box: Box, place: Entry) -> None:
+    """Raise for a zone, or a corner of one, that lies far outside the bounds, or in them with its numbers swapped.
+
+    A zone outside the bounds may well be meant, but closes nothing.
+    """
+    off = off_km(shapely.MultiPoint(corners).convex_hull, box)
+    swapped = swapped_meets(corners, box)
+    if off > 0 and (swapped or off > TUNING.largest_extent_km):
+        expected = LAT_LON_SWAPPED if swapped else ", expected corners [latitude, longitude] near them"
+        raise place.error(f"of {name!r} lies {off:.4g} km outside the bounds{expected}")
+    for number in np.flatnonzero(far_outside(corners, box)).tolist():
+        if not swapped_meets(corners[number : number + 1], box):
+            continue
+        (lon, lat), off = corners[number], off_km(shapely.Point(corners[number]), box)
+        raise place.item(number + 1).error(f"is [{lat:g}, {lon:g}], {off:.4g} km outside the bounds{LAT_LON_SWAPPED}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -26,13 +26,32 @@ class ChartTable(Table):
         default=None,
         description="the path of an S-57 cell, *.000, instead of geojson; update files in the same folder are applied",
     )
+    outlines: Literal["water", "land"] | None = Field(
+        default=None,
+        description="what the polygons of a GeoJSON chart enclose that name no layer; with 'water', those inside "
+        "others are islands, and everything outside is land",
+    )
     land_layers: list[Text] = Field(default=["land"], description="the layers of the GeoJSON chart that are land")
+    water_layers: list[Text] = Field(
+        default=[],
+        description="the layers of the GeoJSON chart that are water of unknown depth; everything outside is land",
+    )
     layer_property: Text = Field(default="layer", description="the property that names the layer of a GeoJSON feature")
     depth_layers: dict[str, Number] | None = Field(
         default=None, description="the GeoJSON layers of water with their least depth [m], e.g. {seabed5m = 5.0}"
     )
     depth_property: Text | None = Field(
         default=None, description="the property that holds the depth of a GeoJSON area [m], instead of depth_layers"
+    )
+    depth_positive: Literal["down", "up"] | None = Field(
+        default=None,
+        description="how depths in a GeoJSON chart count: 'down' for depths, 'up' for heights, which are negative "
+        "below the surface; needed where most are negative",
+    )
+    skip_features: list[int | Text] = Field(
+        default=[],
+        description="the features of the GeoJSON chart to leave out, by number from 1 or by type of geometry, e.g. "
+        "[3, 'LineString']; the report names them",
     )
     danger_layers: list[Text] | None = Field(
         default=None,
@@ -44,6 +63,10 @@ class ChartTable(Table):
         default=None, description="the ship's height above water [m]; when not given, bridges and cables are closed"
     )
     notice: str = Field(default="", description="a notice of copyright for the report")
+
+    def below(self, stated_m: float) -> float:
+        """The depth below the surface of a depth or height that the GeoJSON chart states [m]."""
+        return -stated_m if self.depth_positive == "up" else stated_m
 
 
 class BoundsTable(Table):

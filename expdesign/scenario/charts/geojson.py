@@ -1,22 +1,44 @@
 """From GeoJSON files to features and the rings of their polygons; geometry is not checked here.
 
-Source of the format: RFC 7946; the caller states which property names the layer of a feature.
+Source of the format: RFC 7946; the caller states which property names the layer of a feature. Other formats of maps are
+recognised, and refused with the way from them to GeoJSON.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from expdesign.scenario.tables import Entry, read_text, shown
 
-LAYER_OF_BARE_POLYGONS = "land"
+UNNAMED = ""
+"""Layer of features that name none."""
 POLYGON_TYPES = ("Polygon", "MultiPolygon", "GeometryCollection")
 GEOMETRY_TYPES = (*POLYGON_TYPES, "Point", "MultiPoint", "LineString", "MultiLineString")
 WGS84 = ("CRS84", ":4326")
+CONVERT = "expected GeoJSON: save it as that in a GIS or a map editor, or ogr2ogr -f GeoJSON {stem}.geojson {name}"
+OTHER_FORMATS = (
+    (b"<kml", "KML", CONVERT),
+    (b"<osm", "OpenStreetMap XML", f"{CONVERT} multipolygons"),
+    (b"<gpx", "GPX", f"{CONVERT} tracks, whose closed lines have to become polygons"),
+    (b"<", "XML", CONVERT),
+    (
+        b"PK\x03\x04",
+        "a zip archive such as KMZ or zipped shapefiles",
+        "expected GeoJSON: unpack it, and convert the map",
+    ),
+    (b"\x00\x00\x27\x0a", "a shapefile", CONVERT),
+    (b"SQLite format 3", "a GeoPackage or another SQLite file", CONVERT),
+    (b'"osm3s"', "Overpass JSON", "expected GeoJSON: export it as that from the map service"),
+    (b'"esriGeometry', "Esri JSON", CONVERT),
+)
+"""Mark among the first bytes (XML begins with <, JSON with {), format, and how to go on."""
+PARTS = {".dbf": ".shp", ".shx": ".shp", ".prj": ".shp", ".cpg": ".shp"}
+"""Files that come with a shapefile, which alone hold no geometry."""
+FIRST_BYTES = 2000
 
 
 @dataclass(frozen=True)
@@ -25,27 +47,32 @@ class Feature:
 
     Attributes:
         entry: the file and the number of the feature in it, from 1.
-        layer: name of its layer.
+        layer: name of its layer, or `UNNAMED`.
         geometry: the GeoJSON geometry.
         properties: its other properties.
-        assumed: the file names no layer at all, so that all is taken to be land.
     """
 
     entry: Entry
     layer: str
     geometry: Mapping[str, Any]
     properties: Mapping[str, Any] = field(default_factory=dict)
-    assumed: bool = False
+
+    @property
+    def is_area(self) -> bool:
+        """Whether its geometry is of polygons."""
+        return self.geometry["type"] in POLYGON_TYPES
 
 
-def read_features(path: Path, *, layer_property: str = "layer") -> tuple[Feature, ...]:
+def read_features(
+    path: Path, *, layer_property: str = "layer", skip: Sequence[int | str] = (), stated_at: Entry | None = None
+) -> tuple[Feature, ...]:
     """The features of a GeoJSON file: a FeatureCollection, a Feature or a bare geometry.
-
-    Bare geometries, and features of a file in which none names a layer, are land.
 
     Args:
         path: the file.
         layer_property: the property that names the layer of a feature.
+        skip: numbers, from 1, and types of geometry of features to leave out unread.
+        stated_at: the list of these in another file.
 
     Raises:
         FileError: unreadable, not GeoJSON, not in longitude and latitude, or without features.
@@ -56,15 +83,18 @@ def read_features(path: Path, *, layer_property: str = "layer") -> tuple[Feature
     _check_reference_system(content, entry.at("crs"))
     kind = content.get("type")
     if kind in GEOMETRY_TYPES:
-        return (Feature(_named(path, 1, LAYER_OF_BARE_POLYGONS), LAYER_OF_BARE_POLYGONS, content),)
-    if kind not in ("FeatureCollection", "Feature"):
+        content = {"type": "Feature", "geometry": content}
+    elif kind not in ("FeatureCollection", "Feature"):
         raise entry.at("type").error(f"is {shown(kind)}, expected FeatureCollection, Polygon or MultiPolygon")
     rows = content.get("features") if kind == "FeatureCollection" else [content]
     if not isinstance(rows, list):
         raise entry.at("features").error("is missing or no list, expected a list of features")
-    features = tuple(_features(rows, path, layer_property))
+    if stated_at is not None:
+        _check_skipped(rows, skip, stated_at)
+    features = tuple(_features(rows, path, layer_property, skip))
     if not features:
-        raise entry.at("features").error("is empty, expected at least one polygon")
+        found = "hold no geometry that is not skipped" if rows else "is empty"
+        raise entry.at("features").error(f"{found}, expected at least one polygon")
     return features
 
 
@@ -89,8 +119,22 @@ def polygon_rings(geometry: object, entry: Entry) -> list[list[Any]]:
     return polygons
 
 
+def positions_in(geometry: Mapping[str, Any]) -> Iterator[list[float]]:
+    """[longitude, latitude] of every corner of a geometry that was checked."""
+    for part in geometry.get("geometries", []):
+        yield from positions_in(part)
+    parts = [geometry.get("coordinates", [])]
+    while parts:
+        part = parts.pop()
+        if part and not isinstance(part[0], list):
+            yield part[:2]
+        else:
+            parts += part
+
+
 def _read_json(path: Path) -> object:
     entry = Entry(path)
+    _check_format(path, entry)
 
     def refuse(constant: str) -> None:
         raise entry.error(f"holds {constant}, expected finite numbers")
@@ -115,24 +159,59 @@ def _check_reference_system(content: Mapping[str, Any], entry: Entry) -> None:
         raise entry.error(f"is {shown(name)}, expected longitude and latitude in WGS84 (CRS84)")
 
 
-def _features(rows: list[Any], path: Path, key: str) -> Iterator[Feature]:
-    """Features that have a geometry."""
-    named = any(_properties(row).get(key) is not None for row in rows)
+def _check_format(path: Path, entry: Entry) -> None:
+    """Raise for a map in another format that is recognised; files that cannot be read are for the reader."""
+    if path.suffix.lower() in PARTS:
+        raise entry.error(f"is a part of a shapefile, {_way_on(CONVERT, path.with_suffix(PARTS[path.suffix.lower()]))}")
+    try:
+        with path.open("rb") as file:
+            begins = file.read(FIRST_BYTES)
+    except (OSError, ValueError):
+        return
+    begins = begins.lstrip(b"\xef\xbb\xbf \t\r\n")
+    for mark, name, way_on in OTHER_FORMATS:
+        first = {b"<": b"<", b'"': b"{"}.get(mark[:1], mark)
+        if begins.startswith(first) and mark in begins:
+            raise entry.error(f"is {name}, {_way_on(way_on, path)}")
+
+
+def _way_on(text: str, path: Path) -> str:
+    return text.format(stem=path.stem, name=path.name)
+
+
+def _check_skipped(rows: list[Any], skip: Sequence[int | str], entry: Entry) -> None:
+    """Raise for a number or a type of geometry that no feature has."""
+    kinds = sorted({str(kind) for row in rows if (kind := _geometry_type(row)) is not None})
+    for index, item in enumerate(skip, start=1):
+        if isinstance(item, str) and item not in kinds:
+            raise entry.item(index).unknown(item, kinds)
+        if isinstance(item, int) and not 1 <= item <= len(rows):
+            raise entry.item(index).error(f"is {item}, expected 1 to {len(rows)}, the number of a feature")
+
+
+def _geometry_type(row: object) -> Any:
+    geometry = row.get("geometry") if isinstance(row, dict) else None
+    return geometry.get("type") if isinstance(geometry, dict) else None
+
+
+def _features(rows: list[Any], path: Path, key: str, skip: Sequence[int | str]) -> Iterator[Feature]:
+    """Features that have a geometry and are not to be left out."""
     for number, row in enumerate(rows, start=1):
         entry = Entry(path, f"feature {number}")
+        if number in skip or _geometry_type(row) in skip:
+            continue
         if not isinstance(row, dict) or row.get("type") != "Feature":
             raise entry.error("is no GeoJSON feature, expected an object with type 'Feature'")
-        layer = _properties(row).get(key) if named else LAYER_OF_BARE_POLYGONS
-        if not isinstance(layer, str):
-            found = f"has no property {key!r}" if layer is None else f"has the {key} {shown(layer)}"
-            raise entry.error(f"{found}, expected the name of its layer")
+        layer = _properties(row).get(key, UNNAMED)
+        if not isinstance(layer, str | None):
+            raise entry.error(f"has the {key} {shown(layer)}, expected the name of its layer")
         geometry = row.get("geometry")
         if geometry is None:
             continue
-        if not isinstance(geometry, dict) or geometry.get("type") not in GEOMETRY_TYPES:
+        if _geometry_type(row) not in GEOMETRY_TYPES:
             found = shown(geometry.get("type") if isinstance(geometry, dict) else geometry)
             raise entry.error(f"has a geometry of type {found}, expected Polygon or MultiPolygon")
-        yield Feature(_named(path, number, layer), layer, geometry, _properties(row), assumed=not named)
+        yield Feature(_named(path, number, layer or UNNAMED), layer or UNNAMED, geometry, _properties(row))
 
 
 def _properties(row: object) -> Mapping[str, Any]:
@@ -141,4 +220,4 @@ def _properties(row: object) -> Mapping[str, Any]:
 
 
 def _named(path: Path, number: int, layer: str) -> Entry:
-    return Entry(path, f"feature {number} (layer {shown(layer)})")
+    return Entry(path, f"feature {number} (layer {shown(layer)})" if layer else f"feature {number}")

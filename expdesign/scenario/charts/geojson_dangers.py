@@ -18,7 +18,7 @@ import shapely
 from expdesign.scenario.charts.area_tables import ChartTable
 from expdesign.scenario.charts.chart import continuous_line, feature_polygons, positions_of
 from expdesign.scenario.charts.dangers import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
-from expdesign.scenario.charts.geojson import POLYGON_TYPES, Feature
+from expdesign.scenario.charts.geojson import UNNAMED, Feature
 from expdesign.scenario.tables import LARGEST, Entry
 
 CLASSES = (*SOLID, *BUOYS, *DANGERS, *OVERHEAD, UNSURVEYED)
@@ -97,13 +97,13 @@ def kind_of(feature: Feature, table: ChartTable) -> str:
     Areas in land layers are land. Layers named in `danger_layers` hold dangers of whatever kind. Points and lines with
     a depth are soundings and depth contours.
     """
-    area = feature.geometry["type"] in POLYGON_TYPES
-    land = feature.layer in table.land_layers
+    area = feature.is_area
+    land = feature.layer in table.land_layers or (feature.layer == UNNAMED and table.outlines == "land")
     if area and land:
         return ""
     if table.danger_layers is not None:
         return (_said(feature) or "OBSTRN") if feature.layer in table.danger_layers else ""
-    named = land or feature.layer in (table.depth_layers or {})
+    named = land or feature.layer in (*table.water_layers, *(table.depth_layers or {}))
     spot = not area and table.depth_property is not None and feature.properties.get(table.depth_property) is not None
     return _said(feature) or ("" if named else _class(feature.layer)) or ("SOUNDG" if spot else "")
 
@@ -125,7 +125,7 @@ def dangers(features: tuple[Feature, ...], table: ChartTable, near_lon_deg: floa
             kind=kind,
             geometry=geometry,
             depth_m=_depth(feature, kind, table, geometry),
-            clearance_m=_least(feature, tuple(name.lower() for name in CLEARANCES)),
+            clearance_m=_least(_numbers(feature, tuple(name.lower() for name in CLEARANCES))),
         )
         for feature, kind in kinds
         if kind
@@ -153,7 +153,7 @@ def not_used(features: Iterable[Feature], used: Container[str]) -> tuple[str, ..
         features: that are no dangers.
         used: layers whose areas are used.
     """
-    left = [item for item in features if not (item.layer in used and item.geometry["type"] in POLYGON_TYPES)]
+    left = [item for item in features if not (item.layer in used and item.is_area)]
     counts = Counter((item.layer, _kind_words(item), item.geometry["type"]) for item in left)
     return tuple(
         f"not used: {count} {geometry} in layer {layer!r}{kind and f' of {kind}'}"
@@ -203,19 +203,24 @@ def _singular(word: str) -> tuple[str, str]:
 
 
 def _depth(feature: Feature, kind: str, table: ChartTable, geometry: shapely.Geometry) -> float:
-    """The least depth that is stated; nan for none. Soundings may state it as a third coordinate, if positive."""
+    """The least depth that is stated; nan for none. Soundings may state it as a third coordinate."""
     keys = (*DEPTH_KEYS, *([table.depth_property.lower()] if table.depth_property else []))
-    stated = _least(feature, keys)
+    stated = _least(map(table.below, _numbers(feature, keys)))
     if np.isnan(stated) and kind == "SOUNDG" and geometry.has_z:
-        depth = float(shapely.get_coordinates(geometry, include_z=True)[:, 2].min())
-        return depth if depth > 0 else np.nan
+        heights = shapely.get_coordinates(geometry, include_z=True)[:, 2]
+        return _least(table.below(float(height)) for height in heights if height != 0)
     return stated
 
 
-def _least(feature: Feature, keys: tuple[str, ...]) -> float:
-    """The least number among properties; nan where there is none, or where one of them is no number."""
-    found = [_number(value) for key, value in feature.properties.items() if key.lower() in keys and value is not None]
-    return min(found) if found and not np.isnan(found).any() else np.nan
+def _numbers(feature: Feature, keys: tuple[str, ...]) -> list[float]:
+    """The numbers among properties; nan for one that is no number."""
+    return [_number(value) for key, value in feature.properties.items() if key.lower() in keys and value is not None]
+
+
+def _least(numbers: Iterable[float]) -> float:
+    """The least number; nan where there is none, or where one of them is nan."""
+    found = list(numbers)
+    return float(np.min(found)) if found else np.nan
 
 
 def _number(value: object) -> float:

@@ -18,7 +18,10 @@ from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 
-GEOJSON_ONLY = ("land_layers", "layer_property", "depth_layers", "depth_property", "danger_layers")
+GEOJSON_ONLY = (
+    *("outlines", "land_layers", "water_layers", "layer_property", "depth_layers", "depth_property", "depth_positive"),
+    *("skip_features", "danger_layers"),
+)
 
 
 def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:

@@ -25,7 +25,9 @@ VESSELS = (
     "rudder. Simulations act on lags, dead times and sensor faults; estimates undo them in the data first."
 )
 AREAS = (
-    "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. Dangers in a "
+    "Allowed water is inside the bounds and deep enough, and is neither land, danger nor a no-go zone. The layer of an "
+    "outline in a GeoJSON chart says whether it encloses land (land_layers) or water (water_layers, depth_layers), or "
+    "outlines in [chart] does for those that name no layer; without either the chart is refused. Dangers in a "
     "GeoJSON chart are rocks, wrecks, shoals, obstructions, soundings, unsurveyed areas, buoys, beacons and bridges: "
     "points, lines or areas. They are known by their layer, or by a property kind, type, class, natural, objtype or "
     "seamark:type: an object class of S-57, as OpenSeaMap writes it, or a word in English, French, German, Swedish, "

@@ -63,4 +63,4 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
     else:
         day = planned_day(case, information, design, seed=seed, progress=planning)
     files = {**plan_files(case, day.plan), **day_files(case, day)}
-    return written(case, out, files, {**plan_summary(day.plan), **day_summary(day)}, progress, day_tables(day))
+    return written(case, out, files, {**plan_summary(case, day.plan), **day_summary(day)}, progress, day_tables(day))

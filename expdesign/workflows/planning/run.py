@@ -63,6 +63,6 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     summary = {
         **growth_summary(growth, case),
         **day_summary(day),
-        **plan_summary(day.plan),
+        **plan_summary(case, day.plan),
     }
     return written(case, out, files, summary, progress, day_tables(day))

@@ -125,7 +125,7 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
         track: Array | None = None
         if with_plan:
             day = planned_day(case, information, design, seed=seed, progress=planning)
-            information, design, plan = day.information, day.design, dict(plan_summary(day.plan))
+            information, design, plan = day.information, day.design, dict(plan_summary(case, day.plan))
             length = day.plan.day
             track = track_covariance(case.vessel, design, case.environment, day.plan.sailed)
             plan |= {"trial_s": length.planned_s, "day_s": length.planned_s}
@@ -168,6 +168,7 @@ def _described(
         covariance=covariance,
         plan=plan,
         legs_count=case.design.accuracy is not None,
+        remarks=case.remarks,
     )
 
 

@@ -41,7 +41,8 @@ def written(
     note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
     roll = {} if "heel_max_deg" in summary else note_on_roll(case.vessel)
-    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note, **roll}, tables=tables)
+    remarks = {"remarks": list(case.remarks)} if case.remarks and "remarks" not in summary else {}
+    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note, **roll, **remarks}, tables=tables)
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.signals import AUXILIARY
-from expdesign.vessel import NOT_SUPPORTED
+from expdesign.vessel import NOT_SUPPORTED, column_name
 
 
 def planned(
@@ -106,10 +106,25 @@ def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
     }
 
 
-def plan_summary(plan: Plan) -> dict[str, object]:
+def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
+    """What the files state and the trial does not use, or takes as certain; one line each."""
+    columns = [column_name(name) for name in plan.commands.names]
+    used = dict(zip(columns, (plan.commands.values != 0).any(axis=0).tolist(), strict=True))
+    idle = [
+        name
+        for actuator in case.vessel.actuators
+        if not any(used[column_name(signal)] for signal in actuator.signals)
+        for name in map(column_name, actuator.signals)
+    ]
+    return (*case.remarks, *([f"no run or leg of this plan uses {', '.join(idle)}"] if idle else []))
+
+
+def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
     """Key numbers of a plan, units in the names."""
+    remarks = trial_remarks(case, plan)
     return {
-        "verified": plan.verification.verified,
+        "verified": plan.verified,
+        **({} if plan.verified else {"verdict": plan.verdict}),
         "informative_s": plan.seconds("primitive"),
         "repositioning_s": plan.seconds("reposition"),
         "repositioning_bound_s": plan.reposition_bound_s,
@@ -122,6 +137,7 @@ def plan_summary(plan: Plan) -> dict[str, object]:
         "design_efficiency_realised": plan.design_efficiency_realised,
         **({} if plan.area.depths else {"note_on_depths": UNKNOWN_DEPTH}),
         **({"chart_remarks": list(plan.area.notes)} if plan.area.notes else {}),
+        **({"remarks": list(remarks)} if remarks else {}),
     }
 
 

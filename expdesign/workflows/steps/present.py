@@ -19,7 +19,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
 from expdesign.scenario import Scenario, load_scenario, load_vessel
-from expdesign.scenario.scenario_file import berth_problem
+from expdesign.scenario.scenario_file import berth_problem, build_berth
 from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, acting_response, delivered_at_samples
@@ -131,11 +131,12 @@ def present_pose(fix: Fix, ship: Vessel, first: Scenario) -> Array:
         FileError: the ship has not its clearance there.
     """
     area, sensors = first.area, ship.sensors
-    north_east = area.frame.to_metres(fix.position) if fix.degrees else fix.position
-    antenna = np.array([*north_east, fix.heading_rad - sensors.heading_bias_rad])
+    heading_rad = fix.heading_rad - sensors.heading_bias_rad
+    antenna = build_berth(np.asarray(fix.position), heading_rad, area, degrees=fix.degrees)
     mounted = np.array([sensors.position.forward_m, sensors.position.starboard_m])
-    pose = np.array([*to_n_frame(-mounted, antenna), antenna[2]])
-    problem = berth_problem(pose, ship, area, first.plan.clearance_m, degrees=fix.degrees)
+    pose = np.array([*to_n_frame(-mounted, antenna.pose), heading_rad])
+    berth = replace(antenna, pose=pose)
+    problem = berth_problem(berth, ship, area, first.plan, end=first.goal, way="a way to the goal")
     if problem:
         lat, lon = area.frame.to_degrees(pose[:2])
         where = f"{lat:.6f}, {lon:.6f}" if np.isfinite([lat, lon]).all() else place(pose)

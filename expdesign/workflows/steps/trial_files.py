@@ -23,7 +23,7 @@ from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.workflows.steps.grown import growth_files
-from expdesign.workflows.steps.planned import plan_files
+from expdesign.workflows.steps.planned import plan_files, trial_remarks
 from expdesign.workflows.steps.scored import score_files
 
 
@@ -87,4 +87,5 @@ def report_content(
         plan=plan,
         command=f"expdesign run {case.path} --seed {seed}",
         version=__version__,
+        remarks=trial_remarks(case, plan),
     )

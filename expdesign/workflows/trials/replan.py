@@ -140,7 +140,7 @@ def _replanned(
     }  # fmt: skip
     written = write_files(out or Path("runs") / case.name, files)
     progress("done", 1.0)
-    facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(day.plan)}
+    facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(case, day.plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
     return Outcome(files=written, summary=summary, tables=(_table(known), *day_tables(day)))
 
