@@ -9,10 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Lock, Thread
 
-from joblib import effective_n_jobs
-
-from expdesign.processes.tuning import REPORTING
+from expdesign.processes.sharing import shared_among
 from expdesign.progress import Progress
+
+LOOK_S = 0.2
+"""Between two looks at the reports."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def reported_together(progress: Progress, count: int) -> Iterator[Together]:
         reporters = tuple(Reporter(Path(folder) / str(number)) for number in range(count))
         for reporter in reporters:
             reporter.path.touch()
-        together, ended = Together(progress, reporters, effective_n_jobs(None)), Event()
+        together, ended = Together(progress, reporters, shared_among()), Event()
         listener = Thread(target=_listen, args=(together, ended), daemon=True)
         listener.start()
         try:
@@ -80,13 +81,11 @@ def reported_together(progress: Progress, count: int) -> Iterator[Together]:
         finally:
             ended.set()
             listener.join()
+            together.look()
 
 
 def _listen(together: Together, ended: Event) -> None:
-    """Look for what is new until the end, and once after it."""
-    listening = True
-    while listening:
-        listening = not ended.wait(REPORTING.look_s)
+    while not ended.wait(LOOK_S):
         together.look()
 
 
