@@ -32,11 +32,10 @@ class Reporter:
             file.seek(0, 2)
             file.write(f"{float(share)!r} {activity}\n")
 
-    def last(self) -> tuple[float, str]:
-        """The last report; nothing at first."""
-        *_, line = "", *self.path.read_text("utf-8").splitlines()
-        share, _, activity = line.partition(" ")
-        return (float(share), activity) if activity else (0.0, "")
+    def last(self) -> str:
+        """The last line; nothing done at first."""
+        *_, line = "0.0 ", *self.path.read_text("utf-8").splitlines()
+        return line
 
 
 class Together:
@@ -57,8 +56,8 @@ class Together:
             for number, reporter in enumerate(self.reporters):
                 if (new := reporter.last()) != self._known[number]:
                     self._known[number] = new
-                    done = sum(share for share, _ in self._known)
-                    self._progress(new[1], _elapsed(done, len(self._known), self._at_once))
+                    done = sum(float(line.partition(" ")[0]) for line in self._known)
+                    self._progress(new.partition(" ")[2], _elapsed(done, len(self._known), self._at_once))
 
     def finished(self, number: int, activity: str) -> None:
         """Report at once that a task is finished."""
