@@ -56,11 +56,7 @@ def connected(address: str) -> Iterator[Cluster]:
 
 
 class Cluster:
-    """A scheduler and its workers.
-
-    Args:
-        client: connected to it.
-        address: of the scheduler, as it was given.
+    """A scheduler, at the address that was given, and its workers.
 
     Raises:
         InputError: there are no workers, or they have other versions than this process.
@@ -194,12 +190,11 @@ def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[S
 @contextmanager
 def _quiet_loggers() -> Iterator[None]:
     """What happens to a connection is told once, as an error of ours."""
-    loggers = [logging.getLogger(name) for name in LOGGERS]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
+    levels = {logger: logger.level for logger in map(logging.getLogger, LOGGERS)}
+    for logger in levels:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        for logger, level in zip(loggers, levels, strict=True):
+        for logger, level in levels.items():
             logger.setLevel(level)

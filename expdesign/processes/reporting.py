@@ -18,11 +18,7 @@ LOOK_S = 0.2
 
 @dataclass(frozen=True)
 class Reporter:
-    """Progress of one task, in whatever process.
-
-    Attributes:
-        path: of its file; elsewhere than on this machine there is none, and nothing is reported.
-    """
+    """Progress of one task; where its file is not there, as on another machine, nothing is reported."""
 
     path: Path
 
@@ -39,11 +35,7 @@ class Reporter:
 
 
 class Together:
-    """Progress of tasks begun in this order, of about the same length.
-
-    Attributes:
-        reporters: one for each task.
-    """
+    """Progress of tasks begun in this order, of about the same length: `reporters` has one for each."""
 
     def __init__(self, progress: Progress, reporters: tuple[Reporter, ...], at_once: int) -> None:
         """Nothing is reported yet; so many tasks are worked on at once."""
