@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from itertools import accumulate, pairwise
 
 Progress = Callable[[str, float], None]
-"""Is called with the present activity and the completed share of the work, 0 to 1."""
+"""Is called with the present activity and the completed share of the work, 0 to 1; nan where nobody knows what is left,
+as a limit or the next result decides."""
 
 
 def silent(activity: str, share: float) -> None:
@@ -32,7 +34,7 @@ def ending(progress: Progress, *, most_s: float, refusal: Callable[[str], Except
     def report(activity: str, share: float) -> None:
         if time.monotonic() > ends_s:
             raise refusal(activity)
-        progress(activity, share)
+        progress(f"{activity} (given up after {most_s / 60.0:g} min)", share)
 
     return report
 
@@ -64,8 +66,9 @@ class Estimated:
         began = self.done
 
         def report(activity: str, share: float) -> None:
-            self.done = began + work * share
-            self.tell(activity, work * (1.0 - share) + left)
+            if not math.isnan(share):
+                self.done = began + work * share
+            self.tell(activity, began + work - self.done + left)
 
         return report
 
@@ -76,7 +79,7 @@ def never_falling(progress: Progress) -> Progress:
 
     def report(activity: str, share: float) -> None:
         nonlocal most
-        most = max(most, share)
-        progress(activity, most)
+        most = max(most, share)  # nan compares as nothing
+        progress(activity, share if math.isnan(share) else most)
 
     return report

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from joblib import parallel_config
 
 from counted_work import counted_work
 from expdesign import memory, workflows
 from expdesign.memory import ABSENT, VARIABLE, Memory, digest, in_order, recalled, remembering, user_memory
+from expdesign.processes import local_processes
 from nomoto_ship import nomoto_ship
 from short_examples import example_run, example_work
 
@@ -228,7 +228,7 @@ def test_two_processes_at_once_agree_and_share(tmp_path):
 
 
 def test_processes_work_only_on_what_is_not_remembered(tmp_path):
-    with remembering(Memory(tmp_path)), parallel_config(backend="loky", n_jobs=2):
+    with remembering(Memory(tmp_path)), local_processes(2):
         assert list(in_order(pow, (2,), [(3,), (4,)])) == [8, 16]
         assert list(in_order(pow, (2,), [(4,), (5,), (3,)])) == [16, 32, 8]
     assert len(entries(tmp_path)) == 3

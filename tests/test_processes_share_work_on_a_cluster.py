@@ -54,6 +54,11 @@ def interrupt(process):
     time.sleep(600.0)
 
 
+def marked(folder, number):
+    (folder / str(number)).touch()
+    time.sleep(0.1)
+
+
 def refuse(error):
     raise error
 
@@ -63,12 +68,18 @@ def test_results_and_errors_are_those_of_one_process(cluster):
     with on_cluster(cluster.address):
         assert list(in_order(doubled, (10,), tasks)) == list(in_order_here(10, tasks))
         assert sorted(as_finished(doubled, (10,), tasks)) == sorted(in_order_here(10, tasks))
-        assert next(in_order(doubled, (10,), tasks)) == 10  # the others are called off
         with pytest.raises(NoPlan, match="too narrow"):
             list(in_order(refuse, (), [(NoPlan("too narrow"),)]))
         with pytest.raises(UnknownName, match="unknown criterion 'd'"):
             list(in_order(refuse, (), [(UnknownName("criterion", "d", known=("A", "D")),)]))
     assert list(in_order(doubled, (10,), tasks)) == list(in_order_here(10, tasks))  # again in this process
+
+
+def test_work_that_is_given_up_is_called_off(cluster, tmp_path):
+    with on_cluster(cluster.address):
+        next(in_order(marked, (tmp_path,), [(number,) for number in range(40)]))
+        time.sleep(3.0)
+    assert len(list(tmp_path.iterdir())) < 20
 
 
 def in_order_here(base, tasks):

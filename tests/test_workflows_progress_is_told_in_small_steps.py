@@ -27,6 +27,14 @@ def test_steps_are_small_enough_to_follow_the_time(made_once, name):
     assert (np.diff(shares) ** 3).sum() < LARGEST
 
 
+def test_a_share_that_is_not_known_stays_so_and_harms_no_other():
+    told = []
+    first, last = in_phases(never_falling(lambda activity, share: told.append(share)), 1.0, 1.0)
+    for phase, share in ((first, 0.5), (first, np.nan), (first, 0.2), (last, 0.5)):
+        phase("at work", share)
+    np.testing.assert_array_equal(told, [0.25, np.nan, 0.25, 0.75])
+
+
 def test_a_stair_that_follows_the_time_on_average_has_the_correlation_of_its_steps():
     time = (np.arange(60000) + 0.5) / 60000
     for steps in (2, 5, 10):

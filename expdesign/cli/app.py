@@ -7,8 +7,10 @@ commands share, loads the workflow only when the command runs, shows progress, a
 from __future__ import annotations
 
 import inspect
+import math
 import time
 import warnings
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,6 +35,8 @@ PLAIN_STEP = 0.1
 """Least share of the work between two plain lines about the same activity."""
 LEAST_SHARE = 0.1
 """Share of the work from which the time left is estimated."""
+STANDING_S = 10.0
+"""Least time in which the time left must have fallen."""
 
 
 @contextmanager
@@ -47,24 +51,51 @@ def shown_progress(*, quiet: bool) -> Iterator[Progress]:
         )
         known = (activity, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), left_column)
         with Bar(*known, console=console, transient=True) as bar:
-            task, left = bar.add_task("starting", total=1.0, left=""), _TimeLeft()
-            yield lambda activity, share: bar.update(task, description=activity, completed=share, left=left.at(share))
+            left = _TimeLeft()
+            task = bar.add_task("starting", total=1.0, left=left)
+            yield lambda activity, share: bar.update(task, description=activity, completed=left.at(share))
     else:
         yield _plain_lines(console)
 
 
 class _TimeLeft:
-    """The time left if the rest goes on as the work so far."""
+    """The time left if the rest goes on as the work so far, in words.
+
+    It runs down until more is done. It is not known where the work says so, once it has run out, and where it has
+    fallen by less than half of the time that has passed: the work grows as it goes.
+    """
 
     def __init__(self) -> None:
-        self._began = time.monotonic()
+        self._began_s, self._share, self._known = time.monotonic(), 0.0, True
+        self._foreseen: list[tuple[float, float]] = []  # when it was foreseen, and the end
 
-    def at(self, share: float) -> str:
-        """The time left in words, once a part of the work is done; "" where it is less than a second."""
-        left_s = (time.monotonic() - self._began) * (1.0 - share) / max(share, LEAST_SHARE)
-        if share < LEAST_SHARE or left_s < 1.0:
+    def at(self, share: float) -> float:
+        """Note the share done, nan where it is not known; the largest so far."""
+        now_s, self._known = time.monotonic(), not math.isnan(share) and (self._known or share > self._share)
+        if share > self._share:
+            self._share = share
+            if share >= LEAST_SHARE:
+                self._foreseen.append((now_s, self._began_s + (now_s - self._began_s) / share))
+        return self._share
+
+    def __str__(self) -> str:
+        """Nothing before a part of the work is done, and where less than a second is left."""
+        if self._share >= 1.0 or (self._known and not self._foreseen):
+            return ""
+        now_s = time.monotonic()
+        left_s = self._foreseen[-1][1] - now_s if self._known else -math.inf
+        if left_s < 0.0 or self._stands(now_s, left_s):
+            return "time left not known"
+        if left_s < 1.0:
             return ""
         return f"about {left_s:.0f} s left" if left_s < 99.5 else f"about {left_s / 60.0:.0f} min left"
+
+    def _stands(self, now_s: float, left_s: float) -> bool:
+        """Whether what was foreseen as long ago as is left now, or at first, has come nearer by less than half."""
+        before_s = now_s - max(left_s, STANDING_S)
+        then_s, end_s = self._foreseen[max(bisect_right(self._foreseen, (before_s, math.inf)) - 1, 0)]
+        passed_s = now_s - then_s
+        return passed_s >= STANDING_S and left_s > end_s - then_s - passed_s / 2.0
 
 
 def _plain_lines(console: Console) -> Progress:
@@ -73,9 +104,10 @@ def _plain_lines(console: Console) -> Progress:
 
     def report(activity: str, share: float) -> None:
         nonlocal last
+        share = left.at(share)
         if last is None or activity != last[0] or share >= last[1] + PLAIN_STEP:
             last = (activity, share)
-            line = ", ".join(part for part in (activity, left.at(share)) if part)
+            line = ", ".join(part for part in (activity, str(left)) if part)
             console.print(f"[{share:4.0%}] {line}", markup=False, highlight=False, soft_wrap=True)
 
     return report

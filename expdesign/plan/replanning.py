@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,6 +133,7 @@ def with_more_room(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: t
     return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
 
 
-def replanning_progress(progress: Progress) -> Progress:
-    """Progress of a replan: most of the work is done, however much of it is to be repeated."""
-    return lambda activity, share: progress(f"with more room: {activity}", max(share, 0.9))
+def replanning_progress(progress: Progress, attempt: int) -> Progress:
+    """Progress of a replan, which drawn trials may refuse once more."""
+    which = f"plan {attempt + 1} of at most {PLAN.replans + 1}, with more room"
+    return lambda activity, share: progress(f"{which}: {activity}", math.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -80,7 +81,7 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
     phases, stretches = phases_of(problem, space.planner, progress), sum(left.values()) + 1
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
-        phases.placing("placing runs", 0.0)
+        phases.placing(*failures.placing())
         placed = _placed(search, space, left, voyage.line, stuck)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
@@ -120,6 +121,12 @@ class _Failures:
     def __init__(self, budget_s: float) -> None:
         self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
         self.tries, self._lost_s = 0, 0.0
+
+    def placing(self) -> tuple[str, float]:
+        """What is done next, and its share; that of another try is not known."""
+        if not self.tries:
+            return "placing runs", 0.0
+        return f"placing runs anew, {self._lost_s:.0f} s of plan.time_budget_s = {self._budget_s:g} used up", math.nan
 
     def count(self, cost_s: float, stuck: str, failed: Placement) -> None:
         """Count one failure, and raise NoPlan where it was one too many."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -71,7 +72,7 @@ def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: 
     try:
         return _in_water(problem, reported, _planned) if drafted is None else _checked(problem, drafted, reported)
     except NoPlan as error:
-        progress("looking for what would help", 0.95)
+        progress("looking for what would help", math.nan)
         raise advised(replace(problem, area=error.within or (drafted or problem).area), error) from None
 
 
@@ -107,16 +108,16 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
     problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
     confidence = problem.settings.confidence
     budget = _budget(problem)
-    sailed, before_s, budget.spent_s = draft.sailed, 0.0, draft.spent_s
+    sailed, before_s, budget.spent_s, reported = draft.sailed, 0.0, draft.spent_s, progress
     made = list[Refused]()
     for attempt in range(PLAN.replans + 1):
         if attempt:
-            before_s, progress = budget.spent_s, replanning_progress(progress)
+            before_s, reported = budget.spent_s, replanning_progress(progress, attempt)
             try:
-                sailed = sail_all(problem, room, progress, stated=water, budget=budget)
+                sailed = sail_all(problem, room, reported, stated=water, budget=budget)
             except NoPlan as error:
                 raise not_again(error, made) from None
-        checking = phases_of(problem, room.space.planner, progress).trials
+        checking = phases_of(problem, room.space.planner, reported).trials
         checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((verified,), (_bound_s,)))
         verification = next(checks)

@@ -7,21 +7,16 @@ what it was given. Data scattered among workers would be lost, and with them the
 from __future__ import annotations
 
 import logging
-import threading
+import sys
 import time
-import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Any
-from uuid import uuid4
-
-import cloudpickle
 
 from expdesign.errors import InputError
-from expdesign.processes.tasks import done
-from expdesign.processes.tuning import CLUSTER
 
 try:
     from distributed import Client, Future, KilledWorker
@@ -32,8 +27,14 @@ COMPARED = ("casadi", "clarabel", "cvxpy", "numba", "numpy", "ompl", "scipy", "s
 """Packages that results may depend on, besides our own: workers have the versions that are here."""
 LOGGERS = ("distributed", "distributed.client", "distributed.batched", "distributed.core", "distributed.comm")
 """They tell of lost connections, each in its own words."""
-ONE_AT_A_TIME = threading.Lock()
-"""Held by the task of this process: solvers and their random numbers are not made for threads."""
+CONNECT_S = 4.0
+"""In which a scheduler must answer at first, and again after the connection broke."""
+LOOK_S = 5.0
+"""Without a finished task, after which the scheduler is asked whether it and its workers are there."""
+ANSWER_S = 20.0
+"""In which it must answer then."""
+IDLE_S = 60.0
+"""After which work without any worker is given up; workers that died are mostly started again sooner."""
 
 
 @contextmanager
@@ -45,25 +46,23 @@ def connected(address: str) -> Iterator[Cluster]:
     """
     with _quiet_loggers():
         try:
-            client = Client(address, timeout=CLUSTER.connect_s, set_as_default=False)
+            client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"--scheduler {address}: no scheduler answers there ({error})") from None
         try:
             yield Cluster(client, address)
         finally:
-            client.close(timeout=CLUSTER.connect_s)
+            client.close(timeout=CONNECT_S)
 
 
 class Cluster:
-    """A scheduler and its workers.
-
-    Args:
-        client: connected to it.
-        address: of the scheduler, as it was given.
+    """A scheduler, at the address that was given, and its workers.
 
     Raises:
         InputError: there are no workers, or they have other versions than this process.
     """
+
+    at_once = sys.maxsize  # the scheduler shares tasks out as workers come and go
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
@@ -72,43 +71,32 @@ class Cluster:
         self._idle_since: float | None = None
         self._check_workers(versions)
 
-    def results(self, both: bytes, tasks: Sequence[bytes], *, ordered: bool) -> Iterator[Any]:
-        """Results of `done(both, task)`; tasks are submitted now. One whose worker dies is done by another."""
-        work = self._submitted(both, tasks)
-        finished: SimpleQueue[int] = SimpleQueue()
-        for number, future in work.items():
-            future.add_done_callback(lambda _, number=number: finished.put(number))
-        outcomes = self._finished(work, finished)
-        return map(_result, _in_order(outcomes) if ordered else (outcome for _, outcome in outcomes))
+    def beginner(self, both: bytes) -> Callable[[bytes], Future[Any]]:
+        """What submits a task with what all of its kind share. One whose worker dies is done by another."""
+        shared = self._submitted(bytes, both)
+        return partial(self._submitted, self._call, self._expected["expdesign"], shared)
 
-    def _submitted(self, both: bytes, tasks: Sequence[bytes]) -> dict[int, Future[Any]]:
-        name, expected = uuid4().hex, self._expected["expdesign"]
+    def _submitted(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         try:
             with warnings.catch_warnings():
                 warnings.filterwarnings("ignore", message="Sending large graph")  # it is sent once
-                shared = self._client.submit(bytes, both, key=f"shared-{name}")
-            return {
-                number: self._client.submit(self._call, expected, shared, task, key=f"task-{name}-{number}")
-                for number, task in enumerate(tasks)
-            }
+                return self._client.submit(function, *arguments, pure=False)
         except (OSError, RuntimeError):
             raise self._lost() from None
 
-    def _finished(self, work: dict[int, Future[Any]], finished: SimpleQueue[int]) -> Iterator[tuple[int, bytes]]:
-        """Numbers and outcomes of tasks, as they are finished."""
-        while work:
+    def wait(self, ended: SimpleQueue[int]) -> int:
+        """The next task that has ended, while the scheduler is there."""
+        while True:
             try:
-                number = finished.get(timeout=CLUSTER.look_s)
+                return ended.get(timeout=LOOK_S)
             except Empty:
                 self._look()
-            else:
-                yield number, self._outcome(work.pop(number))
 
-    def _outcome(self, future: Future[Any]) -> bytes:
+    def outcome(self, future: Future[Any]) -> bytes:
         """What the worker sent; where that is lost with the worker, the work is done again."""
         while True:
             try:
-                worker, version, outcome = future.result(timeout=CLUSTER.answer_s)
+                worker, version, outcome = future.result(timeout=ANSWER_S)
             except TimeoutError:
                 self._look()
             except KilledWorker:
@@ -119,22 +107,26 @@ class Cluster:
                 self._check(worker, {"expdesign": version})
                 return bytes(outcome)
 
+    def call_off(self, future: Future[Any]) -> None:
+        """The scheduler forgets what nobody holds."""
+        future.release()
+
     def _look(self) -> None:
         """Raise InputError where the scheduler does not answer, or has been without workers for long."""
         try:
             scheduler = self._client.scheduler
             assert scheduler is not None
-            found = self._client.sync(scheduler.identity, callback_timeout=CLUSTER.answer_s)
+            found = self._client.sync(scheduler.identity, callback_timeout=ANSWER_S)
         except Exception:
             raise self._lost() from None
         now = time.monotonic()
         self._idle_since = None if found["workers"] else self._idle_since or now
-        if self._idle_since is not None and now - self._idle_since > CLUSTER.idle_s:
-            raise self._error(f"there have been no workers for {CLUSTER.idle_s:g} s, and work is left")
+        if self._idle_since is not None and now - self._idle_since > IDLE_S:
+            raise self._error(f"there have been no workers for {IDLE_S:g} s, and work is left")
 
     def _check_workers(self, versions: Callable[[Sequence[str]], dict[str, str]]) -> None:
         try:
-            self._client.wait_for_workers(1, timeout=CLUSTER.answer_s)
+            self._client.wait_for_workers(1, timeout=ANSWER_S)
             found = self._client.run(versions, COMPARED)
         except TimeoutError:
             raise self._error("there are no workers, expected some (dask worker ADDRESS)") from None
@@ -155,33 +147,6 @@ class Cluster:
 
     def _error(self, problem: str) -> InputError:
         return InputError(f"--scheduler {self._address}: {problem}")
-
-
-def outcome_of(both: bytes, task: bytes) -> bytes:
-    """Result and error of a task, pickled; for workers."""
-    with ONE_AT_A_TIME:
-        try:
-            return bytes(cloudpickle.dumps((done(both, task), None)))
-        except Exception as error:
-            error.add_note("".join(traceback.format_exception(error)))
-            return bytes(cloudpickle.dumps((None, error)))
-
-
-def _result(outcome: bytes) -> Any:
-    result, error = cloudpickle.loads(outcome)
-    if error is not None:
-        raise error
-    return result
-
-
-def _in_order(numbered: Iterable[tuple[int, bytes]]) -> Iterator[bytes]:
-    waiting: dict[int, bytes] = {}
-    following = 0
-    for number, outcome in numbered:
-        waiting[number] = outcome
-        while following in waiting:
-            yield waiting.pop(following)
-            following += 1
 
 
 def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[Sequence[str]], dict[str, str]]]:
@@ -215,7 +180,7 @@ def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[S
         found = own_version()
         if found != expected:
             return get_worker().address, found, b""
-        from expdesign.processes._dask import outcome_of
+        from expdesign.processes.local import outcome_of
 
         return get_worker().address, found, outcome_of(both, task)
 
@@ -225,12 +190,11 @@ def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[S
 @contextmanager
 def _quiet_loggers() -> Iterator[None]:
     """What happens to a connection is told once, as an error of ours."""
-    loggers = [logging.getLogger(name) for name in LOGGERS]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
+    levels = {logger: logger.level for logger in map(logging.getLogger, LOGGERS)}
+    for logger in levels:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        for logger, level in zip(loggers, levels, strict=True):
+        for logger, level in levels.items():
             logger.setLevel(level)

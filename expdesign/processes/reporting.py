@@ -9,19 +9,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event, Lock, Thread
 
-from joblib import effective_n_jobs
-
-from expdesign.processes.tuning import REPORTING
+from expdesign.processes.sharing import shared_among
 from expdesign.progress import Progress
+
+LOOK_S = 0.2
+"""Between two looks at the reports."""
 
 
 @dataclass(frozen=True)
 class Reporter:
-    """Progress of one task, in whatever process.
-
-    Attributes:
-        path: of its file; elsewhere than on this machine there is none, and nothing is reported.
-    """
+    """Progress of one task; where its file is not there, as on another machine, nothing is reported."""
 
     path: Path
 
@@ -31,19 +28,14 @@ class Reporter:
             file.seek(0, 2)
             file.write(f"{float(share)!r} {activity}\n")
 
-    def last(self) -> tuple[float, str]:
-        """The last report; nothing at first."""
-        *_, line = "", *self.path.read_text("utf-8").splitlines()
-        share, _, activity = line.partition(" ")
-        return (float(share), activity) if activity else (0.0, "")
+    def last(self) -> str:
+        """The last line; nothing done at first."""
+        *_, line = "0.0 ", *self.path.read_text("utf-8").splitlines()
+        return line
 
 
 class Together:
-    """Progress of tasks begun in this order, of about the same length.
-
-    Attributes:
-        reporters: one for each task.
-    """
+    """Progress of tasks begun in this order, of about the same length: `reporters` has one for each."""
 
     def __init__(self, progress: Progress, reporters: tuple[Reporter, ...], at_once: int) -> None:
         """Nothing is reported yet; so many tasks are worked on at once."""
@@ -56,8 +48,8 @@ class Together:
             for number, reporter in enumerate(self.reporters):
                 if (new := reporter.last()) != self._known[number]:
                     self._known[number] = new
-                    done = sum(share for share, _ in self._known)
-                    self._progress(new[1], _elapsed(done, len(self._known), self._at_once))
+                    done = sum(float(line.partition(" ")[0]) for line in self._known)
+                    self._progress(new.partition(" ")[2], _elapsed(done, len(self._known), self._at_once))
 
     def finished(self, number: int, activity: str) -> None:
         """Report at once that a task is finished."""
@@ -72,7 +64,7 @@ def reported_together(progress: Progress, count: int) -> Iterator[Together]:
         reporters = tuple(Reporter(Path(folder) / str(number)) for number in range(count))
         for reporter in reporters:
             reporter.path.touch()
-        together, ended = Together(progress, reporters, effective_n_jobs(None)), Event()
+        together, ended = Together(progress, reporters, shared_among()), Event()
         listener = Thread(target=_listen, args=(together, ended), daemon=True)
         listener.start()
         try:
@@ -80,13 +72,11 @@ def reported_together(progress: Progress, count: int) -> Iterator[Together]:
         finally:
             ended.set()
             listener.join()
+            together.look()
 
 
 def _listen(together: Together, ended: Event) -> None:
-    """Look for what is new until the end, and once after it."""
-    listening = True
-    while listening:
-        listening = not ended.wait(REPORTING.look_s)
+    while not ended.wait(LOOK_S):
         together.look()
 
 

@@ -1,27 +1,27 @@
 """Independent work, shared among processes of this machine or the workers of a Dask scheduler.
 
 Results are the same wherever tasks are done: a task takes all that it depends on, its random numbers too, as arguments.
+
+Every call has its own tasks, futures and queue; all that calls share is the place that runs what they begin. So work
+may begin inside other work, end early or fail in any order: no call waits for another, or ends what is not its own.
 """
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
-from itertools import chain, islice
+from itertools import islice
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import cloudpickle
-from joblib import Parallel, cpu_count, delayed, effective_n_jobs, parallel_config
-from joblib.externals.loky import ProcessPoolExecutor
+from joblib import cpu_count
 
-from expdesign.processes.tasks import done
+from expdesign.processes.local import Processes, result_of
 
 if TYPE_CHECKING:
     from expdesign.processes._dask import Cluster
@@ -33,79 +33,28 @@ SLOW_S = 1.0
 """From which a task was long in coming."""
 ALONE_S = 5.0
 """Time from which tasks that come one by one are worth other processes."""
-
-_CLUSTER: ContextVar[Cluster | None] = ContextVar("_CLUSTER", default=None)
-"""Where `on_cluster` shares the work of a block."""
-_START: ContextVar[Callable[[], None]] = ContextVar("_START", default=lambda: None)
-"""Starts the processes of a block of `local_processes`."""
-
-
-def in_order(
-    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[Result]:
-    """Results of `function(*shared, *task)`, in the order of the tasks.
-
-    One process works on a task when its result is asked for. Several begin at once, on copies made now: what changes
-    here later does not reach them. Where results are not read to their end, the work under way is waited for; that of
-    a cluster is called off.
-
-    Args:
-        function: of a module.
-        shared: arguments that all tasks share; unpacked once in each process.
-        tasks: the others.
-    """
-    return _results(function, shared, tasks, ordered=True)
-
-
-def as_finished(
-    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[Result]:
-    """The results of `in_order`, those first that are finished first."""
-    return _results(function, shared, tasks, ordered=False)
+_PLACE: ContextVar[Processes | Cluster | None] = ContextVar("_PLACE", default=None)
+"""Where the work of a block is shared; None for this process alone."""
 
 
 @contextmanager
 def local_processes(count: int, *, load: Callable[[], None] | None = None) -> Iterator[None]:
-    """Work of this block is shared among so many processes of this machine.
+    """Work of this block is shared among so many processes of this machine, which end with it.
 
     Args:
         count: of processes.
         load: what each does first, where `begin` is called before there is work to share.
     """
-    started: list[Iterator[None]] = []
-
-    def start() -> None:
-        if load is not None and not started and effective_n_jobs(None) > 1:
-            started.append(as_finished(load, (), [()] * count))
-
-    with warnings.catch_warnings(), parallel_config(backend="loky", n_jobs=count):
-        # joblib replaces a process whose memory has grown, and says so; no work is lost
+    place = Processes(count, load)
+    with _sharing(place if count > 1 else None), warnings.catch_warnings():
+        # loky replaces a process whose memory has grown, and says so; no work is lost
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
-        token = _START.set(start)
         try:
             yield
+            place.end(kill=False)
         except BaseException:
-            with suppress(Exception):  # of processes interrupted while they start: what ended the work counts
-                list(chain(*started))
+            place.end(kill=True)
             raise
-        finally:
-            _START.reset(token)
-        list(chain(*started))
-
-
-def processors() -> int:
-    """Cores that this process may use: its affinity, its container's quota and LOKY_MAX_CPU_COUNT are kept to."""
-    return int(cpu_count())
-
-
-def shared_among() -> int:
-    """How many processes or threads of this machine work of this block may be shared among."""
-    return 1 if _CLUSTER.get() is not None else int(effective_n_jobs(None))
-
-
-def begin() -> None:
-    """Start the processes of this block, if they are not: there will be work to share."""
-    _START.get()()
 
 
 @contextmanager
@@ -118,40 +67,97 @@ def on_cluster(scheduler: str) -> Iterator[None]:
     """
     from expdesign.processes._dask import connected
 
-    with connected(scheduler) as cluster:
-        before = _CLUSTER.set(cluster)
-        try:
-            yield
-        finally:
-            _CLUSTER.reset(before)
+    with connected(scheduler) as cluster, _sharing(cluster):
+        yield
+
+
+@contextmanager
+def _sharing(place: Processes | Cluster | None) -> Iterator[None]:
+    before = _PLACE.set(place)
+    try:
+        yield
+    finally:
+        _PLACE.reset(before)
+
+
+def processors() -> int:
+    """Cores that this process may use: its affinity, its container's quota and LOKY_MAX_CPU_COUNT are kept to."""
+    return int(cpu_count())
+
+
+def shared_among() -> int:
+    """How many processes or threads of this machine work of this block may be shared among."""
+    place = _PLACE.get()
+    return place.count if isinstance(place, Processes) else 1
+
+
+def begin() -> None:
+    """Start the processes of this block, if they are not: there will be work to share."""
+    place = _PLACE.get()
+    if isinstance(place, Processes):
+        place.begin()
+
+
+def in_order(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Result]:
+    """Results of `function(*shared, *task)`, in the order of the tasks.
+
+    One process works on a task when its result is asked for. Several begin at once, on copies made now: what changes
+    here later does not reach them. Where results are not read to their end, tasks that are not under way are left.
+
+    Args:
+        function: of a module.
+        shared: arguments that all tasks share; unpacked once in each process.
+        tasks: the others.
+
+    Raises:
+        InputError: a process died, or the cluster is lost; whatever a task raises, when its result is asked for.
+    """
+    return _results(function, shared, tasks, ordered=True)
+
+
+def as_finished(
+    function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Result]:
+    """The results of `in_order`, those first that are finished first."""
+    return _results(function, shared, tasks, ordered=False)
 
 
 def _results(
     function: Callable[..., Result], shared: tuple[Any, ...], tasks: Iterable[tuple[Any, ...]], *, ordered: bool
 ) -> Iterator[Result]:
-    cluster = _CLUSTER.get()
-    if cluster is None and effective_n_jobs(None) == 1:
+    place = _PLACE.get()
+    if place is None:
         return (function(*shared, *task) for task in tasks)
-    both = cloudpickle.dumps((function, shared))
-    copies = [cloudpickle.dumps(task) for task in tasks]
-    if cluster is not None:
-        return cluster.results(both, copies, ordered=ordered)
-    with leaving_interruptions():
-        work = Parallel(return_as="generator" if ordered else "generator_unordered")
-        results = _waited_for(work(delayed(done)(both, task) for task in copies))
+    both, copies = cloudpickle.dumps((function, shared)), [cloudpickle.dumps(task) for task in tasks]
+    results = _shared(place, both, copies, ordered=ordered)
     next(results)
     return results
 
 
-def _waited_for(results: Iterator[Any]) -> Iterator[Any]:
-    """None, from which on work is waited for, and the same results; joblib would end the processes with some left."""
+def _shared(place: Processes | Cluster, both: bytes, tasks: list[bytes], *, ordered: bool) -> Iterator[Any]:
+    """None once the first tasks have begun, then the results; each that ends lets the reader begin another."""
+    begin_task, waiting = place.beginner(both), iter(enumerate(tasks))
+    begun, ended, outcomes = dict[int, Any](), SimpleQueue[int](), dict[int, bytes]()
+
+    def begin_more() -> None:
+        for number, task in islice(waiting, place.at_once - len(begun)):
+            begun[number] = begin_task(task)
+            begun[number].add_done_callback(lambda _, number=number: ended.put(number))
+
     try:
+        begin_more()
         yield None
-        for result in results:  # noqa: UP028 - `yield from` would close them
-            yield result
-    except GeneratorExit:
-        list(results)
-        raise
+        for following in range(len(tasks)):
+            while not outcomes or (ordered and following not in outcomes):
+                number = place.wait(ended)
+                outcomes[number] = place.outcome(begun.pop(number))
+                begin_more()
+            yield result_of(outcomes.pop(following if ordered else next(iter(outcomes))))
+    finally:
+        for future in begun.values():
+            place.call_off(future)
 
 
 def ahead(
@@ -167,44 +173,20 @@ def ahead(
         shared: arguments that all tasks share.
         tasks: what each result goes with, and the other arguments.
     """
-    jobs, source, began_s, asked_s = shared_among(), iter(tasks), time.monotonic(), time.monotonic()
+    place, source, began_s, asked_s = _PLACE.get(), iter(tasks), time.monotonic(), time.monotonic()
     for item, task in source:
         slow = time.monotonic() - asked_s > SLOW_S
         yield item, function(*shared, *task)
         asked_s = time.monotonic()
-        if jobs > 1 and not slow and asked_s - began_s > ALONE_S:
+        if isinstance(place, Processes) and not slow and asked_s - began_s > ALONE_S:
             break
     else:
         return
-    executor = ProcessPoolExecutor(max_workers=jobs)
-    try:
-        yield from _results_ahead(executor, cloudpickle.dumps((function, shared)), source, 2 * jobs)
-    finally:
-        executor.shutdown(wait=True)
-
-
-def _results_ahead(
-    executor: ProcessPoolExecutor, both: bytes, source: Iterator[tuple[Item, tuple[Any, ...]]], most: int
-) -> Iterator[tuple[Item, Any]]:
-    work, last = deque[tuple[Item, Future[Any]]](), False
+    begin_task, work, last = place.beginner(cloudpickle.dumps((function, shared))), deque[tuple[Item, Any]](), False
     while not last:
         asked_s, taken = time.monotonic(), list(islice(source, 1))
         last, slow = not taken, time.monotonic() - asked_s > SLOW_S
-        with leaving_interruptions():
-            work.extend((item, executor.submit(done, both, cloudpickle.dumps(task))) for item, task in taken)
-        while work and (last or slow or len(work) > most):
-            item, result = work.popleft()
-            yield item, result.result()
-
-
-@contextmanager
-def leaving_interruptions() -> Iterator[None]:
-    """Processes started in this block ignore Ctrl-C: the one they work for ends them."""
-    if threading.current_thread() is not threading.main_thread():  # others may not change it
-        yield
-        return
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
+        work.extend((item, begin_task(cloudpickle.dumps(task))) for item, task in taken)
+        while work and (last or slow or len(work) > place.at_once):
+            item, future = work.popleft()
+            yield item, result_of(place.outcome(future))

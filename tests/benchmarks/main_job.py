@@ -78,7 +78,7 @@ def measured(scenario: Path) -> MainJob:
         seen.update(s=now, phase=phase)
 
     def progress(activity: str, share: float) -> None:
-        reach(counted_work.PHASES.get(activity.removeprefix("with more room: "), seen["phase"]))
+        reach(counted_work.PHASES.get(activity.rpartition(": ")[2], seen["phase"]))
 
     with tempfile.TemporaryDirectory() as folder:
         run = workflows.run

@@ -139,7 +139,7 @@ def row(name: str, total_s: float, moments: list[tuple[float, float, str]]) -> s
         return f"| {name} | {total_s:.1f} s | | | | too short to be watched |"
     times, shares, activities = zip(*moments, strict=True)
     last = np.searchsorted(np.array(times) / total_s, MOMENTS, side="right") - 1
-    shown = np.array(shares)[last]
+    shown = np.fmax.accumulate(shares)[last]
     apart = shown - MOMENTS
     correlation = np.corrcoef(shown, MOMENTS)[0, 1]
     return (
