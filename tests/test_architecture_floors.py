@@ -30,7 +30,7 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("tuning",), ("file",), ("pose",), ("load", "labels", "levels", "pieces")),
+    "records": (("tuning",), ("file",), ("limits", "pose"), ("load", "labels", "levels", "pieces")),
     "step_trials": (
         ("tuning",),
         ("holds", "regression", "steady_state", "responses"),

@@ -33,6 +33,9 @@ class Tuning:
         learning_samples: samples, from the middle, from which the smoother learns its ratio.
         shortest_smoothed: samples that the smoother needs.
         held_share: share of repeated positions of a moving ship above which they count as held values.
+        limit_slack: share of an actuator's limit by which a recorded input may exceed it.
+        most_beyond: share of rows beyond the limits above which a file is refused.
+        far_beyond: multiple of a limit from which another unit is thought of.
         sideways_ratio: sway over surge (root mean square) above which the axes of the pose are questioned.
     """
 
@@ -59,6 +62,9 @@ class Tuning:
     learning_samples: int = 8192
     shortest_smoothed: int = 4
     held_share: float = 0.5
+    limit_slack: float = 0.02
+    most_beyond: float = 0.5
+    far_beyond: float = 3.0
     sideways_ratio: float = 2.0
 
 

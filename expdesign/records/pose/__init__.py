@@ -17,7 +17,7 @@ from expdesign.records.pose.motion import (
     smoothed_velocity,
     velocity_origins,
 )
-from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
+from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_angles, with_metres
 
 __all__ = [
     "MEASURED",
@@ -38,6 +38,6 @@ __all__ = [
     "origin_notes",
     "smoothed_velocity",
     "velocity_origins",
-    "with_continuous_heading",
+    "with_continuous_angles",
     "with_metres",
 ]

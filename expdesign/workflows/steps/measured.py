@@ -46,6 +46,7 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         velocity=velocity,
         heading_std_rad=vessel.sensors.heading_rad or None,
         outputs=vessel.model.outputs,
+        actuators=vessel.model.actuators,
     )
     return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
 

@@ -134,7 +134,8 @@ def _cases(
     step_s = None
     followed = False
     for path, load in zip(data, known.loads, strict=True):
-        record = load_records([path], outputs=("r",), sample_time_s=step_s)
+        actuators = () if ship is None else ship.model.actuators
+        record = load_records([path], outputs=("r",), sample_time_s=step_s, actuators=actuators)
         step_s = record.batches[0].sample_time_s
         runs = tuple(_run(path, batch, rudder, ship) for batch in record.batches)
         cases.append(Case(name=path.stem, load=load, runs=runs))

@@ -115,6 +115,7 @@ def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
         velocity=velocity,
         heading_std_rad=None if ship is None else ship.sensors.heading_rad or None,
         outputs=("u", "r"),
+        actuators=() if ship is None else ship.model.actuators,
     )
 
 
