@@ -9,6 +9,7 @@ from pathlib import Path
 from expdesign.errors import FileError
 from expdesign.estimation.regression import with_depth
 from expdesign.input_files import check_ends
+from expdesign.kinematics import checked
 from expdesign.records import load_records
 from expdesign.reduction import reduced
 from expdesign.signals import Record
@@ -48,7 +49,8 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         outputs=vessel.model.outputs,
         actuators=vessel.model.actuators,
     )
-    return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+    record = with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+    return checked(record, vessel, smoothed=velocity == "smoothed")
 
 
 def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
