@@ -61,8 +61,8 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
     if abs(bias) > max(TUNING.certain * std, TUNING.rate_matters * rate):
         yield Finding(
             name="yaw_rate_bias_radps", value=bias, std=std, rest=found.rest,
-            text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of a "
-            "gyro?",
+            text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of "
+            "a gyro?",
         )  # fmt: skip
 
 

@@ -73,8 +73,8 @@ class Tuning:
     told: float = 0.02
     on_course: float = 0.5
     drifts: float = 0.2
-    on_track: float = 0.3
-    turning: float = 0.05
+    on_track: float = 0.5
+    turning: float = 0.02
     opposed: tuple[float, float] = (0.1, 10.0)
     opposed_share: float = 0.3
     turned_rad: float = 1.6

@@ -26,6 +26,8 @@ class Tuning:
         pose_disagreement: relative difference of both changes (root mean square) that gets a note.
         pose_suspicion: relative difference above which an explanation is searched for.
         pose_explained: share of the difference that may remain with an explanation.
+        course_spread: circular variance of course less heading below which it is not questioned.
+        course_axis_rad: distance of an axis at which headings may begin [rad].
         equally_good: ratio of remaining differences below which explanations are named together.
         turning_rad: change of heading over a window (root mean square) below which no turn is compared [rad].
         jump_ratio: a step above this multiple of the 95th percentile of all changes gets a note.
@@ -55,6 +57,8 @@ class Tuning:
     pose_disagreement: float = 0.3
     pose_suspicion: float = 0.1
     pose_explained: float = 0.25
+    course_spread: float = 0.02
+    course_axis_rad: float = 0.5
     equally_good: float = 1.5
     turning_rad: float = 0.05
     jump_ratio: float = 10.0

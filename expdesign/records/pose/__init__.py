@@ -1,6 +1,6 @@
 """Pose and velocity: positions, derived velocities, and whether they agree."""
 
-from expdesign.records.pose.agreement import check_agreement
+from expdesign.records.pose.agreement import check_agreement, check_heading
 from expdesign.records.pose.fix import Fix, last_fix
 from expdesign.records.pose.motion import (
     MEASURED,
@@ -29,6 +29,7 @@ __all__ = [
     "batch_velocity",
     "central_difference",
     "check_agreement",
+    "check_heading",
     "check_jumps",
     "kept_samples",
     "last_fix",
