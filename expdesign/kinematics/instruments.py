@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.kinematics.relation import relation
+from expdesign.kinematics.relation import Relation, relation
 from expdesign.kinematics.tuning import TUNING
 from expdesign.signals import Batch
 from expdesign.values import Array
@@ -95,14 +95,29 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
             text=f"the positions move at {with_std(abs(drift), std)} m/s towards {toward:.0f} degrees beyond u_mps and "
             "v_mps: are these through the water, and not over ground?",
         )  # fmt: skip
+    yield from _place_or_delay(own, found, speed, length_m=length_m)
+
+
+def _place_or_delay(batches: Sequence[Batch], found: Relation, speed: float, *, length_m: float) -> Iterator[Finding]:
+    """Where the positions are measured, or how late the velocities come; at one speed these are the same."""
     arm, spread = -complex(found.others[1] / found.ratio), found.others_std[1] / abs(found.ratio)
+    late = relation(stretches(batches, [_moving_late(batch) for batch in batches], length_m=length_m))
+    if late is not None:
+        delay, std = -float((late.others[2] / late.ratio).real), float(late.others_std[2, 0] / abs(late.ratio))
+        if abs(delay) > max(TUNING.certain * std, TUNING.delay_matters * batches[0].sample_time_s):
+            arm, spread = -complex(late.others[1] / late.ratio), late.others_std[1] / abs(late.ratio)
+            later, sooner = ("u_mps and v_mps", "the positions")[:: 1 if delay > 0 else -1]
+            yield Finding(
+                name="velocity_delay_s", value=delay, std=std, rest=late.rest,
+                text=f"{later} come {with_std(abs(delay), std)} s later than {sooner}.",
+            )  # fmt: skip
     if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), TUNING.place_matters * length_m):
         ahead, beside = ("forward" if arm.real >= 0 else "aft"), ("starboard" if arm.imag >= 0 else "port")
         yield Finding(
             name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.rest,
             text=f"the positions are those of a place {with_std(abs(arm.real), spread[0])} m {ahead} and "
-            f"{with_std(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured, or u_mps and "
-            f"v_mps come {arm.real / speed:.2g} s late.",
+            f"{with_std(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
+            + (f", or u_mps and v_mps come {arm.real / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) else "."),
         )  # fmt: skip
 
 
@@ -147,6 +162,12 @@ def _moving(batch: Batch) -> Array:
     bow = np.exp(1j * batch.pose[:, 2])
     through = integral(bow * (batch.velocity[:, 0] + 1j * batch.velocity[:, 1]), batch)
     return np.column_stack([through, batch.pose[:, 0] + 1j * batch.pose[:, 1], batch.time_s, bow])
+
+
+def _moving_late(batch: Batch) -> Array:
+    """(k, 5) the same, and the velocity."""
+    rows = _moving(batch)
+    return np.column_stack([rows, rows[:, 3] * (batch.velocity[:, 0] + 1j * batch.velocity[:, 1])])
 
 
 def _drifting(batch: Batch) -> Array:
