@@ -17,20 +17,29 @@ if TYPE_CHECKING:
 UNITS = {"s": "s", "m": "m", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "kn": "kn", "rps": "1/s"}
 """Last part of a name -> printed unit."""
 LONGEST = 200
-"""Characters of a value beside its name; longer ones are left to the tables."""
+"""Characters of a list beside its name; longer ones are left to the tables."""
 
 
 def as_json(command: str, outcome: Outcome) -> str:
-    """One JSON object: `command`, `files` written, and the workflow's `summary`."""
-    content = {"command": command, "files": [str(path) for path in outcome.files], "summary": outcome.summary}
+    """One JSON object: `command`, `files` written, the workflow's `summary`, and the `notes` of its page."""
+    content = {
+        "command": command,
+        "files": [str(path) for path in outcome.files],
+        "summary": outcome.summary,
+        "notes": list(outcome.notes),
+    }
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def print_summary(outcome: Outcome) -> None:
-    """Key numbers as a table, then the files and the page to open."""
+    """Key numbers as a table, then tables, the notes, the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    shown = {key: value for key, value in outcome.summary.items() if not outcome.tables or _brief(value)}
+    shown = {
+        key: value
+        for key, value in outcome.summary.items()
+        if not _among_notes(value, outcome) and (not outcome.tables or _brief(value))
+    }
     for row in _rows(shown):
         table.add_row(*row)
     if table.row_count:
@@ -38,6 +47,11 @@ def print_summary(outcome: Outcome) -> None:
         console.print()
     for text in outcome.tables:
         _print_table(console, text)
+    if outcome.notes:
+        console.print("Notes", style="bold")
+        for note in outcome.notes:
+            console.print(f"- {note}")
+        console.print()
     for folder, names in _by_folder(outcome.files).items():
         console.print(f"Written to {folder}: {', '.join(names)}")
     for page in (path for path in outcome.files if path.suffix == ".html"):
@@ -45,8 +59,15 @@ def print_summary(outcome: Outcome) -> None:
 
 
 def _brief(value: object) -> bool:
-    """Whether a value gets a line beside tables."""
-    return not isinstance(value, Mapping) and value != [] and len(_text(value)) < LONGEST
+    """Whether a value gets a line beside tables: no table of its own, and no long list."""
+    if isinstance(value, (list, tuple)):
+        return bool(value) and len(_text(value)) < LONGEST
+    return not isinstance(value, Mapping)
+
+
+def _among_notes(value: object, outcome: Outcome) -> bool:
+    """Whether an entry is a list of what the notes say anyway."""
+    return isinstance(value, (list, tuple)) and bool(value) and set(map(str, value)) <= set(outcome.notes)
 
 
 def _print_table(console: Console, text: TextTable) -> None:

@@ -29,7 +29,7 @@ SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velociti
 
 
 def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
-    """The record with held and interpolated signals read in time, and first a note on all that does not agree.
+    """The record with held and interpolated signals read in time, and its doubts: what does not agree.
 
     Args:
         record: as measured.
@@ -39,7 +39,8 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     in_time = [_in_time(batch, vessel.sensors, smoothed=smoothed) for batch in record.batches]
     record = replace(record, batches=tuple(batch for batch, _ in in_time))
     held_notes = _shared([(batch.name, note) for batch, notes in in_time for note in notes])
-    return replace(record, notes=(*held_notes, *_findings(record, vessel, smoothed=smoothed), *record.notes))
+    doubts = (*held_notes, *_findings(record, vessel, smoothed=smoothed))
+    return replace(record, notes=(*doubts, *record.notes), doubts=doubts)
 
 
 def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, list[str]]:

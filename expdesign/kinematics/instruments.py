@@ -111,7 +111,8 @@ def _place_or_delay(batches: Sequence[Batch], found: Relation, speed: float, *, 
                 name="velocity_delay_s", value=delay, std=std, rest=late.rest,
                 text=f"{later} come {with_std(abs(delay), std)} s later than {sooner}.",
             )  # fmt: skip
-    if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), TUNING.place_matters * length_m):
+    little = TUNING.place_matters * length_m + TUNING.delay_matters * batches[0].sample_time_s * speed
+    if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), little):
         ahead, beside = ("forward" if arm.real >= 0 else "aft"), ("starboard" if arm.imag >= 0 else "port")
         yield Finding(
             name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.rest,

@@ -1,6 +1,6 @@
 """Manoeuvring indices as a form: criteria of the resolution and results, as JSON, table and page."""
 
 from expdesign.export.indices_form.form import Held, IndicesContent, indices_json, verdict_rows
-from expdesign.export.indices_form.page import indices_html
+from expdesign.export.indices_form.page import indices_html, indices_notes
 
-__all__ = ["Held", "IndicesContent", "indices_html", "indices_json", "verdict_rows"]
+__all__ = ["Held", "IndicesContent", "indices_html", "indices_json", "indices_notes", "verdict_rows"]

@@ -27,8 +27,16 @@ def indices_html(content: IndicesContent) -> str:
         circles=[_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)],
         zigzags=[_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)],
         stops=[_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)],
-        others=[item for item in content.measured if isinstance(item, NotStandard)],
+        notes=indices_notes(content),
     )
+
+
+def indices_notes(content: IndicesContent) -> tuple[str, ...]:
+    """The notes of the form: on the files, and why results are missing."""
+    why_not = [f"The model was not simulated: {content.simulated_why_not}"] if content.simulated_why_not else []
+    not_run = content.simulated.not_run if content.simulated else ()
+    others = (f"{item.name}: {item.reason}" for item in content.measured if isinstance(item, NotStandard))
+    return (*why_not, *not_run, *others, *content.notes)
 
 
 def _degrees(angle_rad: float) -> str:

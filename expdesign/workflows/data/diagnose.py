@@ -18,6 +18,7 @@ from expdesign.export.diagnosis_page import (
     RollVerdict,
     diagnosis_html,
     diagnosis_json,
+    diagnosis_notes,
     diagnosis_tables,
     extended_vessel,
     roll_sentences,
@@ -32,7 +33,7 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalis
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import doubted, measured
 from expdesign.workflows.steps.workers import workers
 
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
@@ -74,7 +75,7 @@ def diagnose(
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     reported = Estimated(progress, after=drawing)
-    with workers(jobs if samples > FEW_SAMPLES else 1, load=None):
+    with workers(jobs if samples > FEW_SAMPLES else 1, load=None), doubted(record):
         found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=reported)
     reported.after = 0.0
     roll = _roll(ship, record)
@@ -94,7 +95,7 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(files=written, summary=summary, tables=_tables(found))
+    return Outcome(files=written, summary=summary, tables=_tables(found), notes=diagnosis_notes(found))
 
 
 def _roll(ship: Vessel, record: Record) -> RollVerdict | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import write_files
-from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, verdict_rows
+from expdesign.export.indices_form import Held, IndicesContent, indices_html, indices_json, indices_notes, verdict_rows
 from expdesign.indices import StandardResults, ZigZag, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
@@ -76,7 +76,7 @@ def indices(
     files = {"indices.json": indices_json(content), "indices.html": indices_html(content)}
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=indices_notes(content))
 
 
 def _check_place(ship: Vessel, forward_m: float) -> None:

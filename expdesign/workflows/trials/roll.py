@@ -114,7 +114,7 @@ def roll(
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:
@@ -201,14 +201,12 @@ def _summary(content: RollContent) -> dict[str, object]:
         "held": list(estimate.held),
         "rank": content.report.rank,
         "free": len(content.report.free),
-        "remarks": [*roll_sentences(content), *content.notes],
+        "remarks": list(roll_sentences(content)),
     }
 
 
 def _tables(content: RollContent) -> tuple[TextTable, ...]:
-    found = TextTable(
-        title="Roll", header=("finding",), rows=tuple((text,) for text in (*roll_sentences(content), *content.notes))
-    )
+    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
     values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
     cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
     return (found, values, cures) if cures.rows else (found, values)

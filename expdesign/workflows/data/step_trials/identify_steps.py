@@ -104,7 +104,7 @@ def identify_steps(
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:

@@ -141,7 +141,7 @@ def watch_steps(
     content = _content(now, work)
     written = write_files(folder, _files(now, work))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:
