@@ -7,8 +7,8 @@ Held and interpolated signals are found and read in time (`held`); gyro, compass
 sense that the vessel file gives (`steering`). Everything is told; nothing but the times of readings is changed.
 """
 
-from expdesign.kinematics.check import checked
+from expdesign.kinematics.check import checked, in_stated_time
 from expdesign.kinematics.held import Held, held
 from expdesign.kinematics.instruments import Finding
 
-__all__ = ["Finding", "Held", "checked", "held"]
+__all__ = ["Finding", "Held", "checked", "held", "in_stated_time"]

@@ -43,6 +43,17 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     return replace(record, notes=(*doubts, *record.notes), doubts=doubts)
 
 
+def in_stated_time(record: Record, sensors: Sensors) -> Record:
+    """The record with signals read at the stated intervals of their sensors, for models that know no intervals."""
+    intervals = {name: Mounting(interval_s=getattr(sensors, name).interval_s) for name in SIGNALS}
+    if not any(place.interval_s for place in intervals.values()):
+        return record
+    like: dict[str, Any] = {name: place for name, place in intervals.items() if place.interval_s}
+    own = replace(Sensors(heading_rad=sensors.heading_rad), **like)
+    notes = at_reference_point(record, own).notes
+    return replace(record, batches=tuple(_read(batch, own, smoothed=False) for batch in record.batches), notes=notes)
+
+
 def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, list[str]]:
     """A batch with the signals that its file holds between readings, of sensors without a stated interval."""
     found = {
@@ -60,10 +71,19 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
     }
     like = replace(Sensors(heading_rad=sensors.heading_rad), **intervals)
     try:
-        (read,) = at_reference_point(Record(batches=(_with(batch, lines),)), like, smoothed=smoothed).batches
+        return _read(_with(batch, lines), like, smoothed=smoothed), notes
     except InputError:  # too short
         return batch, notes
-    return read, notes
+
+
+def _read(batch: Batch, like: Sensors, *, smoothed: bool) -> Batch:
+    """A batch read at the intervals of sensors, without the ends at which no pose is known any more."""
+    (read,) = at_reference_point(Record(batches=(batch,)), like, smoothed=smoothed).batches
+    if batch.pose is None or read.pose is None:
+        return read
+    measured = np.isfinite(batch.pose).any(axis=0)
+    known = np.flatnonzero(np.isfinite(read.pose[:, measured]).all(axis=1))
+    return read.cut(slice(int(known[0]), int(known[-1]) + 1))
 
 
 def _signals(batch: Batch) -> dict[str, Array]:

@@ -63,10 +63,14 @@ def knots_held(values: Array, how: Held) -> Array:
 
 
 def _knots(steps: Array) -> Places:
-    """Samples at which a signal of these steps (k, c) bends by more than its rounding."""
-    smallest = [np.min(np.abs(column[column != 0]), initial=np.inf) for column in steps.T]
-    bent = np.abs(np.diff(steps, axis=0)) > TUNING.bend * np.array(smallest)
-    return np.flatnonzero(bent.any(axis=1)) + 1
+    """Samples at which a signal of these steps (k, c) bends by more than its rounding.
+
+    Where lines are drawn over three samples or more, most bends are rounding alone.
+    """
+    bends = np.abs(np.diff(steps, axis=0))
+    rounding = TUNING.bend * np.quantile(bends, TUNING.unbent, axis=0)
+    least = np.maximum(rounding, TUNING.straight * np.median(np.abs(steps), axis=0))
+    return np.flatnonzero((bends > least).any(axis=1)) + 1
 
 
 def _read_at(changes: Places, rounded: bool, count: int, *, interpolated: bool) -> Held | None:
@@ -74,8 +78,11 @@ def _read_at(changes: Places, rounded: bool, count: int, *, interpolated: bool) 
     if len(changes) < TUNING.fewest_changes:
         return None
     gaps = np.diff(changes)
-    several = np.maximum(np.round(gaps / np.median(gaps)), 1.0)
-    interval = float(gaps.sum() / several.sum())
+    single = gaps[gaps <= TUNING.single * np.median(gaps) + 0.5]
+    several = np.maximum(np.round(gaps / single.mean()), 1.0)
+    about = float(gaps.sum() / several.sum())
+    near = about + np.linspace(-1.0, 1.0, TUNING.tried) / several.sum()
+    interval = float(max(near, key=lambda value: (_explained(changes, value), -abs(value - about))))
     if abs(interval - round(interval)) * several.sum() < TUNING.whole * np.sqrt(several.sum()):
         interval = float(round(interval))
     if interpolated and interval != round(interval):

@@ -12,7 +12,11 @@ class Tuning:
     Attributes:
         fewest_held: samples from which a signal is asked whether it is held.
         most_changes: share of samples that change, or bend, above which every sample may be a reading.
-        bend: bend of a line, in roundings, above which it is no straight line with rounded samples.
+        bend: multiple of rounding above which a bend shows a reading.
+        unbent: share of samples between readings, whose bends are rounding.
+        straight: bend of a line, as a share of its usual step, above which it is none.
+        single: multiple of the usual gap between changes up to which a gap may be one interval.
+        tried: intervals that are tried around the mean of the gaps.
         fewest_changes: from which an interval is found.
         whole: standard errors within which an interval counts as a whole number of samples.
         shortest_interval: of readings [samples].
@@ -50,6 +54,10 @@ class Tuning:
     fewest_held: int = 40
     most_changes: float = 0.7
     bend: float = 2.5
+    unbent: float = 0.6
+    straight: float = 1e-3
+    single: float = 1.5
+    tried: int = 41
     fewest_changes: int = 8
     whole: float = 0.5
     shortest_interval: float = 1.5

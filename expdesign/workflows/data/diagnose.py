@@ -24,6 +24,7 @@ from expdesign.export.diagnosis_page import (
     roll_sentences,
 )
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
+from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
 from expdesign.scenario import load_scenario, load_vessel
@@ -70,7 +71,7 @@ def diagnose(
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.0)
     ship = load_vessel(vessel)
-    record = measured(data, ship, velocity=velocity)
+    record = in_stated_time(measured(data, ship, velocity=velocity), ship.sensors)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)

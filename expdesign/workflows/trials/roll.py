@@ -201,7 +201,7 @@ def _summary(content: RollContent) -> dict[str, object]:
         "held": list(estimate.held),
         "rank": content.report.rank,
         "free": len(content.report.free),
-        "remarks": list(roll_sentences(content)),
+        "remarks": [*roll_sentences(content), *content.notes],
     }
 
 
