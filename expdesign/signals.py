@@ -221,7 +221,9 @@ class Record:
     Attributes:
         batches: with the same inputs and the same sample time.
         notes: on flaws of the files and their treatment, one sentence each.
+        doubts: those of the notes that put results into question, whatever is done with the data.
     """
 
     batches: tuple[Batch, ...]
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()

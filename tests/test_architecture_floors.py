@@ -22,7 +22,7 @@ FLOORS = {
         ("simulation", "records"),
         ("reduction",),
         ("dictionary", "estimation", "indices", "step_trials"),
-        ("information", "diagnosis", "assessment", "roll"),
+        ("information", "diagnosis", "assessment", "roll", "kinematics"),
         ("durations",),
         ("growing", "rehearsal", "plan", "monitoring", "loading"),
         ("shortest_day", "foresight"),
@@ -30,7 +30,7 @@ FLOORS = {
         ("workflows",),
         ("cli", "__main__"),
     ),
-    "records": (("tuning",), ("file",), ("pose",), ("load", "labels", "levels", "pieces")),
+    "records": (("tuning",), ("file",), ("limits", "pose"), ("load", "labels", "levels", "pieces")),
     "step_trials": (
         ("tuning",),
         ("holds", "regression", "steady_state", "responses"),

@@ -73,6 +73,7 @@ class Finished:
     files: tuple[Path, ...] = (Path("runs/a/plan.json"), Path("runs/a/report.html"))
     summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
     tables: tuple[object, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass
@@ -255,6 +256,7 @@ def test_json_is_alone_on_stdout_and_progress_on_stderr(
         "command": "run",
         "files": ["runs/a/plan.json", "runs/a/report.html"],
         "summary": SUMMARY,
+        "notes": [],
     }
     assert captured.err.splitlines() == ["[  0%] at work", "[ 50%] at work", "[100%] at work"]
 

@@ -63,6 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _termination_interrupts():
             return _invoke(arguments)
     except (InputError, NoAnswer) as error:
+        for note in getattr(error, "__notes__", ()):
+            typer.echo(f"expdesign: note: {note}", err=True)
         return _fail(str(error), WRONG_INPUT if isinstance(error, InputError) else NO_ANSWER)
     except typer.TyperException as error:
         return _fail(_usage(error), WRONG_INPUT)

@@ -31,12 +31,17 @@ UNITS = {
 SENTENCES = ("remarks", "judgements", "notes")
 """Entries of a summary with sentences, one line each, that need no words before them; others end so or are notes."""
 LONGEST = 200
-"""Characters of a value beside its name; longer ones are left to the tables."""
+"""Characters of a list beside its name; longer ones are left to the tables."""
 
 
 def as_json(command: str, outcome: Outcome) -> str:
-    """One JSON object: `command`, `files` written, the workflow's `summary`."""
-    content = {"command": command, "files": [str(path) for path in outcome.files], "summary": outcome.summary}
+    """One JSON object: `command`, `files` written, the workflow's `summary`, and the `notes` of its page."""
+    content = {
+        "command": command,
+        "files": [str(path) for path in outcome.files],
+        "summary": outcome.summary,
+        "notes": list(outcome.notes),
+    }
     return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False)
 
 
@@ -56,7 +61,7 @@ def print_summary(outcome: Outcome) -> None:
     shown = {
         key: value
         for key, value in outcome.summary.items()
-        if not _is_told(key) and (not outcome.tables or _brief(value))
+        if not _is_told(key) and not _among_notes(value, outcome) and (not outcome.tables or _brief(value))
     }
     for row in _rows(shown):
         table.add_row(*row)
@@ -68,6 +73,11 @@ def print_summary(outcome: Outcome) -> None:
     lines = list(_unsaid(outcome))
     for line in (*lines, *[""] * bool(lines)):
         console.print(line)
+    if outcome.notes:
+        console.print("Notes", style="bold")
+        for note in outcome.notes:
+            console.print(f"- {note}")
+        console.print()
     for folder, names in _by_folder(outcome.files).items():
         console.print(f"Written to {folder}: {', '.join(names)}")
     for page in (path for path in outcome.files if path.suffix == ".html"):
@@ -81,7 +91,7 @@ def _unsaid(outcome: Outcome) -> Iterator[str]:
         if _is_told(key):
             lines = (value,) if isinstance(value, str) else value
             start = "" if key in SENTENCES else f"{key.replace('_', ' ')}: "
-            yield from (f"{start}{line}" for line in lines if line not in said)  # type: ignore[attr-defined]
+            yield from (f"{start}{line}" for line in lines if line not in said and line not in outcome.notes)  # type: ignore[attr-defined]
 
 
 def _is_told(key: str) -> bool:
@@ -90,8 +100,15 @@ def _is_told(key: str) -> bool:
 
 
 def _brief(value: object) -> bool:
-    """Whether a value gets a line beside tables."""
-    return not isinstance(value, Mapping) and value != [] and len(_text(value)) < LONGEST
+    """Whether a value gets a line beside tables: no table of its own, and no long list."""
+    if isinstance(value, (list, tuple)):
+        return bool(value) and len(_text(value)) < LONGEST
+    return not isinstance(value, Mapping)
+
+
+def _among_notes(value: object, outcome: Outcome) -> bool:
+    """Whether an entry is a list of what the notes say anyway."""
+    return isinstance(value, (list, tuple)) and bool(value) and set(map(str, value)) <= set(outcome.notes)
 
 
 def _print_table(console: Console, text: TextTable) -> None:

@@ -25,6 +25,7 @@ from expdesign.records.file import (
     read_table,
     relative_wind,
 )
+from expdesign.records.limits import check_limits, column_limits
 from expdesign.records.pose import (
     MEASURED,
     SMOOTHED,
@@ -33,6 +34,7 @@ from expdesign.records.pose import (
     Request,
     batch_velocity,
     check_agreement,
+    check_heading,
     check_jumps,
     kept_samples,
     left_out_notes,
@@ -40,13 +42,13 @@ from expdesign.records.pose import (
     needed_columns,
     origin_notes,
     velocity_origins,
-    with_continuous_heading,
+    with_continuous_angles,
     with_metres,
 )
 from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY, Batch, Record
 from expdesign.values import Array
-from expdesign.vessel import column_name
+from expdesign.vessel import Actuator, Limit, column_name
 
 UNCHECKED = ("time_s", "batch", "depth_m", "lat_deg", "lon_deg")
 
@@ -82,6 +84,7 @@ def load_records(
     velocity: str = "auto",
     heading_std_rad: float | None = None,
     outputs: tuple[str, ...] = OUTPUTS,
+    actuators: Sequence[Actuator] = (),
 ) -> Record:
     """Read measured data from one or more CSV files.
 
@@ -95,6 +98,7 @@ def load_records(
         heading_std_rad: standard deviation of the heading's noise [rad], which corrects differences and the
             smoother; None where unknown: differences are not corrected, the smoother estimates it.
         outputs: required velocities among u, v, r; others are nan in the record where they are unknown.
+        actuators: of the vessel, within whose limits the inputs should be.
 
     Returns:
         Batches in file order. Positions of all files share one origin. A batch with a differenced velocity lacks the
@@ -107,11 +111,11 @@ def load_records(
     files = _names(paths)
     request = _request(velocity, heading_std_rad, outputs, sample_time_s)
     inputs = Inputs(tuple(map(column_name, vessel_inputs)), "the vessel") if vessel_inputs is not None else None
-    whose, origin = "the vessel", None
+    whose, origin, limits = "the vessel", None, column_limits(actuators)
     batches: list[Batch] = []
     notes: dict[str, list[str]] = {}
     for path, name in files.items():
-        table, origin = _read(path, inputs, origin)
+        table, origin = _read(path, inputs, origin, limits)
         clock = read_clock(table, sample_time_s=sample_time_s, whose=whose)
         if sample_time_s is None:
             sample_time_s, whose = clock.sample_time_s, f"the first file ({name})"
@@ -157,11 +161,14 @@ def _request(
     return Request(method=velocity, heading_std_rad=heading_std_rad, outputs=outputs)
 
 
-def _read(path: Path, inputs: Inputs | None, origin: LocalMetres | None) -> tuple[Table, LocalMetres | None]:
-    """One file in metres and radians, with every number in its range."""
+def _read(
+    path: Path, inputs: Inputs | None, origin: LocalMetres | None, limits: Mapping[str, Limit]
+) -> tuple[Table, LocalMetres | None]:
+    """One file in metres and radians, with every number in its range and within the limits of the actuators."""
     table = read_table(path, inputs=inputs)
     check_ranges(table)
-    return with_metres(with_continuous_heading(check_wind(table)), origin)
+    table = with_continuous_angles(check_wind(table), limits)
+    return with_metres(check_limits(table, limits), origin)
 
 
 def _judged(table: Table, clock: Clock, request: Request) -> Table:
@@ -171,6 +178,8 @@ def _judged(table: Table, clock: Clock, request: Request) -> Table:
     table = check_jumps(table, clock.batches, clock.sample_time_s, needed=needed_columns(origins))
     if MEASURED in origins.values():
         table = check_agreement(table, clock.batches, clock.sample_time_s)
+    if any(origins.get(output) != MEASURED for output in ("u", "v")):
+        check_heading(table, clock.batches, clock.sample_time_s)
     return table.noted(*table_remarks(table))
 
 

@@ -26,6 +26,8 @@ class Tuning:
         pose_disagreement: relative difference of both changes (root mean square) that gets a note.
         pose_suspicion: relative difference above which an explanation is searched for.
         pose_explained: share of the difference that may remain with an explanation.
+        course_spread: circular variance of course less heading below which it is not questioned.
+        course_axis_rad: distance of an axis at which headings may begin [rad].
         equally_good: ratio of remaining differences below which explanations are named together.
         turning_rad: change of heading over a window (root mean square) below which no turn is compared [rad].
         jump_ratio: a step above this multiple of the 95th percentile of all changes gets a note.
@@ -33,6 +35,9 @@ class Tuning:
         learning_samples: samples, from the middle, from which the smoother learns its ratio.
         shortest_smoothed: samples that the smoother needs.
         held_share: share of repeated positions of a moving ship above which they count as held values.
+        limit_slack: share of an actuator's limit by which a recorded input may exceed it.
+        most_beyond: share of rows beyond the limits above which a file is refused.
+        far_beyond: multiple of a limit from which another unit is thought of.
         sideways_ratio: sway over surge (root mean square) above which the axes of the pose are questioned.
     """
 
@@ -52,6 +57,8 @@ class Tuning:
     pose_disagreement: float = 0.3
     pose_suspicion: float = 0.1
     pose_explained: float = 0.25
+    course_spread: float = 0.02
+    course_axis_rad: float = 0.5
     equally_good: float = 1.5
     turning_rad: float = 0.05
     jump_ratio: float = 10.0
@@ -59,6 +66,9 @@ class Tuning:
     learning_samples: int = 8192
     shortest_smoothed: int = 4
     held_share: float = 0.5
+    limit_slack: float = 0.02
+    most_beyond: float = 0.5
+    far_beyond: float = 3.0
     sideways_ratio: float = 2.0
 
 

@@ -17,11 +17,13 @@ class Outcome:
         files: written, in the order of their contents.
         summary: key numbers, ready for JSON; units in the names.
         tables: the same for people where key numbers are many.
+        notes: all that the page notes and warns of, so that nobody has to open it to be warned.
     """
 
     files: tuple[Path, ...]
     summary: Mapping[str, object]
     tables: tuple[TextTable, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

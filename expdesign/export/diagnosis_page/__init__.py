@@ -1,7 +1,15 @@
 """The page about a diagnosis: one self-contained file."""
 
-from expdesign.export.diagnosis_page.page import diagnosis_html
+from expdesign.export.diagnosis_page.page import diagnosis_html, diagnosis_notes
 from expdesign.export.diagnosis_page.results import diagnosis_json, diagnosis_tables, extended_vessel
 from expdesign.export.diagnosis_page.roll import RollVerdict, roll_sentences
 
-__all__ = ["RollVerdict", "diagnosis_html", "diagnosis_json", "diagnosis_tables", "extended_vessel", "roll_sentences"]
+__all__ = [
+    "RollVerdict",
+    "diagnosis_html",
+    "diagnosis_json",
+    "diagnosis_notes",
+    "diagnosis_tables",
+    "extended_vessel",
+    "roll_sentences",
+]

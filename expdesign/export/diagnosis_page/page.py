@@ -59,10 +59,17 @@ def diagnosis_html(
         accuracy=_accuracy(found),
         data=_data(found),
         roll=roll_sentences(roll),
+        notes=diagnosis_notes(found),
         figures=figures,
         command=command,
         version=version,
     )
+
+
+def diagnosis_notes(found: Diagnosis) -> tuple[str, ...]:
+    """The notes of the page: doubts about the record, notes on the diagnosis, notes on the files."""
+    rest = (note for note in found.record.notes if note not in found.record.doubts)
+    return (*found.record.doubts, *found.notes, *rest)
 
 
 def _figures(found: Diagnosis, progress: Progress) -> dict[str, object]:

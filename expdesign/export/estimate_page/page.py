@@ -66,10 +66,29 @@ def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> s
         explained=[(item.name, item.explained, item.correlation) for item in methods],
         conditions=conditions(content),
         advice=advice(content),
-        notes=[*found.record.notes, *found.tests.notes, *found.left_out],
+        notes=_data_notes(content),
         figures=_figures(content, progress),
         sample_time_s=found.record.batches[0].sample_time_s,
     )
+
+
+def estimate_notes(content: EstimateContent) -> tuple[str, ...]:
+    """The notes and warnings of the page: doubts about the data first, then advice, methods, files."""
+    record = content.found.record
+    methods = (_notes(content, item) for item in content.found.methods)
+    return (
+        *record.doubts,
+        *advice(content),
+        *conditions(content),
+        *(f"{item.name}: {warning}" for item in methods for warning in item.warnings),
+        *(note for note in _data_notes(content) if note not in record.doubts),
+    )
+
+
+def _data_notes(content: EstimateContent) -> list[str]:
+    """Notes on the files, and on methods without an answer."""
+    found = content.found
+    return list(dict.fromkeys([*found.record.notes, *found.tests.notes, *found.left_out]))
 
 
 def _figures(content: EstimateContent, progress: Progress) -> dict[str, object]:

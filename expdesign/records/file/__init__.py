@@ -3,7 +3,17 @@
 from expdesign.records.file.cells import FIRST_ROW, read_cells
 from expdesign.records.file.choice import Inputs, Sources, choose_columns, mistyped
 from expdesign.records.file.clock import Clock, read_clock
-from expdesign.records.file.names import COLUMNS, LABEL, PLANNED, REACHED, STEERED, Source, is_input, meaning
+from expdesign.records.file.names import (
+    COLUMNS,
+    LABEL,
+    PLANNED,
+    REACHED,
+    STEERED,
+    Source,
+    is_input,
+    is_turning_input,
+    meaning,
+)
 from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import MISSING, Table, read_table
 from expdesign.records.file.wind import check_wind, relative_wind
@@ -25,6 +35,7 @@ __all__ = [
     "check_wind",
     "choose_columns",
     "is_input",
+    "is_turning_input",
     "meaning",
     "mistyped",
     "read_cells",

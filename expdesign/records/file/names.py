@@ -221,6 +221,11 @@ def is_input(name: str) -> bool:
     return name in FORCES or re.fullmatch(r"n\d+_rps|(?:a|rudder)\d+_rad", name) is not None
 
 
+def is_turning_input(name: str) -> bool:
+    """True for the contract's names of angles of thrusters, commanded or planned."""
+    return re.fullmatch(rf"(?:{PLANNED})?a\d+_rad", name) is not None
+
+
 def _synonyms(pattern: str) -> str:
     words = [word for word, stem in SYNONYMS.items() if re.fullmatch(pattern, stem)]
     return "|".join(words) or "(?!)"

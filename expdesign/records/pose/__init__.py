@@ -1,6 +1,6 @@
 """Pose and velocity: positions, derived velocities, and whether they agree."""
 
-from expdesign.records.pose.agreement import check_agreement
+from expdesign.records.pose.agreement import check_agreement, check_heading
 from expdesign.records.pose.fix import Fix, last_fix
 from expdesign.records.pose.motion import (
     MEASURED,
@@ -17,7 +17,7 @@ from expdesign.records.pose.motion import (
     smoothed_velocity,
     velocity_origins,
 )
-from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_heading, with_metres
+from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_angles, with_metres
 
 __all__ = [
     "MEASURED",
@@ -29,6 +29,7 @@ __all__ = [
     "batch_velocity",
     "central_difference",
     "check_agreement",
+    "check_heading",
     "check_jumps",
     "kept_samples",
     "last_fix",
@@ -38,6 +39,6 @@ __all__ = [
     "origin_notes",
     "smoothed_velocity",
     "velocity_origins",
-    "with_continuous_heading",
+    "with_continuous_angles",
     "with_metres",
 ]

@@ -75,6 +75,31 @@ def check_agreement(table: Table, batches: tuple[slice, ...], sample_time_s: flo
     return table
 
 
+def check_heading(table: Table, batches: tuple[slice, ...], sample_time_s: float) -> None:
+    """Compare the heading with the course over ground, where no velocity is measured.
+
+    A ship mostly goes where she points, so that course less heading varies little. Where course plus heading varies far
+    less, the heading counts the other way round.
+
+    Raises:
+        FileError: it does.
+    """
+    windows = _windows(batches, sample_time_s)
+    if not {"heading_rad", "north_m"} <= set(table.columns) or not len(windows):
+        return
+    way = _change(table.stack("north_m", "east_m"), windows) @ (1.0, 1j)
+    middle = windows.mean(axis=1).astype(int)
+    bow = np.exp(1j * table.columns["heading_rad"][middle])
+    size = float(np.abs(way).sum())
+    ahead, mirrored = (complex(np.sum(way * turn)) / size if size else 0j for turn in (bow.conj(), bow))
+    if 1.0 - abs(ahead) < TUNING.course_spread or 1.0 - abs(mirrored) > TUNING.pose_explained * (1.0 - abs(ahead)):
+        return
+    for axis, whence in ((0.0, ""), (np.pi / 2.0, " from east, as in mathematics")):
+        if abs(np.angle(mirrored * np.exp(-1j * axis))) < TUNING.course_axis_rad:
+            problem = f"counts counter-clockwise{whence}, as the positions show; expected clockwise from north"
+            raise table.error("heading_rad", problem)
+
+
 def _check_turning(table: Table, windows: Array, sample_time_s: float) -> Table:
     turned = _change(table.columns["heading_rad"][:, None], windows)
     expected = _integral(table.columns["r_radps"][:, None], windows, sample_time_s)

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pyproj
 
-from expdesign.records.file import Table
+from expdesign.conventions import whole_turns
+from expdesign.records.file import PLANNED, Table, is_turning_input
 from expdesign.records.tuning import TUNING
 from expdesign.values import Array
+from expdesign.vessel import Limit
+
+TURN = 2.0 * np.pi
+TIE = 1e-9
+"""Share of a turn within which a step counts as half a turn, so that it goes the same way however it is written."""
 
 CHANGES = {
     "heading_rad": (0.5, 1.0, "rad"),
@@ -62,20 +69,39 @@ def with_metres(table: Table, origin: LocalMetres | None) -> tuple[Table, LocalM
     return replace(table, columns=columns, sources=sources).noted(note), origin
 
 
-def with_continuous_heading(table: Table) -> Table:
-    """Take the jumps by a whole turn out of the heading."""
-    heading = table.columns.get("heading_rad")
-    if heading is None:
-        return table
-    continuous = np.unwrap(heading)
-    turns = int(np.sum(np.abs(np.diff(continuous - heading)) > np.pi))
-    if not turns:
-        return table
-    columns = {**table.columns, "heading_rad": continuous}
-    note = (
-        f"{table.sources['heading_rad'].header} is wrapped {turns} time{'s' if turns > 1 else ''} and made continuous"
-    )
-    return replace(table, columns=columns).noted(note)
+def with_continuous_angles(table: Table, limits: Mapping[str, Limit]) -> Table:
+    """Take the jumps by a whole turn out of the heading, and out of angles of thrusters, planned ones too.
+
+    A thruster that turns freely goes the shorter way from sample to sample, and begins within half a turn of dead
+    ahead. One with limits of less than a turn has one angle between them for every direction.
+
+    Args:
+        table: a file.
+        limits: of columns, where they are known.
+    """
+    columns, notes = dict(table.columns), []
+    if "heading_rad" in columns:
+        columns["heading_rad"] = continuous(columns["heading_rad"])
+    for name in (name for name in columns if is_turning_input(name)):
+        limit, angle = limits.get(name.removeprefix(PLANNED), Limit()), continuous(columns[name])
+        columns[name] = angle - whole_turns(angle[0])
+        if limit.high - limit.low <= TURN:
+            columns[name] -= whole_turns(columns[name] - (limit.low + limit.high) / 2.0)
+    for name, angle in columns.items():
+        change = np.diff(whole_turns(angle - table.columns[name]))
+        if turns := int(np.count_nonzero(change)):
+            times = f"{turns} time{'s' if turns > 1 else ''}"
+            notes.append(f"{table.sources[name].header} is wrapped {times} and made continuous")
+    return replace(table, columns=columns).noted(*notes)
+
+
+def continuous(angle_rad: Array) -> Array:
+    """Angles (k,) with whole turns added, none more than half a turn from the one before, and half a turn positive.
+
+    Values that repeat are the same numbers afterwards.
+    """
+    turns = np.ceil((np.diff(angle_rad, prepend=angle_rad[0]) - np.pi) / TURN - TIE)
+    return np.asarray(angle_rad - TURN * np.cumsum(turns))
 
 
 def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, *, needed: set[str]) -> Table:

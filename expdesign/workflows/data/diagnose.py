@@ -19,11 +19,13 @@ from expdesign.export.diagnosis_page import (
     RollVerdict,
     diagnosis_html,
     diagnosis_json,
+    diagnosis_notes,
     diagnosis_tables,
     extended_vessel,
     roll_sentences,
 )
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
+from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
 from expdesign.scenario import load_scenario, load_vessel
@@ -33,7 +35,7 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalis
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import doubted, measured
 from expdesign.workflows.steps.workers import workers
 
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
@@ -70,12 +72,12 @@ def diagnose(
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.0)
     ship = load_vessel(vessel)
-    record = measured(data, ship, velocity=velocity)
+    record = in_stated_time(measured(data, ship, velocity=velocity), ship.sensors)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     reported = Estimated(progress, after=drawing)
-    with workers(jobs if samples > FEW_SAMPLES else 1, load=None):
+    with workers(jobs if samples > FEW_SAMPLES else 1, load=None), doubted(record):
         found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=reported)
     reported.after = 0.0
     roll = _roll(ship, record)
@@ -95,7 +97,7 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(files=written, summary=summary, tables=_tables(found))
+    return Outcome(files=written, summary=summary, tables=_tables(found), notes=diagnosis_notes(found))
 
 
 def _roll(ship: Vessel, record: Record) -> RollVerdict | None:

@@ -25,12 +25,12 @@ from expdesign.export import (
     steered_entry,
     write_files,
 )
-from expdesign.export.estimate_page import EstimateContent, estimate_html
+from expdesign.export.estimate_page import EstimateContent, estimate_html, estimate_notes
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
-from expdesign.workflows.steps.measured import measured, reduced_data
+from expdesign.workflows.steps.measured import doubted, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
@@ -80,26 +80,26 @@ def estimate(
         prior=prior,
     )
     raw = measured(data, ship, velocity=velocity)
-    with workers(0, load=None):
+    with workers(0, load=None), doubted(raw):
         now, record = settled(ship, raw, options, smoothed=velocity == "smoothed", progress=within(progress, 0.01, 0.4))
         apart = reduced_data(tests, now, velocity=velocity) if tests else NO_TESTS
         begun = 0.01 if now is ship else 0.4
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
     command = _command(data, vessel, tests, velocity, options)
+    content = EstimateContent(vessel=ship, found=found, command=command, version=__version__)
     files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
-        "estimate.html": partial(
-            estimate_html,
-            EstimateContent(vessel=ship, found=found, command=command, version=__version__),
-            progress=within(progress, 0.7, 0.98),
-        ),
+        "estimate.html": partial(estimate_html, content, progress=within(progress, 0.7, 0.98)),
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     return Outcome(
-        files=written, summary={**_estimate_summary(found), **note_on_roll(ship)}, tables=_estimate_tables(found)
+        files=written,
+        summary={**_estimate_summary(found), **note_on_roll(ship)},
+        tables=_estimate_tables(found),
+        notes=estimate_notes(content),
     )
 
 

@@ -100,13 +100,15 @@ def _measured(
 ) -> tuple[tuple[Found, ...], tuple[str, ...]]:
     """Each file by itself: trials need not share a sample time."""
     seen: list[Found] = []
+    doubts: list[str] = []
     notes: list[str] = []
     for number, path in enumerate(data):
         progress(f"reading {path.name}", 0.6 * number / len(data))
         record = at_reference_point(measured([path], ship), ship.sensors)
         seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
-        notes += record.notes
-    return tuple(seen), tuple(notes)
+        doubts += record.doubts
+        notes += (note for note in record.notes if note not in record.doubts)
+    return tuple(seen), (*doubts, *notes)
 
 
 def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[StandardResults | None, str]:

@@ -21,7 +21,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
-from expdesign.vessel import VesselModel
+from expdesign.vessel import Vessel, VesselModel
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.data.labelled import (
     Asked,
@@ -32,7 +32,7 @@ from expdesign.workflows.data.labelled import (
     piece_of,
 )
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.measured import data_files, measured, reduced_data
+from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 
 
 def mine(
@@ -96,8 +96,25 @@ def mine(
     if labels is not None:
         asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)
         record = reduced_data(paths, ship, velocity=velocity)
-        return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
+        with doubted(record):
+            return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
     record = in_pieces(measured(paths, ship, velocity=velocity), piece_s)
+    with doubted(record):
+        return _mined(record, folder, ship, fixed, keep, mean, velocity, command, progress)
+
+
+def _mined(
+    record: Record,
+    folder: Path,
+    ship: Vessel,
+    fixed: Sequence[str],
+    keep: int,
+    mean: str,
+    velocity: str,
+    command: str,
+    progress: Progress,
+) -> Outcome:
+    """A choice of batches, written."""
     windy = all(batch.wind is not None for batch in record.batches)
     names, unseen = _parameters(ship.model, fixed, windy=windy)
     progress("simulating the runs", 0.2)
@@ -107,14 +124,17 @@ def mine(
     progress("choosing among them", 0.6)
     subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
     chosen = [batch for batch in record.batches if batch.name in subset.chosen]
-    content = _content(subset, batches, names, unseen, mean=mean, command=command)
+    content = {
+        **_content(subset, batches, names, unseen, mean=mean, command=command),
+        "notes": list(record.notes),
+    }
     files = {
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "chosen.csv": record_csv(chosen),
     }
     written = write_files(folder, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),))
+    return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),), notes=record.notes)
 
 
 SYMMETRIC = "symmetric part of the information"
@@ -152,7 +172,8 @@ def _designed(
     )
     written = write_files(folder, labelled_files(found, names, model.outputs, command))
     progress("done", 1.0)
-    return Outcome(files=written, summary=labelled_summary(found), tables=labelled_tables(found, model.outputs))
+    tables = labelled_tables(found, model.outputs)
+    return Outcome(files=written, summary=labelled_summary(found), tables=tables, notes=record.notes)
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:

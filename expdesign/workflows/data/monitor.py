@@ -188,7 +188,7 @@ def monitor(
     content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now, asked))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 @dataclass(frozen=True, kw_only=True)

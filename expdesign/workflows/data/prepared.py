@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import FileError
+from expdesign.kinematics import in_stated_time
 from expdesign.monitoring import Change, Grams, stretch_length
 from expdesign.records import as_file
 from expdesign.records.file import FIRST_ROW
@@ -105,6 +106,7 @@ def prepared(asked: Asked, text: str, time_s: Array, changes: tuple[Change, ...]
     try:
         with as_file(text) as path:
             record = measured([path], asked.vessel, velocity=asked.velocity)
+            record = in_stated_time(record, asked.vessel.sensors)
     except FileError as error:
         return Unread(error.key, error.problem)
     begins = tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)

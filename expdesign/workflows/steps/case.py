@@ -13,6 +13,7 @@ from expdesign.export import Content, write_files
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
 """Names of the files of a draft; no results have them."""
@@ -41,8 +42,14 @@ def written(
     note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
     roll = {} if "heel_max_deg" in summary else note_on_roll(case.vessel)
+    before = measured(case.design.prior_data, case.vessel).doubts if case.design.prior_data else ()
     remarks = {"remarks": list(case.remarks)} if case.remarks and "remarks" not in summary else {}
-    return Outcome(files=paths, summary={"scenario": case.name, **summary, **note, **roll, **remarks}, tables=tables)
+    return Outcome(
+        files=paths,
+        summary={"scenario": case.name, **summary, **note, **roll, **remarks},
+        tables=tables,
+        notes=(*before, *case.area.notes),
+    )
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-from expdesign.errors import FileError
+from expdesign.errors import FileError, NoAnswer
 from expdesign.estimation.regression import with_depth
 from expdesign.input_files import check_ends
+from expdesign.kinematics import checked
 from expdesign.records import load_records
 from expdesign.reduction import reduced
 from expdesign.signals import Record
@@ -46,13 +48,26 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         velocity=velocity,
         heading_std_rad=vessel.sensors.heading_rad or None,
         outputs=vessel.model.outputs,
+        actuators=vessel.model.actuators,
     )
-    return with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+    record = with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+    return checked(record, vessel, smoothed=velocity == "smoothed")
 
 
 def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
     """Measured data of a vessel, reduced by what its file states of actuators and sensors."""
     return reduced(measured(data, vessel, velocity=velocity), vessel, smoothed=velocity == "smoothed")
+
+
+@contextmanager
+def doubted(record: Record) -> Iterator[None]:
+    """Say the doubts about a record beside a refusal of the block: they may be why there is no answer."""
+    try:
+        yield
+    except NoAnswer as error:
+        for doubt in record.doubts:
+            error.add_note(doubt)
+        raise
 
 
 def _header(path: Path) -> set[str]:

@@ -90,13 +90,13 @@ def present_state(
     sailed_s = float(sum(len(batch) * batch.sample_time_s for batch in record.batches))
     left_s = _left(first, sailed_s, remaining_s)
     origin = f"that of {vessel}"
-    notes: tuple[str, ...] = ()
+    notes = record.notes
     seen = reduced(record, ship) if vessel is None or not stopped else record
     under_way = None if stopped else present_motion(seen, record, ship, data[-1])
     if vessel is None:
         fixed, prior_counts = first.design.fixed_parameters, first.design.prior == "parameter_std"
         ship, origin, notes = updated(ship, seen, fixed=fixed, prior_counts=prior_counts, progress=progress)
-        notes = (*seen.notes[len(record.notes) :], *notes)
+        notes = (*seen.notes, *notes)
     return PresentState(
         first=first,
         data=tuple(data),

@@ -142,7 +142,8 @@ def _replanned(
     progress("done", 1.0)
     facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(case, day.plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
-    return Outcome(files=written, summary=summary, tables=(_table(known), *day_tables(day)))
+    notes = (*_notes(known), *day.plan.area.notes)
+    return Outcome(files=written, summary=summary, tables=(_table(known), *day_tables(day)), notes=notes)
 
 
 def _stated_before(
@@ -203,8 +204,6 @@ def _stated(vessel: Vessel) -> dict[str, float]:
 
 def _summary(known: Known) -> dict[str, object]:
     asked = math.isnan(known.remaining_s)
-    of_total = not (asked or known.remaining_stated)
-    left = ("remaining_s is design.total_s less the time of the data",) if of_total else ()
     return {
         "data_s": known.sailed_s,
         **({} if asked else {"remaining_s": known.remaining_s}),
@@ -214,8 +213,14 @@ def _summary(known: Known) -> dict[str, object]:
         "current_to_east_mps": float(known.environment.current_to[1]),
         "start": f"{place(known.pose)}, {_motion(known)}",
         "new_parameters": list(known.new),
-        "notes": [*left, *known.notes],
+        "notes": list(_notes(known)),
     }
+
+
+def _notes(known: Known) -> tuple[str, ...]:
+    of_total = not (math.isnan(known.remaining_s) or known.remaining_stated)
+    left = ("remaining_s is design.total_s less the time of the data",) if of_total else ()
+    return (*left, *known.notes)
 
 
 def _motion(known: Known) -> str:

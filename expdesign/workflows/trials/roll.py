@@ -115,7 +115,7 @@ def roll(
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:
@@ -135,7 +135,8 @@ def _cases(
     step_s = None
     followed = False
     for path, load in zip(data, known.loads, strict=True):
-        record = load_records([path], outputs=("r",), sample_time_s=step_s)
+        actuators = () if ship is None else ship.model.actuators
+        record = load_records([path], outputs=("r",), sample_time_s=step_s, actuators=actuators)
         step_s = record.batches[0].sample_time_s
         runs = tuple(_run(path, batch, rudder, ship) for batch in record.batches)
         cases.append(Case(name=path.stem, load=load, runs=runs))
@@ -206,9 +207,7 @@ def _summary(content: RollContent) -> dict[str, object]:
 
 
 def _tables(content: RollContent) -> tuple[TextTable, ...]:
-    found = TextTable(
-        title="Roll", header=("finding",), rows=tuple((text,) for text in (*roll_sentences(content), *content.notes))
-    )
+    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
     values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
     cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
     return (found, values, cures) if cures.rows else (found, values)

@@ -108,7 +108,7 @@ def identify_steps(
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
@@ -119,6 +119,7 @@ def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
         velocity=velocity,
         heading_std_rad=None if ship is None else ship.sensors.heading_rad or None,
         outputs=("u", "r"),
+        actuators=() if ship is None else ship.model.actuators,
     )
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
@@ -25,7 +27,8 @@ from expdesign.export.step_trial_page import (
 from expdesign.monitoring import saved
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
-from expdesign.records.file import Inputs, choose_columns
+from expdesign.records.file import Inputs, Table, choose_columns
+from expdesign.records.limits import check_limits, column_limits
 from expdesign.scenario import load_vessel
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
@@ -38,7 +41,7 @@ from expdesign.step_trials.live import (
     expected_constants,
     restored_state,
 )
-from expdesign.vessel import column_name
+from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.data.step_trials.listed import listed_steps
 from expdesign.workflows.outcome import Outcome, TextTable
@@ -50,6 +53,8 @@ LEARN_S, LEARN_SHARE = 120.0, 0.8
 WRITTEN_EVERY_S = 20.0
 """Time between writing the state where nothing happens [s]."""
 READ = ("u_mps", "r_radps")
+COMPARED_ROWS = 50
+"""First rows, whose inputs are compared with the limits of the vessel file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +64,7 @@ class _Work:
     setup: Setup
     folder: Path
     command: str
+    actuators: tuple[Actuator, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,14 +134,14 @@ def watch_steps(
     }  # fmt: skip
     command = command_text("watch-steps", [data], options, usual={"--learn-s": None, "--seed": 0})
     folder = out or Path("runs") / ("watch-steps" if data == STREAM else data.stem)
-    work = _Work(setup=setup, folder=folder, command=command)
+    work = _Work(setup=setup, folder=folder, command=command, actuators=ship.model.actuators)
     now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))
     now = _through(now, data, work, tell, progress)
     _check_learnt(now.state, setup)
     content = _content(now, work)
     written = write_files(folder, _files(now, work))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:
@@ -144,7 +150,7 @@ def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], 
     size = data.stat().st_size if data != STREAM and data.is_file() else 0
     done, columns = 0, None
     for piece in _rows_of(data, work.setup.steps, now.taken):
-        columns = columns or _Columns(data, piece, work.setup.steps)
+        columns = columns or _Columns(data, piece, work.setup.steps, column_limits(work.actuators))
         events_before = now.events
         for row in columns.rows(piece):
             state, events = after_row(now.state, row, work.setup)
@@ -179,7 +185,7 @@ def _read(now: _Watch, piece: Piece, columns: _Columns) -> _Watch:
 class _Columns:
     """Where time, motion and commands stand in the rows of a source."""
 
-    def __init__(self, path: Path, piece: Piece, steps: StepList) -> None:
+    def __init__(self, path: Path, piece: Piece, steps: StepList, limits: Mapping[str, Limit]) -> None:
         names = tuple(name.strip() for name in piece.header.rstrip("\r\n").split(","))
         inputs = Inputs(tuple(column_name(name) for name in steps.names), "the vessel")
         chosen, notes = choose_columns(path, names, inputs=inputs)
@@ -191,12 +197,13 @@ class _Columns:
         self.time, self.u, self.r = chosen["time_s"], chosen["u_mps"], chosen["r_radps"]
         self.v = chosen.get("v_mps")
         self.inputs = [chosen[name] for name in inputs.columns]
+        self.limits, self.first = limits, list[Row]()
 
     def rows(self, piece: Piece) -> Iterator[Row]:
         """Samples of a piece."""
         for line in piece.lines:
             cells = line.rstrip("\r\n").split(",")
-            yield Row(
+            row = Row(
                 time_s=self._value(cells, self.time),
                 motion=(
                     self._value(cells, self.u),
@@ -205,6 +212,21 @@ class _Columns:
                 ),
                 inputs=tuple(self._value(cells, source) for source in self.inputs),
             )
+            self._compare(row)
+            yield row
+
+    def _compare(self, row: Row) -> None:
+        """Compare the inputs of the first rows with their limits, once there are enough of them."""
+        self.first.append(row)
+        if len(self.first) != COMPARED_ROWS:
+            return
+        values = np.array([row.inputs for row in self.first]).T
+        columns = {source.name: own for source, own in zip(self.inputs, values, strict=True)}
+        table = Table(
+            path=self.path, header=(), columns={"time_s": np.array([row.time_s for row in self.first]), **columns},
+            sources={source.name: source for source in self.inputs},
+        )  # fmt: skip
+        self.notes += tuple(f"{self.path.name}: {note}" for note in check_limits(table, self.limits).notes)
 
     def _value(self, cells: Sequence[str], source: Any) -> float:
         text = cells[source.column] if source.column < len(cells) else ""

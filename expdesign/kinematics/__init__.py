@@ -1,0 +1,14 @@
+"""Instruments of a record against each other and against the inputs, before any model is fitted.
+
+    record as measured, vessel  ->  record with readings at their own times, and notes on what does not agree
+
+Held and interpolated signals are found and read in time (`held`); gyro, compass, log and positions are compared
+(`instruments`), each by an estimate with its standard error and what is left; the ship should answer her inputs in the
+sense that the vessel file gives (`steering`). Everything is told; nothing but the times of readings is changed.
+"""
+
+from expdesign.kinematics.check import checked, in_stated_time
+from expdesign.kinematics.held import Held, held
+from expdesign.kinematics.instruments import Finding
+
+__all__ = ["Finding", "Held", "checked", "held", "in_stated_time"]

@@ -1,0 +1,190 @@
+"""A record as its instruments show it: readings at their own times, and what does not agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from expdesign.errors import InputError
+from expdesign.estimation.regression import model_for
+from expdesign.kinematics.held import Held, held, knots_held
+from expdesign.kinematics.instruments import (
+    Finding,
+    course_as_heading,
+    gyro_against_heading,
+    log_against_positions,
+)
+from expdesign.kinematics.steering import against_inputs
+from expdesign.kinematics.tuning import TUNING
+from expdesign.reduction import at_reference_point, with_delivered_inputs
+from expdesign.signals import Batch, Record
+from expdesign.values import Array
+from expdesign.vessel import Mounting, Sensors, Vessel, VesselModel
+
+SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
+           "wind": "winds"}  # fmt: skip
+
+
+def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
+    """The record with held and interpolated signals read in time, and its doubts: what does not agree.
+
+    Args:
+        record: as measured.
+        vessel: what its file states of actuators and sensors, which is taken into account.
+        smoothed: whether velocities from the pose are smoothed, rather than central differences.
+    """
+    in_time = [_in_time(batch, vessel.sensors, smoothed=smoothed) for batch in record.batches]
+    record = replace(record, batches=tuple(batch for batch, _ in in_time))
+    held_notes = _shared([(batch.name, note) for batch, notes in in_time for note in notes])
+    doubts = (*held_notes, *_findings(record, vessel, smoothed=smoothed))
+    return replace(record, notes=(*doubts, *record.notes), doubts=doubts)
+
+
+def in_stated_time(record: Record, sensors: Sensors) -> Record:
+    """The record with signals read at the stated intervals of their sensors, for models that know no intervals."""
+    intervals = {name: Mounting(interval_s=getattr(sensors, name).interval_s) for name in SIGNALS}
+    if not any(place.interval_s for place in intervals.values()):
+        return record
+    like: dict[str, Any] = {name: place for name, place in intervals.items() if place.interval_s}
+    own = replace(Sensors(heading_rad=sensors.heading_rad), **like)
+    notes = at_reference_point(record, own).notes
+    return replace(record, batches=tuple(_read(batch, own, smoothed=False) for batch in record.batches), notes=notes)
+
+
+def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, list[str]]:
+    """A batch with the signals that its file holds between readings, of sensors without a stated interval."""
+    found = {
+        name: how
+        for name, values in _signals(batch).items()
+        if not getattr(sensors, name).interval_s and (how := held(values)) is not None
+    }
+    notes = [_how_held(name, how, batch.sample_time_s) for name, how in found.items()]
+    undone = {name: how for name, how in found.items() if how.even}
+    if not undone:
+        return batch, notes
+    lines = {name: knots_held(_signals(batch)[name], how) for name, how in undone.items() if how.interpolated}
+    intervals: dict[str, Any] = {
+        name: Mounting(interval_s=how.interval * batch.sample_time_s) for name, how in undone.items()
+    }
+    like = replace(Sensors(heading_rad=sensors.heading_rad), **intervals)
+    try:
+        return _read(_with(batch, lines), like, smoothed=smoothed), notes
+    except InputError:  # too short
+        return batch, notes
+
+
+def _read(batch: Batch, like: Sensors, *, smoothed: bool) -> Batch:
+    """A batch read at the intervals of sensors, without the ends at which no pose is known any more."""
+    (read,) = at_reference_point(Record(batches=(batch,)), like, smoothed=smoothed).batches
+    if batch.pose is None or read.pose is None:
+        return read
+    measured = np.isfinite(batch.pose).any(axis=0)
+    known = np.flatnonzero(np.isfinite(read.pose[:, measured]).all(axis=1))
+    return read.cut(slice(int(known[0]), int(known[-1]) + 1))
+
+
+def _signals(batch: Batch) -> dict[str, Array]:
+    """Sensor -> its measured values (k, c)."""
+    values: dict[str, Array] = {}
+    if batch.pose is not None:
+        values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
+    if not {"u", "v"} & set(batch.derived):
+        values["velocity"] = batch.velocity[:, :2]
+    if "r" not in batch.derived:
+        values["yaw_rate"] = batch.velocity[:, 2:]
+    if batch.wind is not None:
+        values["wind"] = batch.wind
+    return values
+
+
+def _with(batch: Batch, lines: dict[str, Array]) -> Batch:
+    """The batch with other values of some sensors."""
+    pose, velocity = (None if own is None else own.copy() for own in (batch.pose, batch.velocity))
+    assert velocity is not None
+    for name, part in (("position", slice(0, 2)), ("heading", slice(2, 3))):
+        if name in lines and pose is not None:
+            pose[:, part] = lines[name]
+    for name, part in (("velocity", slice(0, 2)), ("yaw_rate", slice(2, 3))):
+        if name in lines:
+            velocity[:, part] = lines[name]
+    return replace(batch, pose=pose, velocity=velocity, wind=lines.get("wind", batch.wind))
+
+
+def _how_held(name: str, how: Held, sample_time_s: float) -> str:
+    seconds, words = how.interval * sample_time_s, SIGNALS[name]
+    between = "a straight line is drawn between readings" if how.interpolated else "the last one is repeated in between"
+    if not how.even:
+        return (
+            f"the {words} are read about every {seconds:.3g} s, and {between}, at uneven times: they cannot be undone, "
+            "and rates and differences from them are wrong"
+        )
+    return (
+        f"the {words} are read every {seconds:.4g} s, and {between} ({how.changes} changes tell); they count as read "
+        f"then, as with sensors.{name}_interval_s = {seconds:.4g}"
+    )
+
+
+def _findings(record: Record, vessel: Vessel, *, smoothed: bool) -> list[str]:
+    """A note for everything that instruments, or inputs and motion, disagree about: in all files, or in one of them."""
+    try:
+        seen = at_reference_point(record, vessel.sensors, smoothed=smoothed)
+        model = model_for(vessel.model, seen)
+    except InputError:  # told by whoever needs them
+        return []
+    seen = with_delivered_inputs(seen, model)
+    together = list(_disagreements(seen.batches, vessel, model))
+    files = list(dict.fromkeys(_file(batch) for batch in seen.batches))
+    notes = [(", ".join(files[:1]) + (f" and {len(files) - 1} more" if len(files) > 1 else ""), together)]
+    if len(files) > 1:
+        told = {finding.name for finding in together}
+        for file in files:
+            own = _disagreements([batch for batch in seen.batches if _file(batch) == file], vessel, model)
+            notes.append((file, [finding for finding in own if finding.name not in told]))
+    return [f"{where}: {finding.text}" for where, findings in notes for finding in findings]
+
+
+def _file(batch: Batch) -> str:
+    return batch.name.partition(", batch ")[0]
+
+
+def _disagreements(batches: Sequence[Batch], vessel: Vessel, model: VesselModel) -> Iterator[Finding]:
+    length_m = vessel.length_m
+    course = list(course_as_heading(batches, length_m=length_m, drifts=drifts(batches, model, length_m)))
+    yield from course
+    if not course:
+        yield from gyro_against_heading(batches, length_m=length_m)
+        yield from log_against_positions(batches, length_m=length_m)
+    yield from against_inputs(batches, model, length_m=length_m)
+
+
+def drifts(batches: Sequence[Batch], model: VesselModel, length_m: float) -> float:
+    """Distance forward of midships, in ship lengths, of the place that by the model does not drift in these turns.
+
+    At the measured speeds and yaw rates, the model's sway is taken for steady. What ships do where the model says
+    nothing: no sway, or all parameters zero.
+    """
+    velocity = np.concatenate([batch.velocity for batch in batches])
+    u, r = velocity[np.isfinite(velocity[:, [0, 2]]).all(axis=1)][:, [0, 2]].T
+    if "v" not in model.outputs or not len(u):
+        return 0.0 if "v" not in model.outputs else TUNING.drifts
+    still, small = np.zeros_like(u), 0.01 * np.maximum(np.abs(u), 1e-6)
+    inputs = np.zeros((len(model.inputs), len(u)))
+
+    def sway(v: Array) -> Array:
+        return np.broadcast_to(np.asarray(model.accelerations((u, v, r), (u, v), inputs)[1], dtype=float), u.shape)
+
+    damping = (sway(small) - sway(-small)) / (2.0 * small)
+    steady = np.divide(-sway(still), damping, out=np.zeros_like(u), where=damping < 0)
+    expected = float(-(steady @ r) / max(r @ r, 1e-300)) / length_m
+    return min(abs(expected), TUNING.drifts) if (damping < 0).any() and (sway(still) != 0).any() else TUNING.drifts
+
+
+def _shared(noted: Sequence[tuple[str, str]]) -> list[str]:
+    """Notes with the names of the batches that share them."""
+    names: dict[str, list[str]] = {}
+    for name, note in noted:
+        names.setdefault(note, []).append(name)
+    return [f"{own[0]}{f' and {len(own) - 1} more' if len(own) > 1 else ''}: {note}" for note, own in names.items()]

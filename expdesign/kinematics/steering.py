@@ -1,0 +1,108 @@
+"""Whether the ship answers her inputs in the sense that the vessel file's model gives.
+
+The model at the measured velocities splits an acceleration into what an input adds and the rest. Over windows,
+
+    change of r = k * integral of the input's share + b * integral of the rest + ...
+
+and k is about one where model and record agree, whatever the size of the forces. Where the input's sign is wrong in the
+record, or the parameter's in the vessel file, k is negative: no convention of either is taken for granted.
+
+A turning circle by itself does not tell k apart from the ship's damping; there the turn itself must be the other way,
+by more than a quarter of a circle while the input is held.
+
+Inputs that answer the ship are no trouble as long as they explain her changes: a helmsman against a gust moves the
+rudder against the turn, but then the rudder does not explain it, and nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
+from expdesign.estimation.regression import inputs_of
+from expdesign.kinematics.instruments import Finding, integral, stretches, with_std
+from expdesign.kinematics.relation import relation
+from expdesign.kinematics.tuning import TUNING
+from expdesign.signals import Batch
+from expdesign.values import Array
+from expdesign.vessel import VesselModel
+
+GROUPS = (
+    ("rudder", 2, ("rudder",), "the ship turns against the rudder", "positive to port"),
+    ("azimuth", 2, ("a",), "the ship turns against her thrusters' angles", "positive to port"),
+    ("tunnel", 2, ("n",), "the ship turns against her tunnel thruster", "positive to port"),
+    ("force", 2, ("tau_psi",), "the ship turns against the moment", "positive to port"),
+    ("propeller", 0, ("n",), "the ship goes against her propeller", "negative ahead"),
+    ("azimuth", 0, ("n",), "the ship goes against her thrusters", "negative ahead"),
+    ("force", 0, ("tau_x",), "the ship goes against the force", "negative ahead"),
+)
+"""Kind of actuator, equation, stems of signals, what is seen where the answer is opposite, and the likely reason."""
+
+
+def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: float) -> Iterator[Finding]:
+    """Groups of inputs that the ship answers in the opposite sense.
+
+    Args:
+        batches: at the reference point, with delivered inputs.
+        model: of the vessel file, driven by what is recorded.
+        length_m: of the ship.
+    """
+    for kind, axis, stems, seen, reason in GROUPS:
+        own = [
+            signal
+            for actuator in model.actuators
+            if actuator.kind == kind
+            for signal in actuator.signals
+            if signal.rstrip("0123456789") in stems
+        ]
+        if not own or OUTPUTS[axis] not in model.outputs:
+            continue
+        places = [model.inputs.index(signal) for signal in own]
+        answers = [_answers(batch, model, axis, places) for batch in batches]
+        names = ", ".join(own)
+        question = f"Is {names} {reason}, or a sign wrong in [model.parameters]?"
+        found = relation(stretches(batches, answers, length_m=length_m))
+        if found is not None and found.share >= TUNING.opposed_share:
+            low, high = TUNING.opposed
+            answer, std = found.ratio.real, found.std[0]
+            if answer < -TUNING.certain * std and low < -answer < high:
+                yield Finding(
+                    name=f"answer_to_{kind}", value=answer, std=std, rest=found.rest,
+                    text=f"{seen}: the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel "
+                    f"file's model gives. {question}",
+                )  # fmt: skip
+        elif found is None and OUTPUTS[axis] == "r":
+            turned = np.concatenate([_turned(rows) for rows in answers])
+            against = -float(turned[turned < 0].sum())
+            if against > max(TUNING.turned_rad, TUNING.turned_share * float(np.abs(turned).sum())):
+                yield Finding(
+                    name=f"answer_to_{kind}", value=-against, std=0.0, rest=float(turned[turned > 0].sum()),
+                    text=f"{seen}: by {np.degrees(against):.0f} degrees in all the other way than the vessel file's "
+                    f"model gives. {question}",
+                )  # fmt: skip
+
+
+def _turned(answers: Array) -> Array:
+    """(n,) what the ship turns by while the inputs' share keeps its sign, counted in the sense of that share [rad]."""
+    share, turn = np.diff(answers[:, 1]), np.diff(answers[:, 3])
+    sense = np.sign(share) * (np.abs(share) > TUNING.pushing * np.abs(share).max(initial=0.0))
+    ends = np.flatnonzero(np.diff(sense)) + 1
+    return np.array([part.sum() for part in np.split(sense * turn, ends)])
+
+
+def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int]) -> Array:
+    """(k, 5) running velocity, integrals of the inputs' share and of the rest, of the velocity, and of time."""
+    inputs = inputs_of(model, batch)
+    neutral = inputs.copy()
+    neutral[:, places] = 0.0
+    moving = batch.velocity if batch.wind is None else np.where(np.isfinite(batch.velocity), batch.velocity, 0.0)
+    air = batch.wind if batch.wind is not None else moving[:, :2]
+    whole, rest = (
+        np.broadcast_to(model.accelerations(moving.T, air.T, own.T)[axis], (len(batch),)) for own in (inputs, neutral)
+    )
+    velocity = batch.velocity[:, axis]
+    return np.column_stack(
+        [velocity, integral(whole - rest, batch), integral(rest, batch), integral(velocity, batch), batch.time_s]
+    )

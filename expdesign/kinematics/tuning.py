@@ -1,0 +1,95 @@
+"""The tuning constants of the kinematic checks, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """Constants that were chosen, not derived.
+
+    Attributes:
+        fewest_held: samples from which a signal is asked whether it is held.
+        most_changes: share of samples that change, or bend, above which every sample may be a reading.
+        bend: multiple of rounding above which a bend shows a reading.
+        unbent: share of samples between readings, whose bends are rounding.
+        straight: bend of a line, as a share of its usual step, above which it is none.
+        single: multiple of the usual gap between changes up to which a gap may be one interval.
+        tried: intervals that are tried around the mean of the gaps.
+        fewest_changes: from which an interval is found.
+        whole: standard errors within which an interval counts as a whole number of samples.
+        shortest_interval: of readings [samples].
+        various: share of gaps of several intervals that a rounded signal must have.
+        even: share of changes that an interval must explain.
+        uneven: spread of the gaps, as a share of the interval, up to which a signal is held at about that interval.
+        phases: changes whose phases are tried.
+        one_size: multiple of the smallest change below which another is of the same size.
+        mostly_one: share of changes of one size above which a signal is rounded.
+        lengths: ship lengths sailed in a window.
+        window_samples: fewest samples of a window.
+        longest_window_s: of a window [s].
+        windows: least length of a stretch, in windows.
+        blocks: stretches that the record is cut into, each left out in turn for the standard errors.
+        fewest_blocks: with which a comparison is made.
+        certain: standard errors from what would be right at which a finding is told.
+        scale_matters: change of a scale that is told.
+        turn_matters_rad: misalignment that is told [rad].
+        rate_matters: bias of a rate, as a share of its root mean square, that is told.
+        place_matters: distance of an instrument, in ship lengths, that is told.
+        delay_matters: of one instrument after another, in samples, that is told; Euler's map alone gives a half.
+        way_matters: steady difference of velocities, as a share of the speed, that is told.
+        told: least share of a regressor that the others do not explain.
+        on_course: share of the expected distance of the place that does not drift in turns below which a heading is one
+            of the track.
+        drifts: that distance of ships, at least, from which the drift is expected.
+        on_track: share of the expected drift below which heading and course are the same.
+        turning: drift expected in turns [rad], root mean square, from which heading and course can be told apart.
+        opposed: least and most size of an answer to an input, in units of the model's, that has the wrong sign.
+        opposed_share: share of the changes that the input explains then.
+        turned_rad, turned_share: turn against a held input, and its share of all turns, that count as opposed.
+        pushing: share of an input's largest effect below which it is not held to any side.
+    """
+
+    fewest_held: int = 40
+    most_changes: float = 0.7
+    bend: float = 2.5
+    unbent: float = 0.6
+    straight: float = 1e-3
+    single: float = 1.5
+    tried: int = 41
+    fewest_changes: int = 8
+    whole: float = 0.5
+    shortest_interval: float = 1.5
+    various: float = 0.3
+    even: float = 0.95
+    uneven: float = 0.25
+    phases: int = 50
+    one_size: float = 1.5
+    mostly_one: float = 0.8
+    lengths: float = 1.0
+    window_samples: int = 5
+    longest_window_s: float = 60.0
+    windows: float = 1.5
+    blocks: int = 20
+    fewest_blocks: int = 8
+    certain: float = 5.0
+    scale_matters: float = 0.02
+    turn_matters_rad: float = 0.0175
+    rate_matters: float = 0.1
+    place_matters: float = 0.05
+    delay_matters: float = 0.75
+    way_matters: float = 0.05
+    told: float = 0.02
+    on_course: float = 0.5
+    drifts: float = 0.2
+    on_track: float = 0.5
+    turning: float = 0.02
+    opposed: tuple[float, float] = (0.1, 10.0)
+    opposed_share: float = 0.3
+    turned_rad: float = 1.6
+    turned_share: float = 0.95
+    pushing: float = 0.1
+
+
+TUNING = Tuning()

@@ -1,0 +1,164 @@
+"""Instruments are compared before any model: faults are named with their size, clean records give no note."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.errors import FileError
+from expdesign.kinematics.check import _disagreements
+from expdesign.kinematics.instruments import Finding
+from expdesign.records import load_records
+from expdesign.scenario import load_vessel
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+from expdesign.workflows import measured
+from instrumented_ship import KINDS, NAMES, POSE, Log, voyages, write_log, write_vessel
+
+SEEDS = 20
+COUNT = 8
+"""Voyages of each fault."""
+
+
+@pytest.fixture(scope="module")
+def ship(tmp_path_factory: pytest.TempPathFactory) -> Vessel:
+    """Parameters are off by a fifth, as before an estimation."""
+    return load_vessel(write_vessel(tmp_path_factory.mktemp("ship") / "ship.toml", off=1.2))
+
+
+def read(folder: Path, log: Log, ship: Vessel, names: tuple[str, ...] = NAMES) -> Record:
+    return measured([write_log(folder / "log.csv", log, names)], ship)
+
+
+def findings(folder: Path, log: Log, ship: Vessel, names: tuple[str, ...] = NAMES) -> dict[str, Finding]:
+    """By the names of their quantities."""
+    record = load_records(write_log(folder / "log.csv", log, names), vessel_inputs=ship.model.inputs)
+    return {finding.name: finding for finding in _disagreements(record.batches, ship, ship.model)}
+
+
+@pytest.mark.parametrize("sample_s", [1.0, 0.2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_clean_records_are_not_doubted(tmp_path: Path, ship: Vessel, kind: str, sample_s: float) -> None:
+    count = SEEDS if sample_s == 1.0 else 4
+    for gust in (0.0, 2.0):
+        for log in voyages(count, kind, sample_s=sample_s, gust=gust):
+            for names in (NAMES, POSE):
+                assert read(tmp_path, log, ship, names).doubts == ()
+
+
+@pytest.mark.parametrize("rounding", [np.radians(1.0), np.radians(0.1)])
+@pytest.mark.parametrize("kind", ["zigzag", "circle", "straight"])
+def test_rounded_readings_are_not_taken_for_held_ones(tmp_path: Path, ship: Vessel, kind: str, rounding: float) -> None:
+    for log in voyages(4, kind, sample_s=0.2, noise=0.05, last_s=200.0):
+        log["heading_rad"] = np.round(log["heading_rad"] / rounding) * rounding
+        assert read(tmp_path, log, ship, POSE).doubts == ()
+
+
+def scaled(*names: str, by: float) -> Callable[[Log], Log]:
+    return lambda log: {**log, **{name: by * log[name] for name in names}}
+
+
+def moved(log: Log) -> Log:
+    """The antenna is 15 m forward and 2 m to starboard."""
+    c, s = np.cos(log["heading_rad"]), np.sin(log["heading_rad"])
+    return {**log, "north_m": log["north_m"] + 15 * c - 2 * s, "east_m": log["east_m"] + 15 * s + 2 * c}
+
+
+def through_water(log: Log) -> Log:
+    """The log measures through water that flows at 0.4 m/s to 30 degrees."""
+    to_north, to_east = 0.4 * np.cos(np.radians(30)), 0.4 * np.sin(np.radians(30))
+    c, s = np.cos(log["heading_rad"]), np.sin(log["heading_rad"])
+    return {
+        **log,
+        "u_mps": log["u_mps"] - to_north * c - to_east * s,
+        "v_mps": log["v_mps"] + to_north * s - to_east * c,
+    }
+
+
+FAULTS: dict[str, tuple[Callable[[Log], Log], float]] = {
+    "yaw_rate_scale": (scaled("r_radps", by=0.95), 0.95),
+    "yaw_rate_bias_radps": (lambda log: {**log, "r_radps": log["r_radps"] + 0.006}, 0.006),
+    "velocity_scale": (scaled("u_mps", "v_mps", by=0.95), 0.95),
+    "heading_bias_rad": (lambda log: {**log, "heading_rad": log["heading_rad"] + 0.14}, 0.14),
+    "position_forward_m": (moved, 15.0),
+    "current_mps": (through_water, 0.4),
+}
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "random", "circle"])
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_named_with_its_size(tmp_path: Path, ship: Vessel, name: str, kind: str) -> None:
+    spoil, truth = FAULTS[name]
+    errors = []
+    for log in voyages(COUNT, kind, sample_s=0.4, seed=1):
+        found = findings(tmp_path, spoil(log), ship)
+        assert set(found) == {name}
+        errors.append((found[name].value - truth) / found[name].std)
+    # jackknife errors of a dozen stretches have about the tails of t with ten degrees of freedom, std 1.12
+    assert np.sqrt(np.mean(np.square(errors))) < 1.12 * 1.9
+    assert abs(np.mean(errors)) < 1.12 * 4.0 / np.sqrt(COUNT)
+
+
+def test_velocities_that_come_late_are_told_apart_from_a_place_by_speeds_that_differ(
+    tmp_path: Path, ship: Vessel
+) -> None:
+    for log in voyages(4, "random", sample_s=0.2, seed=2):
+        slow = 0.85 + 0.15 * np.sin(2 * np.pi * log["time_s"] / 90.0)
+        pose = [log["north_m"][0], log["east_m"][0]]
+        c, s = np.cos(log["heading_rad"]), np.sin(log["heading_rad"])
+        u, v = slow * log["u_mps"], slow * log["v_mps"]
+        for axis, rate in enumerate((c * u - s * v, s * u + c * v)):
+            log[("north_m", "east_m")[axis]] = pose[axis] + np.cumsum(rate) * 0.2
+        log["u_mps"], log["v_mps"] = (np.concatenate([np.full(4, one[0]), one[:-4]]) for one in (u, v))
+        found = findings(tmp_path, log, ship)
+        assert set(found) == {"velocity_delay_s"}
+        assert found["velocity_delay_s"].value == pytest.approx(0.8, abs=0.15)  # half a sample by the sum
+
+
+@pytest.mark.parametrize("names", [NAMES, POSE])
+@pytest.mark.parametrize("kind", ["zigzag", "random", "circle"])
+def test_a_ship_that_turns_against_her_rudder_is_told(
+    tmp_path: Path, ship: Vessel, kind: str, names: tuple[str, ...]
+) -> None:
+    for log in voyages(COUNT, kind, gust=0.5):
+        log["rudder1_rad"] = -log["rudder1_rad"]
+        (doubt,) = read(tmp_path, log, ship, names).doubts
+        assert doubt.startswith("log.csv: the ship turns against the rudder: ")
+        assert "Is rudder1 positive to port, or a sign wrong in [model.parameters]?" in doubt
+
+
+def test_the_rudder_sign_is_the_vessel_files_and_no_convention(tmp_path: Path) -> None:
+    text = write_vessel(tmp_path / "ship.toml").read_text().replace("N_ud = 0.0005\n", "N_ud = -0.0005\n")
+    (tmp_path / "ship.toml").write_text(text)
+    port = load_vessel(tmp_path / "ship.toml")
+    for log in voyages(COUNT, "zigzag", gust=0.5):
+        assert "against the rudder" in read(tmp_path, log, port).doubts[0]
+        log["rudder1_rad"] = -log["rudder1_rad"]
+        assert read(tmp_path, log, port).doubts == ()
+
+
+@pytest.mark.parametrize("names", [NAMES, POSE])
+@pytest.mark.parametrize("kind", ["zigzag", "random", "circle"])
+def test_course_taken_for_heading_is_recognised(
+    tmp_path: Path, ship: Vessel, kind: str, names: tuple[str, ...]
+) -> None:
+    for seed, log in enumerate(voyages(COUNT, kind, gust=0.5)):
+        drift = np.arctan2(log["v_mps"], log["u_mps"])
+        noise = 0.005 * np.random.default_rng(seed).standard_normal(len(drift))
+        log["heading_rad"] = log["heading_rad"] + drift + noise
+        assert "log.csv: the heading column holds course over ground" in " ".join(
+            read(tmp_path, log, ship, names).doubts
+        )
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "random", "circle", "courses"])
+def test_headings_that_count_counter_clockwise_are_refused(tmp_path: Path, ship: Vessel, kind: str) -> None:
+    for log in voyages(COUNT, kind):
+        truth = log["heading_rad"]
+        for heading, whence in ((np.pi / 2 - truth, " from east, as in mathematics"), (-truth, "")):
+            log["heading_rad"] = heading
+            with pytest.raises(
+                FileError, match=f"heading_rad: counts counter-clockwise{whence}, as the positions show"
+            ):
+                read(tmp_path, log, ship, POSE)
