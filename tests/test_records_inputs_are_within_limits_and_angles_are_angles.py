@@ -150,7 +150,7 @@ WAYS = {
 
 @pytest.mark.parametrize("unit", ["rad", "deg"])
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("stem", ["a1", "heading", "planned_a1"])
+@pytest.mark.parametrize("stem", ["a1", "heading", "planned_a1", "reached_a1"])
 def test_an_angle_is_the_same_in_every_way_to_write_it(tmp_path: Path, stem: str, way: str, unit: str) -> None:
     """What follows one of them, such as a thruster with a lag or a rate, follows all."""
     columns = {name: value for name, value in motion().items() if name not in ("heading_rad", "r_radps", "u_mps")}
@@ -167,7 +167,7 @@ def test_an_angle_is_the_same_in_every_way_to_write_it(tmp_path: Path, stem: str
         if stem == "heading":
             assert batch.pose is not None
             return np.asarray(batch.pose[:, 2])
-        values = batch.inputs if stem == "a1" else batch.planned
+        values = batch.planned if stem == "planned_a1" else batch.inputs
         assert values is not None
         return np.asarray(values[:, batch.input_names.index("a1")])
 
@@ -175,6 +175,8 @@ def test_an_angle_is_the_same_in_every_way_to_write_it(tmp_path: Path, stem: str
     turns = (found - expected)[0] / (2 * np.pi)
     assert turns == pytest.approx(round(turns) if stem == "heading" else 0, abs=1e-9)
     np.testing.assert_allclose(np.diff(found), np.diff(expected), atol=1e-9)
+    if stem == "reached_a1":  # means over the samples
+        angle = (angle + np.append(angle[1:], angle[-1:])) / 2
     np.testing.assert_allclose(np.diff(expected), np.diff(angle), atol=1e-9)
 
 

@@ -109,7 +109,7 @@ def not_drawn(what: str, error: Exception) -> str:
 
 def gaps(paths: Sequence[Path]) -> tuple[str, ...]:
     """What could not be drawn in pages among these files, a sentence each."""
-    pages = [path for path in paths if path.suffix == ".html"]
+    pages = [path for path in paths if path.suffix == ".html" and path.exists()]
     return tuple(f"{path}: {found}" for path in pages for found in NOT_DRAWN.findall(path.read_text(encoding="utf-8")))
 
 

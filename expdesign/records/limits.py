@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from expdesign.records.file import PLANNED, Table
+from expdesign.records.file import Table, input_name
 from expdesign.records.tuning import TUNING
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.vessel.actuators import stem
@@ -39,13 +39,13 @@ def column_limits(actuators: Sequence[Actuator]) -> dict[str, Limit]:
 
 
 def check_limits(table: Table, limits: Mapping[str, Limit]) -> Table:
-    """The table with a note for every input, planned ones too, that is beyond its limits in some rows.
+    """The table with a note for every input, planned and reached ones too, that is beyond its limits in some rows.
 
     Raises:
         FileError: one is in most rows; or wherever it is not zero, and by as much as another unit would explain.
     """
     for name, values in table.columns.items():
-        signal, source = name.removeprefix(PLANNED), table.sources.get(name)
+        signal, source = input_name(name), table.sources.get(name)
         limit = limits.get(signal, Limit())
         slack = TUNING.limit_slack * _size(limit)
         beyond = (values < limit.low - slack) | (values > limit.high + slack)

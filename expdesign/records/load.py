@@ -221,12 +221,7 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
         name=name,
         sample_time_s=clock.sample_time_s,
         input_names=names,
-        inputs=np.column_stack(
-            [
-                _input(table, column, part)[kept.start - part.start :][: kept.stop - kept.start]
-                for column in inputs.columns
-            ]
-        ),
+        inputs=_inputs(table, inputs.columns, part)[kept.start - part.start :][: kept.stop - kept.start],
         velocity=batch_velocity(table, part, clock.sample_time_s, origins, file.request.heading_std_rad),
         pose=table.stack(*POSE_COLUMNS)[kept] if set(POSE_COLUMNS) & set(table.columns) else None,
         wind=wind[kept] if wind is not None else None,
@@ -243,9 +238,9 @@ def _batch(file: _File, part: slice, name: str) -> Batch:
     )
 
 
-def _input(table: Table, column: str, part: slice) -> Array:
-    """(k,) a command held in each sample of a part, or the mean of the positions that were reached at its ends."""
-    if REACHED + column not in table.columns:
-        return table.columns[column][part]
-    reached = table.columns[REACHED + column][part]
-    return np.asarray((reached + np.append(reached[1:], reached[-1:])) / 2)
+def _inputs(table: Table, columns: tuple[str, ...], part: slice) -> Array:
+    """(k, m) commands held in each sample of a part, or means of the positions that were reached at its ends."""
+    commanded = table.stack(*columns)[part]
+    reached = table.stack(*(REACHED + column for column in columns))[part]
+    means = (reached + np.concatenate([reached[1:], reached[-1:]])) / 2
+    return np.where([REACHED + column in table.columns for column in columns], means, commanded)

@@ -222,8 +222,8 @@ def is_input(name: str) -> bool:
 
 
 def is_turning_input(name: str) -> bool:
-    """True for the contract's names of angles of thrusters, commanded or planned."""
-    return re.fullmatch(rf"(?:{PLANNED})?a\d+_rad", name) is not None
+    """True for the contract's names of angles of thrusters, commanded, planned or reached."""
+    return re.fullmatch(r"a\d+_rad", input_name(name)) is not None
 
 
 def _synonyms(pattern: str) -> str:

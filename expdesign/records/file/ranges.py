@@ -46,13 +46,6 @@ RANGES = (
     Range(pattern="wind_speed_mps", low=0, high=120, expected="0 to 120 m/s"),
     Range(pattern="steered", low=0, high=1, expected="0 or 1"),
     Range(
-        pattern=r"(?:planned_|reached_)?a\d+_rad",
-        low=-4 * TURN,
-        high=4 * TURN,
-        expected="-25.1 to 25.1 rad",
-        degrees=True,
-    ),
-    Range(
         pattern=r"(?:planned_|reached_)?rudder\d+_rad",
         low=-TURN / 4,
         high=TURN / 4,
@@ -68,7 +61,7 @@ RANGES = (
 )
 
 
-ROUND = re.compile(r"(?:planned_)?a\d+_rad|wind_angle_rad")
+ROUND = re.compile(r"(?:planned_|reached_)?a\d+_rad|wind_angle_rad")
 """Angles that go round and round: any number of turns stands for the same direction, as it does for the heading."""
 
 

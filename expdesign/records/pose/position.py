@@ -9,7 +9,7 @@ import numpy as np
 import pyproj
 
 from expdesign.conventions import whole_turns
-from expdesign.records.file import PLANNED, Table, is_turning_input
+from expdesign.records.file import Table, input_name, is_turning_input
 from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import Limit
@@ -83,7 +83,7 @@ def with_continuous_angles(table: Table, limits: Mapping[str, Limit]) -> Table:
     if "heading_rad" in columns:
         columns["heading_rad"] = continuous(columns["heading_rad"])
     for name in (name for name in columns if is_turning_input(name)):
-        limit, angle = limits.get(name.removeprefix(PLANNED), Limit()), continuous(columns[name])
+        limit, angle = limits.get(input_name(name), Limit()), continuous(columns[name])
         columns[name] = angle - whole_turns(angle[0])
         if limit.high - limit.low <= TURN:
             columns[name] -= whole_turns(columns[name] - (limit.low + limit.high) / 2.0)
