@@ -8,13 +8,14 @@ import pytest
 
 from expdesign.errors import FileError
 from expdesign.kinematics.check import _disagreements
-from expdesign.kinematics.instruments import Finding
+from expdesign.kinematics.instruments import Finding, log_against_positions
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
 from expdesign.workflows import measured
 from instrumented_ship import KINDS, NAMES, POSE, Log, voyages, write_log, write_vessel
+from sample_files import outside, outside_record
 
 SEEDS = 20
 COUNT = 8
@@ -162,3 +163,39 @@ def test_headings_that_count_counter_clockwise_are_refused(tmp_path: Path, ship:
                 FileError, match=f"heading_rad: counts counter-clockwise{whence}, as the positions show"
             ):
                 read(tmp_path, log, ship, POSE)
+
+
+FIELD = {
+    "heading/cog.csv": "the heading column holds course over ground",
+    "heading/held.csv": "the headings are read every 5 s",
+    "rudder-sign/zz20-act-port.csv": "the ship turns against the rudder",
+    "rudder-sign/tc35-act-port.csv": "the ship turns against the rudder",
+    "rudder-rate/zz20.csv": "",
+    "rudder-rate/tc35.csv": "",
+}
+
+
+@pytest.mark.outside
+@pytest.mark.parametrize("name", FIELD)
+def test_inputs_of_the_field_are_told_by_name(name: str) -> None:
+    ship = load_vessel(outside("field/rudder-rate/ship8.toml"))
+    doubts = measured([outside(f"field/{name}")], ship).doubts
+    assert FIELD[name] in " ".join(doubts)
+    assert len(doubts) == bool(FIELD[name])
+
+
+@pytest.mark.outside
+def test_the_velocities_of_every_pond_run_come_late_by_the_same_time() -> None:
+    delays = []
+    for batch in outside_record("esso-osaka-3m", ("random", "turn_1", "zigzag")).batches:
+        found = {finding.name: finding for finding in log_against_positions([batch], length_m=3.0)}
+        delays.append(found["velocity_delay_s"].value)
+    assert np.ptp(delays) < 0.1
+    assert np.median(delays) == pytest.approx(0.96, abs=0.01)
+
+
+@pytest.mark.outside
+def test_tank_records_are_not_doubted() -> None:
+    ship = load_vessel(outside("field/crash/vessel.toml"))
+    for path in sorted(outside("kvlcc2-hsva-7m").glob("*.csv")):
+        assert measured([path], ship).doubts == ()

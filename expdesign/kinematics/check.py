@@ -50,8 +50,8 @@ def in_stated_time(record: Record, sensors: Sensors) -> Record:
         return record
     like: dict[str, Any] = {name: place for name, place in intervals.items() if place.interval_s}
     own = replace(Sensors(heading_rad=sensors.heading_rad), **like)
-    notes = at_reference_point(record, own).notes
-    return replace(record, batches=tuple(_read(batch, own, smoothed=False) for batch in record.batches), notes=notes)
+    read = at_reference_point(record, own)
+    return replace(read, batches=tuple(map(_where_pose_is_known, read.batches)))
 
 
 def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, list[str]]:
@@ -70,20 +70,16 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
         name: Mounting(interval_s=how.interval * batch.sample_time_s) for name, how in undone.items()
     }
     like = replace(Sensors(heading_rad=sensors.heading_rad), **intervals)
-    try:
-        return _read(_with(batch, lines), like, smoothed=smoothed), notes
-    except InputError:  # too short
-        return batch, notes
+    (read,) = at_reference_point(Record(batches=(_with(batch, lines),)), like, smoothed=smoothed).batches
+    return _where_pose_is_known(read), notes
 
 
-def _read(batch: Batch, like: Sensors, *, smoothed: bool) -> Batch:
-    """A batch read at the intervals of sensors, without the ends at which no pose is known any more."""
-    (read,) = at_reference_point(Record(batches=(batch,)), like, smoothed=smoothed).batches
-    if batch.pose is None or read.pose is None:
-        return read
-    measured = np.isfinite(batch.pose).any(axis=0)
-    known = np.flatnonzero(np.isfinite(read.pose[:, measured]).all(axis=1))
-    return read.cut(slice(int(known[0]), int(known[-1]) + 1))
+def _where_pose_is_known(batch: Batch) -> Batch:
+    """A batch without the ends before the first and after the last reading of a pose."""
+    if batch.pose is None:
+        return batch
+    known = np.flatnonzero(np.isfinite(batch.pose[:, np.isfinite(batch.pose).any(axis=0)]).all(axis=1))
+    return batch.cut(slice(int(known[0]), int(known[-1]) + 1)) if len(known) else batch
 
 
 def _signals(batch: Batch) -> dict[str, Array]:

@@ -55,7 +55,7 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
         yield Finding(
             name="yaw_rate_scale", value=scale, std=std, rest=found.rest,
             text=f"r_radps is {with_std(scale, std)} times the rate at which the heading changes: the scale of a gyro? "
-            f"Where the heading is right, state sensors.yaw_rate_scale = {scale:.4g}.",
+            f"Where the heading is right, multiply sensors.yaw_rate_scale by {scale:.4g}.",
         )  # fmt: skip
     bias, std = float(found.others[0].real), float(found.others_std[0, 0])
     if abs(bias) > max(TUNING.certain * std, TUNING.rate_matters * rate):
@@ -85,7 +85,7 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
         yield Finding(
             name="heading_bias_rad", value=angle, std=std, rest=found.rest,
             text=f"the heading is {with_std(angle / DEGREE, std / DEGREE)} degrees more than positions and velocities "
-            f"say: sensors.heading_bias_rad = {angle:.4g}, or sensors.velocity_angle_rad = {-angle:.4g}.",
+            f"say: add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
         )  # fmt: skip
     drift, std = complex(found.others[0]), float(np.hypot(*found.others_std[0]))
     if abs(drift) > max(TUNING.certain * std, TUNING.way_matters * speed):
@@ -101,24 +101,25 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
 def _place_or_delay(batches: Sequence[Batch], found: Relation, speed: float, *, length_m: float) -> Iterator[Finding]:
     """Where the positions are measured, or how late the velocities come; at one speed these are the same."""
     arm, spread = -complex(found.others[1] / found.ratio), found.others_std[1] / abs(found.ratio)
-    late = relation(stretches(batches, [_moving_late(batch) for batch in batches], length_m=length_m))
-    if late is not None:
-        delay, std = -float((late.others[2] / late.ratio).real), float(late.others_std[2, 0] / abs(late.ratio))
+    both = relation(stretches(batches, [_moving_late(batch) for batch in batches], length_m=length_m))
+    if both is not None:
+        delay, std = -float((both.others[2] / both.ratio).real), float(both.others_std[2, 0] / abs(both.ratio))
         if abs(delay) > max(TUNING.certain * std, TUNING.delay_matters * batches[0].sample_time_s):
-            arm, spread = -complex(late.others[1] / late.ratio), late.others_std[1] / abs(late.ratio)
+            arm, spread = -complex(both.others[1] / both.ratio), both.others_std[1] / abs(both.ratio)
             later, sooner = ("u_mps and v_mps", "the positions")[:: 1 if delay > 0 else -1]
             yield Finding(
-                name="velocity_delay_s", value=delay, std=std, rest=late.rest,
+                name="velocity_delay_s", value=delay, std=std, rest=both.rest,
                 text=f"{later} come {with_std(abs(delay), std)} s later than {sooner}.",
             )  # fmt: skip
     little = TUNING.place_matters * length_m + TUNING.delay_matters * batches[0].sample_time_s * speed
     if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), little):
         ahead, beside = ("forward" if arm.real >= 0 else "aft"), ("starboard" if arm.imag >= 0 else "port")
+        late = "u_mps and v_mps come" if arm.real > 0 else "the positions come"
         yield Finding(
             name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.rest,
             text=f"the positions are those of a place {with_std(abs(arm.real), spread[0])} m {ahead} and "
             f"{with_std(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
-            + (f", or u_mps and v_mps come {arm.real / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) else "."),
+            + (f", or {late} {abs(arm.real) / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) else "."),
         )  # fmt: skip
 
 

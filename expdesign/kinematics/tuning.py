@@ -73,7 +73,7 @@ class Tuning:
     windows: float = 1.5
     blocks: int = 20
     fewest_blocks: int = 8
-    certain: float = 5.0
+    certain: float = 6.0
     scale_matters: float = 0.02
     turn_matters_rad: float = 0.0175
     rate_matters: float = 0.1
