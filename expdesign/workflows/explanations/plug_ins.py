@@ -127,16 +127,11 @@ def data_topic() -> Topic:
         "A CSV file with one header row; the unit is the end of a column's name. Needed are time, the inputs of the "
         "vessel's model, and velocities or a pose to derive them from (--velocity). A gap of more than 1.5 sample "
         "times starts a new batch. Unusual data are reported; wrong data are refused with their rows. Inputs are "
-<<<<<<< HEAD
         "commands, but for reached positions, and the rest is as the sensors measured it: slew rates, lags, delays, "
-        "places and faults that the vessel file states are undone, and notes say so."
-=======
-        "commands and the rest is as the sensors measured it: lags, delays, places and faults that the vessel file "
-        "states are undone, and notes say so. Before any fit, inputs are held against the limits of the vessel file, "
-        "and instruments against each other: gyro, compass, log and positions, each with an estimate and its standard "
-        "error; signals that are held or interpolated between readings are read in time; and the ship must answer her "
-        "inputs in the sense of the vessel file."
->>>>>>> records
+        "places and faults that the vessel file states are undone, and notes say so. Before any fit, inputs are held "
+        "against the limits of the vessel file, and instruments against each other: gyro, compass, log and positions, "
+        "each with an estimate and its standard error; signals that are held or interpolated between readings are read "
+        "in time; and the ship must answer her inputs in the sense of the vessel file."
     )
     return _list("data", "Columns of measured data", entries, text)
 
