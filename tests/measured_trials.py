@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Trajectory
-from expdesign.simulation import CALM, Environment, measure, simulate
+from expdesign.simulation import CALM, Environment, measure, positions, simulate
 from expdesign.vessel import Sensors, Vessel
 from record_files import write_trial
 
@@ -33,11 +33,18 @@ def model_ship_commands(samples: int = 4000, *, seed: int = 0, astern: bool = Fa
     return Commands(sample_time_s=0.125, names=MODEL_SHIP_TRUE.model.inputs, values=values)
 
 
+def prompt(vessel: Vessel) -> Vessel:
+    """The vessel with actuators that jump from command to command."""
+    actuators = tuple(replace(one, responses=()) for one in vessel.model.actuators)
+    return replace(vessel, model=replace(vessel.model, actuators=actuators))
+
+
 def tug_commands(samples: int = 3000, *, seed: int = 0) -> Commands:
-    """Both thrusters about 10 rps and 36 degrees, so that velocities and relative wind vary."""
+    """Both thrusters about 10 rps and 36 degrees, so that velocities and relative wind vary; they keep to the rates."""
     rng = np.random.default_rng(seed)
     speed, one, two = (held(rng, samples) for _ in range(3))
-    values = np.stack([10 + 3 * speed, 0.63 + 0.4 * one, 10 + 3 * speed, 0.63 + 0.4 * two], axis=1)
+    orders = np.stack([10 + 3 * speed, 0.63 + 0.4 * one, 10 + 3 * speed, 0.63 + 0.4 * two], axis=1)
+    values = positions(TUG_TRUE.responses, orders, sample_time_s=1.0, standing=None).means
     return Commands(sample_time_s=1.0, names=TUG_TRUE.model.inputs, values=values)
 
 

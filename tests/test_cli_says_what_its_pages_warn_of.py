@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,12 @@ import pytest
 from design_case import SCENARIOS
 from expdesign.cli import main
 from expdesign.cli.summary import as_json, print_summary
+from expdesign.scenario import load_scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.workflows import Outcome
 from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.planned import plan_summary
-from export_case import plan
+from export_case import plan, tug
 from roll_files import KNOWN, UNKNOWN, stated, three
 from step_case import GUESS, STEPS, craft_columns, write_csv
 
@@ -89,7 +91,10 @@ def test_what_a_page_says_first_is_on_the_terminal(
 
 
 def test_water_without_depths_is_said_with_the_plan() -> None:
-    assert plan_summary(plan())["note_on_depths"] == UNKNOWN_DEPTH
+    assert (
+        plan_summary(replace(load_scenario(SCENARIOS / "story.toml"), vessel=tug()), plan())["note_on_depths"]
+        == UNKNOWN_DEPTH
+    )
 
 
 def test_a_remark_is_printed_once_however_long_and_whatever_tables_there_are(

@@ -18,6 +18,7 @@ from expdesign.errors import FileError, UnknownName
 from expdesign.export import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Mounting, Response, Vessel
+from measured_trials import prompt
 from short_examples import SCENARIOS
 
 TRUE = (0.12, -0.08)
@@ -70,7 +71,7 @@ def test_standard_errors_of_findings_reach_the_vessel_file_and_come_back(tmp_pat
     found = {"current:north": 0.1, "current:east": 0.2, "lag:n": 2.0, "offset:a": 0.03, "heading_bias": 0.02,
              "gyro": 0.04, "lever:forward": 2.0, "late:r": 1.0}  # fmt: skip
     std = {key: 0.1 * abs(value) for key, value in found.items()} | {"current:north": 0.02}
-    vessel = load_vessel(TENDER)
+    vessel = prompt(load_vessel(TENDER))
     ship = extended_model(vessel, record).with_effects(found)
     extended, _ = extend(vessel, ship, std)
     file = tmp_path / "vessel.toml"

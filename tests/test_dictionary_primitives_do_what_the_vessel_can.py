@@ -43,7 +43,8 @@ def test_without_limits_the_run_follows_the_desired_motion_to_second_order_in_th
 
 def commanded(ship: Vessel, primitive: Primitive) -> tuple[Array, Array, Array, Array]:
     """Commands from the standing ones on (k + 1, m), and the limits low, high, rate (m,)."""
-    low, high, rate = (np.array([getattr(limit, name) for limit in ship.limits]) for name in ("low", "high", "rate"))
+    low, high = (np.array([getattr(limit, name) for limit in ship.limits]) for name in ("low", "high"))
+    rate = ship.rates
     return np.vstack([primitive.entry_inputs, primitive.commands.values]), low, high, rate
 
 

@@ -19,7 +19,7 @@ from expdesign.estimation.settings import Settings
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
 from expdesign.vessel import VesselModel
-from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
+from measured_trials import MODEL_SHIP_TRUE, model_ship_commands, prompt
 
 TRUTH = dict(zip(TRUE.model.names, TRUE.model.parameters.tolist(), strict=True))
 MERGED = {"X_abs_u_u": "W_abs_u_u", "Y_abs_v_v": "W_abs_v_v", "N_uv": "W_uv"}
@@ -254,7 +254,7 @@ def test_a_steady_force_nobody_recorded_is_found_and_leaves_the_parameters_alone
 def test_runge_kutta_gives_the_parameters_of_the_motion_and_euler_those_of_its_map() -> None:
     """Sampled eight times finer than estimated, with a decay of 0.35 per sample in yaw for Euler's map to miss."""
     commands_ = model_ship_commands(1200)
-    motion = simulate(MODEL_SHIP_TRUE, commands_, velocity=(1.0, 0.0, 0.0), substeps=8)
+    motion = simulate(prompt(MODEL_SHIP_TRUE), commands_, velocity=(1.0, 0.0, 0.0), substeps=8)
     batch = Batch(
         name="run",
         sample_time_s=0.125,

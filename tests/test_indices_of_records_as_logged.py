@@ -313,7 +313,7 @@ def test_the_terminal_counts_apart_and_says_why_a_run_gives_nothing(
     assert summary["simulated_criteria_met"] == sum(row["met"] is True for row in rows)
     assert main(given) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "short.csv no result: one helm order, and the heading changes by" in printed
+    assert "short.csv: no result: one helm order, and the heading changes by" in printed
     assert "measured criteria met 0" in printed
 
 

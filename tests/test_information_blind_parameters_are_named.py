@@ -76,9 +76,13 @@ def test_with_wind_straight_lines_show_side_wind_unless_each_runs_mean_is_taken_
 
 def test_rounding_of_a_thruster_turned_round_is_no_excitation():
     ship = vessel("azimuth-30m")
+    half_turn = np.array([0, np.pi, 0, np.pi])
     turned = [  # astern by turning both thrusters half a turn: sin(pi) is not quite zero, and sways the ship a little
-        replace(primitive, commands=replace(primitive.commands, values=primitive.commands.values * (-1, 1, -1, 1) +
-                                            (0, np.pi, 0, np.pi)))
+        replace(
+            primitive,
+            commands=replace(primitive.commands, values=primitive.commands.values * (-1, 1, -1, 1) + half_turn),
+            entry_inputs=primitive.entry_inputs * (-1, 1, -1, 1) + half_turn,
+        )
         for primitive in straight_line(ship)
     ]  # fmt: skip
     assert {"Y_v", "Y_mu", "N_r", "N_mu", "Y_abs_v_v"} <= blind(ship, turned, CALM, "none")

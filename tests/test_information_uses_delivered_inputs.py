@@ -22,20 +22,21 @@ from expdesign.information.recorded import recorded_information
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, delivered, simulate
-from expdesign.vessel import Response, Vessel
+from expdesign.vessel import IDEAL, Response, Vessel
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
-IDEAL_SHIP = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
+TENDER = load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 SPECS = load_dictionary(SCENARIOS / "dictionaries/tender-20m.toml")
 SEA = Environment(current_to=np.array([0.1, -0.2]))
-NAMES = IDEAL_SHIP.model.names
+NAMES = TENDER.model.names
 
 
 def with_responses(speed: Response, angle: Response) -> Vessel:
-    actuators = tuple(replace(item, responses=(speed, angle)) for item in IDEAL_SHIP.actuators)
-    return replace(IDEAL_SHIP, model=replace(IDEAL_SHIP.model, actuators=actuators))
+    actuators = tuple(replace(item, responses=(speed, angle)) for item in TENDER.actuators)
+    return replace(TENDER, model=replace(TENDER.model, actuators=actuators))
 
 
+IDEAL_SHIP = with_responses(IDEAL, IDEAL)
 EXACT = with_responses(Response(delay_s=3.0, deadband=2.0), Response(delay_s=2.0, offset=0.1))
 LAGGING = with_responses(Response(lag_s=4.0), Response(lag_s=2.0, delay_s=1.5))
 

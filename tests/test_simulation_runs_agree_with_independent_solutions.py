@@ -13,11 +13,9 @@ from expdesign.signals import Commands
 from expdesign.simulation import Environment, simulate, simulate_many
 from expdesign.simulation.run import FEW_RUNS
 from expdesign.vessel import Vessel
+from measured_trials import prompt
 
-GIVEN = vessel("azimuth-30m-true")
-PROMPT = tuple(replace(actuator, responses=()) for actuator in GIVEN.actuators)
-SHIP = replace(GIVEN, model=replace(GIVEN.model, actuators=PROMPT))
-"""With actuators that jump from command to command."""
+SHIP = prompt(vessel("azimuth-30m-true"))
 SEA = Environment(current_to=np.array([0.3, -0.2]), wind_to=np.array([-4.0, 6.0]))
 START = {"pose": (3.0, -2.0, 0.7), "velocity": (1.0, 0.2, 0.02)}
 

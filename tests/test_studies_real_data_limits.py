@@ -14,7 +14,7 @@ from expdesign.estimation.replay.replay import Integration
 from expdesign.signals import Batch, Record
 from expdesign.simulation import simulate
 from expdesign.vessel import Actuator, Limit, Term, VesselModel
-from measured_trials import MODEL_SHIP_TRUE, model_ship_commands
+from measured_trials import MODEL_SHIP_TRUE, model_ship_commands, prompt
 from real_data_cases import POND, TANK, vessel_of
 from sample_files import outside_record
 
@@ -26,7 +26,7 @@ def driven(samples: int = 1200, *, push: float = 0.0, noise: float = 0.0) -> Bat
     """The model ship's run; a constant side force that nobody recorded, and white noise on every velocity."""
     commands = model_ship_commands(samples)
     pushed = replace(commands, values=commands.values + np.array([0, push, 0]))
-    motion = simulate(MODEL_SHIP_TRUE, pushed, velocity=(1.0, 0.0, 0.0))
+    motion = simulate(prompt(MODEL_SHIP_TRUE), pushed, velocity=(1.0, 0.0, 0.0))
     velocity = motion.velocity[:-1] + noise * np.random.default_rng(5).normal(size=(samples, 3))
     return Batch(
         name="run",

@@ -16,6 +16,7 @@ from expdesign.estimation.methods import estimate
 from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.records import load_records
+from expdesign.reduction import reduced
 from expdesign.scenario import load_vessel
 from expdesign.simulation import Environment
 from expdesign.vessel import NUMPY, generalised_force
@@ -256,7 +257,7 @@ def test_blocks_asked_for_are_blocks_used(trial: Path, tmp_path: Path) -> None:
     """Every run a block of its own: the estimate is that of the library, and differs from one block for all."""
     files, ship = [trial.parent / f"{name}.csv" for name in ("one", "two")], load_vessel(MODEL_SHIP)
     workflows.estimate(files, tmp_path, vessel=MODEL_SHIP, methods=["iv"], mean="batch", blocks="batch", motion="euler")
-    record = load_records(files, vessel_inputs=ship.model.inputs)
+    record = reduced(load_records(files, vessel_inputs=ship.model.inputs), ship)
     found = estimates(tmp_path)["iv"]["parameters"]
     for blocks, same in (("batch", True), ("one", False)):
         weighting = Weighting(mean="batch", blocks=blocks)

@@ -213,15 +213,24 @@ def acting_response(batch: Batch, name: str, response: Response) -> Response:
 def keeps_to(rate: float, signal: Array, *, sample_time_s: float) -> bool:
     """Whether a recorded signal (k,) moves no faster than an actuator can, but for noise and rounding of its readings.
 
-    A recorded position does, and so does a smooth command. The noise follows from the second differences, the rounding
-    from the smallest change.
+    A recorded position does, and so does a smooth command. A command jumps by itself; an actuator that is a little
+    faster than stated goes on for more than a sample. The noise follows from the second differences.
     """
-    steps = np.abs(np.diff(signal))
-    if len(steps) < 2 or not steps.any():
+    steps = np.abs(np.diff(signal, prepend=signal[:1], append=signal[-1:]))
+    if not steps.any():
         return True
-    noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0)
-    rounding = min(float(steps[steps > 0].min()), COARSEST * float(np.ptp(signal)))
-    return bool(steps.max() <= FASTER * rate * sample_time_s + rounding + 6.0 * noise)
+    noise = float(np.median(np.abs(np.diff(signal, 2)))) / 0.6745 / math.sqrt(6.0) if len(signal) > 2 else 0.0
+    reach, slack = rate * sample_time_s, _rounding(steps[steps > 0], float(np.ptp(signal))) + 6.0 * noise
+    alone = np.maximum(steps[:-2], steps[2:]) < steps[1:-1] / 2
+    most = np.where(alone, FOLLOWED, FASTER) * reach + slack
+    return bool((steps[1:-1] <= most).all())
+
+
+def _rounding(steps: Array, extent: float) -> float:
+    """The step of readings of which all changes (n,) are multiples; zero where they are not."""
+    step = float(steps.min())
+    multiples = steps / step
+    return min(step, COARSEST * extent) if np.allclose(multiples, np.round(multiples), atol=0.05) else 0.0
 
 
 def past_deadband(commands: Any, deadband: float) -> Any:

@@ -107,6 +107,11 @@ class IndicesContent:
             )
         return (*refused, *runs, *model, *(("file", note) for note in self.notes))
 
+    @property
+    def notes_in_words(self) -> tuple[str, ...]:
+        """The remarks as sentences, each after what it is of; those on files name them already."""
+        return tuple(remark if what == "file" else f"{what}: {remark}" for what, remark in self.remarks)
+
     def counted(self, source: str) -> dict[str, int]:
         """Number of results of "measured" or "simulated" trials with each of `VERDICT_WORDS`, the last two if any."""
         counted = Counter(verdict_word(verdict) for origin, verdict in self.verdicts if origin == source)

@@ -83,7 +83,7 @@ def indices(
     files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes_in_words)
 
 
 def _check_place(ship: Vessel, forward_m: float) -> None:
@@ -159,6 +159,5 @@ def _tables(content: IndicesContent) -> tuple[TextTable, ...]:
     tables = (
         (criteria, HEADER, verdict_rows(content)),
         ("Zig-zags", zigzags, zigzag_rows(content)),
-        ("Missing results and remarks", ("Of", "Remark"), content.remarks),
     )
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
