@@ -50,7 +50,6 @@ from rich.progress import Progress as Bar
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from adaptive import SCENARIOS
 from adaptive_monte_carlo import Segment, drawn, separate_runs, shared_out, voyages
-from measured_trials import prompt
 from design_value_page import DesignErrors, StudyTable, design_value_html
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_dictionary, build_primitive
 from expdesign.export import write_files
@@ -129,12 +128,15 @@ def cases() -> tuple[Case, ...]:
 
 def _case(name: str, truth: Vessel, nominal: Vessel, *, ranges: Vessel) -> Case:
     """Actuators of the published trials jump from command to command."""
-    truth, nominal = prompt(truth), prompt(nominal)
-        for ship in (truth, nominal)
-    )
+    truth, nominal = _prompt(truth), _prompt(nominal)
     primitives = build_dictionary(ranges, load_dictionary(SCENARIOS / "dictionaries" / "model-ship.toml"))
     best = optimum(score_primitives(ranges, primitives), "complete")
     return Case(name=name, truth=truth, nominal=nominal, primitives=primitives, optimal=best.fractions)
+
+
+def _prompt(ship: Vessel) -> Vessel:
+    actuators = tuple(replace(actuator, responses=()) for actuator in ship.model.actuators)
+    return replace(ship, model=replace(ship.model, actuators=actuators))
 
 
 def try_design(case: Case, design: str, *, runs: int, seed: int = 0) -> DesignErrors:
