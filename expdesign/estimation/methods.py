@@ -211,6 +211,7 @@ def _fitting(choices: Settings, *, current: bool) -> Fitting:
         times=choices.times,
         sensors=choices.sensors,
         begun=choices.begun,
+        quick=choices.weighting.covariance == "hc0",
     )
 
 

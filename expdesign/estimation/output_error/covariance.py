@@ -40,11 +40,12 @@ EVERY = -1
 
 
 def with_covariance(
-    problem: Problem, layout: Layout, record: Record, values: Array, starts: Array
+    problem: Problem, layout: Layout, record: Record, values: Array, starts: Array, *, quick: bool = False
 ) -> tuple[Solution, Regression]:
     """A last Gauss-Newton step as a least-squares problem, with its covariance and null space.
 
-    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
+    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh). A quick covariance
+    is that of least squares with errors that do not last.
 
     Raises:
         NoAnswer: the model grows so fast that what the starts make up for cannot be told.
@@ -65,7 +66,7 @@ def with_covariance(
     weighting = Weighting(output_weights=tuple(problem.weights / problem.weights.max()), covariance="hc0")
     whole = _with_known(regression, problem, values)
     last = solve_ls(whole, weighting)
-    P, misfit = _propagated(problem, layout, record, simulated)
+    P, misfit = (last.covariance, np.zeros(n)) if quick else _propagated(problem, layout, record, simulated)
     if (misfit > TUNING.spectrum_misfit).any():
         robust = solve_ls(whole, replace(weighting, covariance="hac"))
         own, other = np.diag(P), np.diag(robust.covariance)

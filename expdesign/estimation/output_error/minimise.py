@@ -44,7 +44,6 @@ from expdesign.estimation.output_error.problem import (
     build_problem,
     first_states,
     sample_time,
-    with_weights,
 )
 from expdesign.estimation.regression import Layout, Regression
 from expdesign.estimation.solve import Solution
@@ -159,7 +158,7 @@ def minimise_output_error(
         weights = problem.weights
         answered, stages = answered if stage.excerpt.without else stage.excerpt.length, later
     steps.end()
-    return with_covariance(problem, layout, record, values, starts)
+    return with_covariance(problem, layout, record, values, starts, quick=fitting.quick)
 
 
 def _better(problem: Problem, values: Array, found: Mapping[Place, Array], origin: Array) -> tuple[Array, Array]:
@@ -177,7 +176,8 @@ def _reweighted(problem: Problem, values: Array, starts: Array, spread: Array) -
     """The problem with weights by what its own simulations leave, at most as much as the outputs vary."""
     with np.errstate(over="ignore", invalid="ignore"):
         variance = _variance(problem, values, starts)
-    return with_weights(problem, 1.0 / np.clip(np.where(np.isfinite(variance), variance, np.inf), 1e-12 * spread, spread))
+    known = np.where(np.isfinite(variance), variance, np.inf)
+    return replace(problem, weights=1.0 / np.clip(known, 1e-12 * spread, spread))
 
 
 def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:

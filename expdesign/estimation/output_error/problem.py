@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -58,6 +58,7 @@ class Fitting:
         times: dead times and lags that are estimated too.
         sensors: whose stated noise the first velocities may differ from the measured ones by.
         begun: where the search goes on; None to begin with least squares.
+        quick: whether the covariance may be one that takes no time.
     """
 
     integration: Integration
@@ -66,7 +67,8 @@ class Fitting:
     current: bool = False
     times: tuple[ActuatorTime, ...] = ()
     sensors: Sensors = field(default_factory=Sensors)
-    begun: Begun | None = field(default=None, compare=False)
+    begun: Begun | None = None
+    quick: bool = False
 
     @property
     def unexpected(self) -> int:
@@ -305,11 +307,6 @@ def _wind(batch: Batch) -> Array:
         raise InputError(f"{batch.name}: no sample has velocity and relative wind")
     places = np.maximum.accumulate(np.where(seen, np.arange(len(batch)), int(seen.argmax())))
     return np.asarray(wind[places])
-
-
-def with_weights(problem: Problem, weights: Array) -> Problem:
-    """The problem with other weights (n,)."""
-    return replace(problem, weights=weights)
 
 
 def first_states(problem: Problem, found: Mapping[Place, Array]) -> Array:
