@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from expdesign.assessment.actuator_times import (
     considered,
@@ -32,7 +33,7 @@ from expdesign.estimation.settings import STARTS, Settings
 from expdesign.estimation.solve import BLOCKS, Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
-from expdesign.reduction import averaged, reduced
+from expdesign.reduction import averaged, reduced, samples_of_a_mean
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Vessel, VesselModel
@@ -248,7 +249,11 @@ class Work:
 
     def seen(self, record: Record) -> Record:
         """Data averaged to what the motion asks for; Euler's map is of the sample time, which then stays."""
-        return averaged(record, self.vessel.length_m) if self.options.motion == CONTINUOUS else record
+        return averaged(record, self._count)
+
+    @cached_property
+    def _count(self) -> int:
+        return samples_of_a_mean(self.record, self.vessel.length_m) if self.options.motion == CONTINUOUS else 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -21,24 +21,23 @@ from expdesign.signals import Batch, Delivered, Record
 from expdesign.values import Array
 
 
-def averaged(record: Record, length_m: float) -> Record:
-    """The record with as many samples averaged to one as the motion of a ship of this length allows; else itself.
+def averaged(record: Record, count: int) -> Record:
+    """The record with so many samples averaged to one; the record itself for 1.
 
-    Batches of fewer than `Tuning.shortest_batch` means are left out.
+    Batches of fewer than `Tuning.shortest_batch` means are left out, unless all are so short.
 
     Args:
         record: reduced, with inputs as delivered.
-        length_m: of the ship [m].
+        count: of `samples_of_a_mean`.
     """
-    if len({batch.sample_time_s for batch in record.batches}) != 1:
-        return record
-    count = samples_of_a_mean(record, length_m)
     long = [batch for batch in record.batches if len(batch) >= count * TUNING.shortest_batch]
     return record if count < 2 or not long else replace(record, batches=tuple(_averaged(b, count) for b in long))
 
 
 def samples_of_a_mean(record: Record, length_m: float) -> int:
-    """Number of samples that `averaged` takes together."""
+    """Number of samples to average to one, as the motion of a ship of this length [m] allows."""
+    if len({batch.sample_time_s for batch in record.batches}) != 1:
+        return 1
     sample_s = record.batches[0].sample_time_s
     slow = max(1, int(TUNING.longest_mean_s / sample_s + 1e-9))
     rows = np.concatenate([_block_means(batch.velocity, slow) for batch in record.batches])

@@ -181,12 +181,13 @@ def _reweighted(problem: Problem, values: Array, starts: Array, spread: Array) -
 
 
 def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:
-    """The problem with its prior in units of the cost, in which residuals count as white."""
-    if not problem.beyond:
-        return problem
+    """The problem with what is known beforehand, of times and of starts, in units of the cost.
+
+    Residuals count as white in it; those that last would else move starts by many standard deviations of the sensors.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         own = unit(problem, problem.states(values, starts))
-    return replace(problem, precision=problem.precision * own)
+    return replace(problem, precision=problem.precision * own, sensed=problem.sensed / own)
 
 
 @dataclass(frozen=True, kw_only=True)

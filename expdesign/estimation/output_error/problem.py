@@ -92,7 +92,7 @@ class Problem:
         compiled: the stretches, ready to be simulated.
         measured: (L, W, n), nan where missing or filled up.
         weights: (n,) one over the variance of each output.
-        sensed: (n,) variance of the sensors' noise.
+        sensed: (n,) variance of the sensors' noise, in units of the cost.
         batch: (W,) number of the run.
         first: (W,) sample of the run at which each stretch begins.
         constant: whether constants are estimated.
