@@ -82,7 +82,7 @@ def decomposed(model: VesselModel, run: RunCheck, found: Estimate, *, wind: bool
         integration: how it is simulated.
     """
     places = [OUTPUTS.index(name) for name in model.outputs]
-    measured = _whole(run.batch.velocity[:, places])
+    measured = whole(run.batch.velocity[:, places])
     stretches = _stretches(model, run.batch, wind, integration, found)
     values = np.concatenate([found.values, np.zeros(len(places))])[None]
     n, unknown = len(places), np.full(len(places), np.nan)
@@ -117,7 +117,7 @@ def _stretches(model: VesselModel, batch: Batch, wind: bool, integration: Integr
     driven = model_for(model, Record(batches=(batch,)))
     drive = drive_of(driven, batch, substeps=integration.substeps)
     if wind and batch.wind is not None:
-        drive = np.concatenate([drive, _whole(batch.velocity[:, :2] - batch.wind)], axis=1)
+        drive = np.concatenate([drive, whole(batch.velocity[:, :2] - batch.wind)], axis=1)
     return Stretches(
         model=driven,
         sought=tuple(driven.names.index(name) for name in found.names),
@@ -175,7 +175,7 @@ def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: 
         return np.asarray(np.sqrt(np.mean((measured[rows] - states) ** 2, axis=(0, 1))))
 
 
-def _whole(values: Array) -> Array:
+def whole(values: Array) -> Array:
     """Gaps filled linearly; zero in columns without data."""
     places, filled = np.arange(len(values)), np.zeros_like(values)
     for index, column in enumerate(values.T):

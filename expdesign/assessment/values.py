@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from expdesign.assessment.held_out import HeldOut
 from expdesign.assessment.limits import Limits
 from expdesign.assessment.residuals import OneStep
 from expdesign.assessment.runs import RunCheck
+from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import MeasuredWind, Moments
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.methods import Method
@@ -40,6 +42,7 @@ class Assessed:
 
     Attributes:
         method: how it was made.
+        horizon_s: of output error [s], None for whole runs.
         estimate: parameters with their uncertainty.
         start: parameters of the first instruments, "nominal" or "ls"; "" for least squares.
         model: the vessel's model with the estimate.
@@ -51,6 +54,7 @@ class Assessed:
     """
 
     method: Method
+    horizon_s: float | None
     estimate: Estimate
     start: str
     model: VesselModel
@@ -79,7 +83,9 @@ class Assessment:
         record: estimation data.
         tests: test runs, not used for estimation; may be empty.
         methods: one entry for each method that gave an estimate, in the order of the options.
-        left_out: one sentence for each default method that gave no estimate.
+        failures: methods, or horizons of output error, that gave no estimate, and why.
+        notes: on methods that were not tried.
+        compared: errors of predictions that decide which estimate is chosen; empty where nothing was to be decided.
         chosen: index of the method whose estimate goes into the vessel file.
         mean: how the mean was subtracted from instruments.
         fixed: parameters held at the vessel file's values.
@@ -91,13 +97,20 @@ class Assessment:
     record: Record
     tests: Record
     methods: tuple[Assessed, ...]
-    left_out: tuple[str, ...]
+    failures: tuple[tuple[str, InputError | NoAnswer], ...]
+    notes: tuple[str, ...]
+    compared: tuple[HeldOut, ...]
     chosen: int
     mean: str
     fixed: tuple[str, ...]
     motion: str
     prior: str
     limits: tuple[Limits, ...]
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """One sentence for each method that gave no estimate, or was not tried."""
+        return (*(f"Method {label} gave no estimate: {error}." for label, error in self.failures), *self.notes)
 
     @property
     def best(self) -> Assessed:

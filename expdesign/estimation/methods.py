@@ -209,6 +209,9 @@ def _fitting(choices: Settings, *, current: bool) -> Fitting:
         constant=choices.constant,
         current=current,
         times=choices.times,
+        sensors=choices.sensors,
+        begun=choices.begun,
+        quick=choices.weighting.covariance == "hc0",
     )
 
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from expdesign.errors import UnknownName
 from expdesign.estimation.equation_wise import ALL, SAMPLES
 from expdesign.estimation.excitation import WorstCase
-from expdesign.estimation.output_error import ActuatorTime
+from expdesign.estimation.output_error import ActuatorTime, Begun
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.estimation.tuning import TUNING
+from expdesign.vessel import Sensors
 
 STARTS = ("nominal", "ls")
 """Models that first instruments may come from: the one in use, or that of least squares."""
@@ -36,6 +37,8 @@ class Settings:
         samples: "all", or "equation-wise", see `equation_wise`; output error uses all.
         worst: what signals inside a modulus must exceed in equation-wise samples.
         times: dead times and lags that output error estimates beside the parameters.
+        sensors: whose noise leaves the first velocities of output error uncertain.
+        begun: where output error goes on; None to begin with least squares.
     """
 
     fixed: tuple[str, ...] = ()
@@ -52,6 +55,8 @@ class Settings:
     samples: str = ALL
     worst: WorstCase = field(default_factory=WorstCase)
     times: tuple[ActuatorTime, ...] = ()
+    sensors: Sensors = field(default_factory=Sensors)
+    begun: Begun | None = None
 
     def __post_init__(self) -> None:
         if self.steered not in STEERED:

@@ -32,6 +32,7 @@ class Tuning:
         most_left_out: share of these, at most.
         most_steps: of Gauss and Newton at one horizon.
         most_damping: of such a step, relative to the diagonal; with more, nothing is left to find.
+        most_first_weight: weight of the first sample of a stretch, to that of another, at most.
         remembered_steps: that the next one is mixed with.
         rough_samples: compared at earlier horizons than the last, spread over the data.
         rough_step_s: longest step of simulations that compare some samples only.
@@ -89,6 +90,7 @@ class Tuning:
     most_left_out: float = 0.5
     most_steps: int = 40
     most_damping: float = 1e10
+    most_first_weight: float = 1e4
     remembered_steps: int = 5
     rough_samples: int = 10_000
     rough_step_s: float = 0.5

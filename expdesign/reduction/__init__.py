@@ -8,6 +8,7 @@ Lags, dead times, dead bands and misalignments act on inputs as in simulation (`
 `simulation.sensors.observe` are undone in reverse: time, own axes and scale, place.
 """
 
+from expdesign.reduction.averaging import averaged, samples_of_a_mean
 from expdesign.reduction.reduce import (
     at_reference_point,
     reduced,
@@ -16,4 +17,12 @@ from expdesign.reduction.reduce import (
 )
 from expdesign.reduction.uncertain_times import TIMES
 
-__all__ = ["TIMES", "at_reference_point", "reduced", "with_delivered_inputs", "with_reduced_wind"]
+__all__ = [
+    "TIMES",
+    "at_reference_point",
+    "averaged",
+    "reduced",
+    "samples_of_a_mean",
+    "with_delivered_inputs",
+    "with_reduced_wind",
+]

@@ -1,6 +1,6 @@
 """Output error: the parameters whose simulations are closest to the measured velocities."""
 
 from expdesign.estimation.output_error.minimise import minimise_output_error
-from expdesign.estimation.output_error.problem import ActuatorTime, Fitting
+from expdesign.estimation.output_error.problem import ActuatorTime, Begun, Fitting
 
-__all__ = ["ActuatorTime", "Fitting", "minimise_output_error"]
+__all__ = ["ActuatorTime", "Begun", "Fitting", "minimise_output_error"]

@@ -40,11 +40,12 @@ EVERY = -1
 
 
 def with_covariance(
-    problem: Problem, layout: Layout, record: Record, values: Array, starts: Array
+    problem: Problem, layout: Layout, record: Record, values: Array, starts: Array, *, quick: bool = False
 ) -> tuple[Solution, Regression]:
     """A last Gauss-Newton step as a least-squares problem, with its covariance and null space.
 
-    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh).
+    Its regressors are the derivatives, projected on the complement of the starts (Frisch and Waugh). A quick covariance
+    is that of least squares with errors that do not last.
 
     Raises:
         NoAnswer: the model grows so fast that what the starts make up for cannot be told.
@@ -52,11 +53,12 @@ def with_covariance(
     simulated, seen = _linearised(problem, values, starts), np.isfinite(problem.measured)
     batch, step, order = _places(problem)
     slopes, names = _columns(simulated.slopes, problem, layout)
+    heavier = np.sqrt(problem.weight / problem.weights)  # of first samples
     n = len(layout.model.outputs)
     regression = Regression(
         parameters=names,
-        Phi=(slopes * seen[..., None]).reshape(-1, n, len(names))[order],
-        y=np.where(seen, simulated.errors, 0.0).reshape(-1, n)[order],
+        Phi=(slopes * heavier[..., None]).reshape(-1, n, len(names))[order],
+        y=(heavier * simulated.errors).reshape(-1, n)[order],
         batch=batch,
         step=step,
         outputs=layout.model.outputs,
@@ -64,7 +66,7 @@ def with_covariance(
     weighting = Weighting(output_weights=tuple(problem.weights / problem.weights.max()), covariance="hc0")
     whole = _with_known(regression, problem, values)
     last = solve_ls(whole, weighting)
-    P, misfit = _propagated(problem, layout, record, simulated)
+    P, misfit = (last.covariance, np.zeros(n)) if quick else _propagated(problem, layout, record, simulated)
     if (misfit > TUNING.spectrum_misfit).any():
         robust = solve_ls(whole, replace(weighting, covariance="hac"))
         own, other = np.diag(P), np.diag(robust.covariance)
@@ -72,7 +74,9 @@ def with_covariance(
         P = P * np.outer(scale, scale)
         note = misfit_note(regression.outputs, misfit)
         last = replace(last, lags=robust.lags, warnings=(*last.warnings, note))
-    last = replace(last, values=values[: len(names)] + last.values, residuals=last.residuals[: len(regression)])
+    heavier = np.where(seen, heavier, 1.0).reshape(-1, n)[order]
+    residuals = last.residuals[: len(regression)] / heavier
+    last = replace(last, values=values[: len(names)] + last.values, residuals=residuals)
     return replace(last, covariance=P), regression
 
 
@@ -120,8 +124,7 @@ def _linearised(problem: Problem, values: Array, starts: Array) -> _Linearised:
         slopes[at], by_start[at], steps[at] = part.by_values, part.by_start, part.steps
     if not problem.constant:
         slopes = slopes[..., : problem.parameters]
-    weights = np.where(np.isfinite(problem.measured), problem.weights, 0.0)
-    weighted = by_start * weights[..., None]
+    weighted = by_start * problem.weight[..., None]
     S, C = (np.einsum("lwna,lwnb->wab", weighted, rows, optimize=True) for rows in (by_start, slopes))
     try:
         near = np.linalg.solve(regular(S), C)
@@ -145,11 +148,11 @@ def _between_readings(problem: Problem, states: Array) -> Array:
 def _propagated(problem: Problem, layout: Layout, record: Record, simulated: _Linearised) -> tuple[Array, Array]:
     """(p, p) covariance by the noise of one step, and (n,) how little that explains each output's."""
     A, slopes = simulated.steps, _columns(simulated.slopes, problem, layout)[0]
-    lead = slopes * np.where(np.isfinite(problem.measured), problem.weights, 0.0)[..., None]
+    lead = slopes * problem.weight[..., None]
     sensed = np.einsum("lwna,lwnb->nab", lead, lead, optimize=True)
     known = np.zeros((2, slopes.shape[-1]))
     known[:, : problem.parameters] = problem.precision, problem.precision * problem.spread
-    G = _inverse(np.tensordot(1.0 / problem.weights, sensed, 1) + np.diag(known[0]))
+    G = _inverse(np.einsum("lwna,lwnb->ab", lead, slopes, optimize=True) + np.diag(known[0]))
     for sample in range(len(lead) - 2, -1, -1):  # summed backwards to lambda, in place
         lead[sample] += A[sample].swapaxes(1, 2) @ lead[sample + 1]
     rows, errors, owner = _steps_of(problem, record), simulated.errors, _owners(problem, layout)

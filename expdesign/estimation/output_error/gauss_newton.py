@@ -16,10 +16,11 @@ from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 
-def _cost(problem: Problem, values: Array, residuals: Array) -> float:
-    cost = float(np.einsum("lwn,n->", residuals**2, problem.weights))
-    cost += float(problem.precision @ problem.departure(values) ** 2)
-    return cost if np.isfinite(cost) else np.inf
+def cost(problem: Problem, values: Array, residuals: Array) -> float:
+    """Weighted sum of squares of residuals (L, W, n), with what was known beforehand; infinite where they are."""
+    found = float(np.einsum("lwn,lwn->", residuals**2, problem.weight))
+    found += float(problem.precision @ problem.departure(values) ** 2)
+    return found if np.isfinite(found) else np.inf
 
 
 Step = Callable[[float], None]
@@ -102,7 +103,7 @@ class Move:
 
 def _point(problem: Problem, values: Array, starts: Array) -> Point:
     states = problem.states(values, starts)
-    return Point(values, starts, states, _cost(problem, values, problem.residuals(states)))
+    return Point(values, starts, states, cost(problem, values, problem.residuals(states)))
 
 
 def _lower(problem: Problem, point: Point, move: Move, before: Sequence[tuple[Point, Move]]) -> Point | None:
@@ -148,8 +149,8 @@ def unit(problem: Problem, states: Array) -> float:
 
 
 _RUNS_AWAY = (
-    "output error: the best model found diverges within {seconds:.0f} s, as it does where a current turns the model's "
-    "terms into its own; try a shorter horizon ({shorter}), or method iv-augmented, which estimates a mean current"
+    "output error: the best model found diverges within {seconds:.0f} s; try a shorter horizon ({shorter}), fewer "
+    "terms, or methods that simulate nothing (ls) or only their instruments (iv)"
 )
 
 
@@ -165,14 +166,14 @@ class Normal:
 
 
 def _normal(problem: Problem, values: Array, states: Array) -> Normal:
-    root, residuals = np.sqrt(problem.weights), problem.residuals(states)
+    root, residuals = np.sqrt(problem.weight), problem.residuals(states)
     p, count, n = problem.parameters, len(problem.batch), states.shape[2]
     q, runs = p + n * problem.constant, int(problem.batch.max()) + 1
     S, near, g_s = np.zeros((count, n, n)), np.zeros((count, n, q)), np.zeros((count, n))
     V_b, g_b = np.zeros((runs, q, q)), np.zeros((runs, q))
     for part in problem.compiled.slope_blocks(problem.local(values), states):
         at = (part.samples, part.active)
-        weights = np.where(np.isfinite(problem.measured[at]), root, 0.0)[..., None]
+        weights = root[at][..., None]
         by_v, by_s, left = (
             stretchwise(rows * weights) for rows in (part.by_values[..., :q], part.by_start, residuals[at][..., None])
         )

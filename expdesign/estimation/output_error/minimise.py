@@ -1,7 +1,8 @@
 """Output error: the parameters whose simulations are closest to the measured velocities.
 
 Every run is cut into stretches of the length of the horizon; without a horizon a stretch is the whole run. The first
-velocity of each stretch is estimated together with the parameters. Simulated velocities contain no measurement noise:
+velocity of each stretch is estimated together with the parameters; from the measured one it differs by the sensors'
+noise, which weighs the first sample. Simulated velocities contain no measurement noise:
 if the sensors are the only disturbance, whole runs give the maximum-likelihood estimate, the reference for the accuracy
 of IV. Unmodelled forces accumulate in a simulation, and simulations of course-unstable ships diverge from the measured
 motion; a shorter horizon limits both. Optionally each run has a constant acceleration, for steady unmodelled forces.
@@ -26,7 +27,7 @@ Systems (1981), 102-125, for the stretches.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +35,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import NoAnswer
 from expdesign.estimation.output_error.covariance import with_covariance
-from expdesign.estimation.output_error.gauss_newton import minimised, runs_away, unit
+from expdesign.estimation.output_error.gauss_newton import cost, minimised, runs_away, unit
 from expdesign.estimation.output_error.problem import (
     Excerpt,
     Fitting,
@@ -120,7 +121,8 @@ def minimise_output_error(
         NotInformative: parameters without effect on the simulated outputs.
         NoAnswer: the best model found diverges within the horizon.
     """
-    weights = 1.0 / _at_least(start.residuals.var(axis=0), record, layout)
+    spread = _spread(record, layout)
+    weights = 1.0 / spread
     values = np.concatenate(
         [
             start.values[: len(layout.parameters)],
@@ -128,14 +130,17 @@ def minimise_output_error(
         ]
     )
     stages = _stages(record, fitting)
+    if fitting.begun is not None:
+        values[: len(fitting.begun.values)] = fitting.begun.values
     steps = Steps([(stage.work(record), stage.steps) for stage in stages], progress)
     found: dict[Place, Array] = {}
-    answered = 0
+    answered, origin = 0, values
     while stages:
         stage, *later = stages
         problem = build_problem(layout, record, fitting, stage.excerpt, weights)
         steps.begin()
-        starts = first_states(problem, found)
+        values, starts = _better(problem, values, found, origin)
+        problem = _reweighted(problem, values, starts, spread)
         problem = _weighed(problem, values, starts)
         try:
             values, starts = minimised(problem, values, starts, settled=stage.settled, report=steps.report)
@@ -150,19 +155,39 @@ def minimise_output_error(
             stages = [easier, replace(stage, attempts=stage.attempts + 1), *later]
             continue
         found = dict(zip(problem.places, starts, strict=True))
-        weights = 1.0 / _at_least(_variance(problem, values, starts), record, layout)
+        weights = problem.weights
         answered, stages = answered if stage.excerpt.without else stage.excerpt.length, later
     steps.end()
-    return with_covariance(problem, layout, record, values, starts)
+    return with_covariance(problem, layout, record, values, starts, quick=fitting.quick)
+
+
+def _better(problem: Problem, values: Array, found: Mapping[Place, Array], origin: Array) -> tuple[Array, Array]:
+    """What the stage before found, or what the search began with where that is closer to the data of this stage.
+
+    Over a short horizon noise tells little, and what it tells may diverge over a longer one.
+    """
+    later, first = (values, first_states(problem, found)), (origin, first_states(problem, {}))
+    with np.errstate(over="ignore", invalid="ignore"):
+        costs = [cost(problem, own, problem.residuals(problem.states(own, starts))) for own, starts in (later, first)]
+    return first if costs[1] < costs[0] else later
+
+
+def _reweighted(problem: Problem, values: Array, starts: Array, spread: Array) -> Problem:
+    """The problem with weights by what its own simulations leave, at most as much as the outputs vary."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        variance = _variance(problem, values, starts)
+    known = np.where(np.isfinite(variance), variance, np.inf)
+    return replace(problem, weights=1.0 / np.clip(known, 1e-12 * spread, spread))
 
 
 def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:
-    """The problem with its prior in units of the cost, in which residuals count as white."""
-    if not problem.beyond:
-        return problem
+    """The problem with what is known beforehand, of times and of starts, in units of the cost.
+
+    Residuals count as white in it; those that last would else move starts by many standard deviations of the sensors.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         own = unit(problem, problem.states(values, starts))
-    return replace(problem, precision=problem.precision * own)
+    return replace(problem, precision=problem.precision * own, sensed=problem.sensed / own)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,6 +220,9 @@ def _stages(record: Record, fitting: Fitting) -> list[Stage]:
     longest, total, time_s = max(map(len, record.batches)), sum(map(len, record.batches)), sample_time(record)
     full = longest if fitting.horizon_s is None else max(2, round(fitting.horizon_s / time_s) + 1)
     *growing, last = _horizons(min(full, longest))
+    if fitting.begun is not None:
+        known_s = fitting.begun.horizon_s
+        growing = [] if known_s is None else [samples for samples in growing if samples * time_s > known_s]
     rough = [Excerpt(samples=samples, most=TUNING.rough_samples) for samples in growing]
     thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / TUNING.first_horizon_samples))
     if thinner > 1:
@@ -238,11 +266,11 @@ def _horizons(full: int) -> list[int]:
     return horizons
 
 
-def _at_least(variance: Array, record: Record, layout: Layout) -> Array:
-    """Variances, not smaller than rounding errors."""
+def _spread(record: Record, layout: Layout) -> Array:
+    """(n,) variances of the outputs; 1 where one does not change."""
     states = [OUTPUTS.index(name) for name in layout.model.outputs]
     spread = np.nanvar(np.concatenate([batch.velocity[:, states] for batch in record.batches]), axis=0)
-    return np.asarray(np.maximum(variance, 1e-12 * np.where(spread > 0, spread, 1.0)))
+    return np.asarray(np.where(spread > 0, spread, 1.0))
 
 
 def _variance(problem: Problem, values: Array, starts: Array) -> Array:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, drive_of, heading_of, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
+from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
+from expdesign.vessel import Sensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +33,19 @@ class ActuatorTime:
     std_s: float
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Begun:
+    """Where a search goes on.
+
+    Attributes:
+        values: (p,) parameters.
+        horizon_s: with which they were found [s]; shorter ones are not searched again. None for whole runs.
+    """
+
+    values: Array
+    horizon_s: float | None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fitting:
     """How simulations are compared with the data.
@@ -40,6 +56,9 @@ class Fitting:
         constant: whether each run has a constant acceleration of its own.
         current: whether a steady current is estimated too, one for all runs.
         times: dead times and lags that are estimated too.
+        sensors: whose stated noise the first velocities may differ from the measured ones by.
+        begun: where the search goes on; None to begin with least squares.
+        quick: whether the covariance may be one that takes no time.
     """
 
     integration: Integration
@@ -47,6 +66,9 @@ class Fitting:
     constant: bool = False
     current: bool = False
     times: tuple[ActuatorTime, ...] = ()
+    sensors: Sensors = field(default_factory=Sensors)
+    begun: Begun | None = None
+    quick: bool = False
 
     @property
     def unexpected(self) -> int:
@@ -70,6 +92,7 @@ class Problem:
         compiled: the stretches, ready to be simulated.
         measured: (L, W, n), nan where missing or filled up.
         weights: (n,) one over the variance of each output.
+        sensed: (n,) variance of the sensors' noise, in units of the cost.
         batch: (W,) number of the run.
         first: (W,) sample of the run at which each stretch begins.
         constant: whether constants are estimated.
@@ -81,6 +104,7 @@ class Problem:
     compiled: Compiled
     measured: Array
     weights: Array
+    sensed: Array
     batch: Integers
     first: Integers
     constant: bool
@@ -97,6 +121,16 @@ class Problem:
     def beyond(self) -> int:
         """Number of times among these, the last ones."""
         return len(self.compiled.stretches.times)
+
+    @cached_property
+    def weight(self) -> Array:
+        """(L, W, n) weight of each measurement, zero where there is none.
+
+        First samples weigh by the sensors' noise: a simulation that may begin anywhere makes up for a wrong model so.
+        """
+        rows = np.broadcast_to(self.weights, self.measured.shape).copy()
+        rows[0] = np.clip(1.0 / np.maximum(self.sensed, 1e-300), self.weights, TUNING.most_first_weight * self.weights)
+        return np.where(np.isfinite(self.measured), rows, 0.0)
 
     def departure(self, values: Array) -> Array:
         """(p,) values less those known beforehand."""
@@ -193,6 +227,7 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
         ),
         measured=stacked(read, fill=False),
         weights=weights,
+        sensed=sensor_variance(record, fitting.sensors)[list(states)],
         batch=np.array([number for number, _ in cuts]),
         first=np.array([first for _, first in cuts]),
         constant=fitting.constant,
@@ -200,6 +235,22 @@ def build_problem(layout: Layout, record: Record, fitting: Fitting, excerpt: Exc
         precision=np.array([*unknown, *(time.std_s**-2 for time in fitting.times)]),
         spread=np.array([*unknown, *(time.std_s for time in fitting.times)]),
     )
+
+
+def sensor_variance(record: Record, sensors: Sensors) -> Array:
+    """(3,) variance of the sensors' noise on u, v, r: as stated, or that of third differences where this is larger.
+
+    Third differences of white noise have 20 times its variance, and hardly anything of a slow motion. Infinite where
+    velocities are smoothed, whose noise differences do not show.
+    """
+    if any(batch.smoothed for batch in record.batches):
+        return np.full(len(OUTPUTS), np.inf)
+    differences = np.concatenate([np.diff(_read(batch), 3, axis=0) for batch in record.batches])
+    seen = np.isfinite(differences)
+    found = np.where(seen, differences, 0.0) ** 2 / 20.0
+    variance = found.sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    stated = np.array([sensors.velocity_mps, sensors.velocity_mps, sensors.yaw_rate_radps]) ** 2
+    return np.where(seen.any(axis=0), np.maximum(variance, stated), np.inf)
 
 
 def _means(rows: Array, every: int) -> Array:

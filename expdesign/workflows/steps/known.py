@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.assessment import Assessed, EstimateOptions, assess
+from expdesign.assessment import INSTRUMENTS, Assessed, EstimateOptions, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
 from expdesign.estimation.regression import in_depth
@@ -47,7 +47,11 @@ def updated(
     held: tuple[str, ...] = ()
     while len(held) + len(fixed) < len(vessel.model.names):
         try:
-            found = assess(vessel, record, EstimateOptions(fixed=(*fixed, *held)), progress=progress)
+            options = EstimateOptions(fixed=(*fixed, *held), choice=INSTRUMENTS)
+            found = assess(vessel, record, options, progress=progress)
+            for _, error in found.failures:
+                if isinstance(error, NotInformative):
+                    raise error
         except NotInformative as error:
             more = tuple(name for name in error.parameters if name not in (*fixed, *held))
             if not more:

@@ -1,0 +1,251 @@
+"""Which estimate predicts best: errors of predictions from measured states, on runs that an estimate has not seen.
+
+Runs are left out in turn, or each half of a single one, and every method estimates from the rest. Its model then
+predicts what was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states would hide a
+useless model, and one simulation of a whole run tells more of the ship's stability than of the model. An error is over
+the standard deviation of the measured output, so 1 is no better than a constant; runs and outputs are joined by
+geometric means, in which no single one decides. Errors that differ by less than `Tuning.same_error` of themselves count
+as equal. Of such methods the one goes first that noise in the measured velocities does not bias: instrumental
+variables, then output error, then least squares.
+
+Source: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147, for leaving out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.assessment.limits import whole
+from expdesign.assessment.tuning import TUNING
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError, NoAnswer
+from expdesign.estimation.methods import Method
+from expdesign.estimation.regression import Integers, drive_of, model_for, parts_of
+from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
+from expdesign.signals import Batch, Record
+from expdesign.values import Array, seal
+from expdesign.vessel import VesselModel
+
+UNBIASED = ("iv", "oe", "ls")
+"""Solvers, those first that noise biases least."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeldOut:
+    """Errors of one method's predictions.
+
+    Attributes:
+        method: the method.
+        horizon_s: of output error [s], None for whole runs.
+        outputs: names.
+        shares: (n,) errors over standard deviations, geometric means over runs; nan where one never changes.
+        unseen: whether each run was predicted without it.
+    """
+
+    method: Method
+    horizon_s: float | None
+    outputs: tuple[str, ...]
+    shares: Array
+    unseen: bool
+
+    def __post_init__(self) -> None:
+        seal(self, shares="n")
+
+    @property
+    def label(self) -> str:
+        """Name of the method, with the horizon of output error."""
+        return self.label_of(self.method, self.horizon_s)
+
+    @staticmethod
+    def label_of(method: Method, horizon_s: float | None) -> str:
+        """Of a method with a horizon."""
+        if method.solver != "oe":
+            return method.name
+        return f"{method.name} over {'whole runs' if horizon_s is None else f'{horizon_s:g} s'}"
+
+    @property
+    def share(self) -> float:
+        """Geometric mean over the outputs."""
+        return float(np.exp(np.nanmean(np.log(self.shares)))) if np.isfinite(self.shares).any() else float("inf")
+
+
+def ranked(found: Sequence[HeldOut]) -> list[int]:
+    """Indices, the best first; of errors that count as equal, the least biased first."""
+    least = min((item.share for item in found), default=0.0)
+
+    def place(index: int) -> tuple[bool, float]:
+        item = found[index]
+        equal = item.share <= (1.0 + TUNING.same_error) * least
+        return not equal, UNBIASED.index(item.method.solver) if equal else item.share
+
+    return sorted(range(len(found)), key=place)
+
+
+def folds(record: Record) -> Iterator[tuple[Record, Record]]:
+    """(estimate from, predict): every run left out once, several at a time where there are many; halves of one run."""
+    batches = record.batches
+    if len(batches) == 1:
+        middle = len(batches[0]) // 2
+        batches = (batches[0].cut(slice(0, middle)), batches[0].cut(slice(middle, len(batches[0]))))
+    count = min(len(batches), TUNING.most_folds)
+    for number in range(count):
+        rest, apart = (
+            tuple(batch for place, batch in enumerate(batches) if (place % count == number) is left_out)
+            for left_out in (False, True)
+        )
+        yield replace(record, batches=rest), replace(record, batches=apart)
+
+
+Refit = Callable[[Record], VesselModel]
+"""The model by the same method from other data; raises `NoAnswer` or `InputError` where there is none."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A method with an estimate.
+
+    Attributes:
+        method, horizon_s: as of `HeldOut`.
+        model: with the estimate.
+        wind: whether measured wind acts.
+        again: the same from other data.
+    """
+
+    method: Method
+    horizon_s: float | None
+    model: VesselModel
+    wind: bool
+    again: Refit
+
+
+def held_out(
+    record: Record, candidates: Sequence[Candidate], *, seen_as: Callable[[Record], Record], integration: Integration
+) -> tuple[HeldOut, ...]:
+    """Errors of the predictions of every candidate.
+
+    Runs that no candidate can do without are left out of the comparison; where it could do without none, the errors are
+    those on the data that the estimates are from.
+
+    Args:
+        record: the data.
+        candidates: with estimates from them.
+        seen_as: what of a record is predicted.
+        integration: how models are simulated.
+    """
+    apart: list[Batch] = []
+    models: list[list[VesselModel | None]] = []
+    for rest, left_out in folds(record):
+        row = [_model(candidate, rest) for candidate in candidates]
+        if any(model is not None for model in row):
+            own = seen_as(left_out).batches
+            apart += own
+            models += [row] * len(own)
+    unseen = bool(apart)
+    if not unseen:
+        apart = list(seen_as(record).batches)
+        models = [[candidate.model for candidate in candidates]] * len(apart)
+    ahead = {
+        wind: Ahead(candidates[0].model, apart, wind=wind, integration=integration)
+        for wind in {candidate.wind for candidate in candidates}
+    }
+    return tuple(
+        HeldOut(
+            method=candidate.method,
+            horizon_s=candidate.horizon_s,
+            outputs=candidate.model.outputs,
+            shares=typical(ahead[candidate.wind].shares([row[number] for row in models])),
+            unseen=unseen,
+        )
+        for number, candidate in enumerate(candidates)
+    )
+
+
+def _model(candidate: Candidate, rest: Record) -> VesselModel | None:
+    try:
+        return candidate.again(rest)
+    except (NoAnswer, InputError):
+        return None
+
+
+class Ahead:
+    """Windows of `Tuning.ahead_s` of some runs, ready to be predicted by models of one structure.
+
+    Args:
+        model: the structure.
+        batches: the runs, as they are to be predicted.
+        wind: whether measured wind acts.
+        integration: how models are simulated.
+    """
+
+    def __init__(self, model: VesselModel, batches: Sequence[Batch], *, wind: bool, integration: Integration) -> None:
+        """Cut the windows and compile them."""
+        driven = model_for(model, Record(batches=tuple(batches)))
+        self._places = tuple(OUTPUTS.index(name) for name in driven.outputs)
+        windy = wind and all(batch.wind is not None for batch in batches)
+        measured, drives, owners = [], [], []
+        for number, batch in enumerate(batches):
+            states, drive = (
+                whole(batch.velocity[:, self._places]),
+                drive_of(driven, batch, substeps=integration.substeps),
+            )
+            if windy and batch.wind is not None:
+                drive = np.concatenate([drive, whole(batch.velocity[:, :2] - batch.wind)], axis=1)
+            length = min(len(batch), round(TUNING.ahead_s / batch.sample_time_s) + 1)
+            for first in range(0, len(batch) - length + 1, max(1, length - 1)):
+                measured.append(states[first : first + length])
+                drives.append(drive[first : first + length])
+                owners.append(number)
+        counts = np.array([len(rows) for rows in measured])
+        self._measured, drive = _stacked(measured, counts.max(), np.nan), _stacked(drives, counts.max(), None)
+        self.owners: Integers = np.array(owners)
+        self._spread = np.stack([whole(batch.velocity[:, self._places]).std(axis=0) for batch in batches])
+        self._compiled: Compiled = compiled(
+            Stretches(
+                model=driven,
+                sought=tuple(range(len(driven.names))),
+                states=self._places,
+                drive=drive,
+                windy=windy,
+                sample_time_s=batches[0].sample_time_s,
+                integrator=integration.integrator,
+                substeps=integration.substeps,
+                parts=parts_of(batches[0], substeps=integration.substeps),
+                counts=counts,
+            )
+        )
+
+    def shares(self, models: Sequence[VesselModel | None]) -> Array:
+        """(runs, n) errors over standard deviations, each run by a model of its own; at most `Tuning.largest_error`."""
+        n, q = len(self._places), self._compiled.stretches.values
+        values = np.zeros((len(models), q + n))
+        for row, model in zip(values, models, strict=True):
+            row[:q] = np.nan if model is None else model.parameters
+        with np.errstate(over="ignore", invalid="ignore"):
+            states = self._compiled.states(values[self.owners], self._measured[0])
+            squares = (states - self._measured) ** 2
+        seen = np.isfinite(self._measured)
+        total, number = np.zeros(self._spread.shape), np.zeros(self._spread.shape)
+        np.add.at(total, self.owners, np.where(seen, squares, 0.0).sum(axis=0))
+        np.add.at(number, self.owners, seen.sum(axis=0))
+        errors = np.sqrt(total / number) / np.where(self._spread > 0, self._spread, np.nan)
+        bounded = np.clip(errors, TUNING.smallest_error, TUNING.largest_error)
+        return np.where(np.isfinite(bounded) | (self._spread == 0), bounded, TUNING.largest_error)
+
+
+def _stacked(rows: Sequence[Array], length: int, fill: float | None) -> Array:
+    """(L, W, c); shorter ones are filled, with their last row where nothing else is given."""
+    parts = []
+    for own in rows:
+        tail = own[-1:] if fill is None else np.full_like(own[-1:], fill)
+        parts.append(np.concatenate([own, np.repeat(tail, length - len(own), axis=0)]))
+    return np.stack(parts, axis=1)
+
+
+def typical(shares: Array) -> Array:
+    """(n,) geometric means over runs (runs, n), of those in which an output changes."""
+    seen = np.isfinite(shares)
+    logs = np.log(np.where(seen, shares, 1.0)).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
+    return np.asarray(np.where(seen.any(axis=0), np.exp(logs), np.nan))
