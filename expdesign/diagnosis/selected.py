@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.accuracy import Accuracy, accuracy, white_noise_std
-from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.accuracy import Accuracy, accuracy
+from expdesign.diagnosis.data import Windows, white_noise_std
 from expdesign.diagnosis.fit import CrossValidation, HeldOut, within_stated_std
 from expdesign.diagnosis.judgement import (
     LITTLE_FIT,
@@ -19,7 +19,7 @@ from expdesign.diagnosis.judgement import (
     without_harm,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states
+from expdesign.diagnosis.motion import fitted_start
 from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
 from expdesign.diagnosis.remainder import Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import Selection, Step, eliminate_backward, select_forward
@@ -74,7 +74,7 @@ def select_causes(
     """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
     rng, (windows, _) = np.random.default_rng(seed), data
     validation = CrossValidation(*data)
-    found = select_forward(begun, windows, initial_states(windows), rng, reported, validation)
+    found = select_forward(begun, windows, fitted_start(begun, windows), rng, reported, validation)
     as_stated = validation.without(None, ship)
 
     def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:

@@ -8,6 +8,7 @@ from expdesign.diagnosis.data.noise import (
     linear_basis,
     random_current_covariance,
     white_noise,
+    white_noise_std,
     whitened,
 )
 from expdesign.diagnosis.data.sampled_batch import averaging_half_width
@@ -26,5 +27,6 @@ __all__ = [
     "missing_wind_share",
     "random_current_covariance",
     "white_noise",
+    "white_noise_std",
     "whitened",
 ]

@@ -10,6 +10,9 @@ import scipy
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
 
+PER_SECOND_DIFFERENCE = np.sqrt(6.0)
+"""Standard deviation of second differences of white noise of unit variance."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Noise:
@@ -137,3 +140,11 @@ def channel_std(values: Array) -> Array:
     count = np.maximum(seen.sum(axis=(0, 1)), 1)
     mean = np.where(seen, values, 0.0).sum(axis=(0, 1)) / count
     return np.asarray(np.sqrt(np.where(seen, (values - mean) ** 2, 0.0).sum(axis=(0, 1)) / count))
+
+
+def white_noise_std(measured: Array) -> Array:
+    """(n,) standard deviation of white noise in (w, s, n), from second differences, which include some motion."""
+    second = np.diff(measured, 2, axis=1)
+    seen = np.isfinite(second)
+    mean = np.where(seen, second, 0.0) ** 2
+    return np.asarray(np.sqrt(mean.sum(axis=(0, 1)) / np.maximum(seen.sum(axis=(0, 1)), 1)) / PER_SECOND_DIFFERENCE)
