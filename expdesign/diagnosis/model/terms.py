@@ -101,7 +101,7 @@ def library_terms(model: VesselModel, library: Mapping[str, Term], effects: Effe
             parts.append(
                 ScaledTerm(
                     equation=term.equation,
-                    expression=with_input_products(expression, model.inputs),
+                    expression=with_input_products(expression, driving_signals(model)),
                     factor=value / model.time_scale_s,
                     reads_air=bool(AIR_SIGNALS & set(expression.signals)),
                     reads_turn="tau_psi" in expression.signals,
@@ -144,7 +144,7 @@ class TermKind:
 
 @lru_cache(maxsize=64)
 def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
-    inputs = model.inputs
+    inputs = driving_signals(model)
     return tuple(
         TermKind(
             name=term.name,
@@ -221,6 +221,11 @@ MEAN = "mean_"
 """Before the name of what inputs alone make, the hexadecimal digits of its expression."""
 
 
+def driving_signals(model: VesselModel) -> tuple[str, ...]:
+    """Inputs and forces, but for the yaw moment, which may lean on the force ahead (`ahead_force`)."""
+    return tuple(name for name in dict.fromkeys((*model.inputs, *FORCE_SIGNALS)) if name != "tau_psi")
+
+
 def with_input_products(expression: Expression, inputs: tuple[str, ...]) -> Expression:
     """The same with every product of inputs as one signal, whose mean over an integrator step is the mean to take.
 
@@ -249,7 +254,7 @@ def _with_input_products(text: str, signals: tuple[str, ...], inputs: tuple[str,
 @lru_cache(maxsize=64)
 def input_products(model: VesselModel, library: tuple[Term, ...]) -> Mapping[str, Expression]:
     """Signal -> what inputs alone make in the model's terms, in those of the library and in the force ahead."""
-    inputs = model.inputs
+    inputs = driving_signals(model)
     known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *inputs)))
     texts = [*(term.expression for term in (*model.terms, *library)), ahead_force_text(model)]
     read = [name for text in texts for name in with_input_products(_parsed(text, known), inputs).signals]
@@ -260,7 +265,7 @@ def input_products(model: VesselModel, library: tuple[Term, ...]) -> Mapping[str
 def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
     """tau_x, of rudder ships n |n| of their propellers; zero without either."""
     expression = _parsed(ahead_force_text(model), (*FORCE_SIGNALS, *model.inputs))
-    return np.asarray(evaluation([with_input_products(expression, model.inputs)]).values(signals)[0])
+    return np.asarray(evaluation([with_input_products(expression, driving_signals(model))]).values(signals)[0])
 
 
 def ahead_force_text(model: VesselModel) -> str:

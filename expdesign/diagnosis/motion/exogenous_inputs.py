@@ -121,8 +121,8 @@ def _acting(ship: ExtendedModel, rows: Array, finer: int, rows_per_step: int) ->
     """
     table = dict(zip(ship.model.inputs, np.moveaxis(rows, 1, 0), strict=True))
     forces = generalised_force(ship.model.actuators, table, NUMPY)
-    products = evaluation([*ship.input_products.values()]).values(table)
-    table |= dict(zip((*FORCE_SIGNALS, *ship.input_products), (*forces, *products), strict=True))
+    table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
+    table |= dict(zip(ship.input_products, evaluation([*ship.input_products.values()]).values(table), strict=True))
     known = np.empty((len(rows), len(table), rows.shape[2]))
     for column, values in enumerate(table.values()):
         known[:, column] = values
