@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.accuracy import Accuracy, accuracy
-from expdesign.diagnosis.data import Windows, white_noise_std
+from expdesign.diagnosis.accuracy import Accuracy, accuracy, white_noise_std
+from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import CrossValidation, HeldOut, within_stated_std
 from expdesign.diagnosis.judgement import (
     LITTLE_FIT,

@@ -1,6 +1,6 @@
 """Accuracy of the simulation, one-step residuals, and excitation by the inputs."""
 
-from expdesign.diagnosis.accuracy.excitation import check_excitation, constant_inputs
+from expdesign.diagnosis.accuracy.excitation import check_excitation, constant_inputs, white_noise_std
 from expdesign.diagnosis.accuracy.residuals import Dependence, Residuals, dependence, mean_residual, one_step_residuals
 from expdesign.diagnosis.accuracy.simulated_fit import WHOLE_S, Accuracy, accuracy, pooled_fit, squared_sums
 
@@ -17,4 +17,5 @@ __all__ = [
     "one_step_residuals",
     "pooled_fit",
     "squared_sums",
+    "white_noise_std",
 ]

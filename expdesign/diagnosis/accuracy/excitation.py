@@ -8,10 +8,14 @@ import numpy as np
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy.tuning import TUNING
-from expdesign.diagnosis.data import Windows, white_noise_std
+from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.errors import NotInformative
+from expdesign.values import Array
+
+PER_SECOND_DIFFERENCE = np.sqrt(6.0)
+"""Standard deviation of second differences of white noise of unit variance."""
 
 
 def check_excitation(ship: ExtendedModel, windows: Windows) -> None:
@@ -71,3 +75,11 @@ def _check_answer(ship: ExtendedModel, windows: Windows) -> None:
             f"it is less than half of the noise in every output; expected runs with larger changes",
             parameters=ship.model.inputs,
         )
+
+
+def white_noise_std(measured: Array) -> Array:
+    """(n,) standard deviation of white noise in (w, s, n), from second differences, which include some motion."""
+    second = np.diff(measured, 2, axis=1)
+    seen = np.isfinite(second)
+    mean = np.where(seen, second, 0.0) ** 2
+    return np.asarray(np.sqrt(mean.sum(axis=(0, 1)) / np.maximum(seen.sum(axis=(0, 1)), 1)) / PER_SECOND_DIFFERENCE)

@@ -9,7 +9,6 @@ from expdesign.diagnosis.data.noise import (
     linear_basis,
     random_current_covariance,
     white_noise,
-    white_noise_std,
     whitened,
 )
 from expdesign.diagnosis.data.sampled_batch import averaging_half_width
@@ -29,6 +28,5 @@ __all__ = [
     "missing_wind_share",
     "random_current_covariance",
     "white_noise",
-    "white_noise_std",
     "whitened",
 ]

@@ -11,8 +11,6 @@ import scipy
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
 
-PER_SECOND_DIFFERENCE = np.sqrt(6.0)
-"""Standard deviation of second differences of white noise of unit variance."""
 NO_DIFFERENCE = 0.0, 1
 
 
@@ -108,20 +106,21 @@ def _convolved(values: Array, taps: Array) -> Array:
     )
 
 
-def fit_ar_noise(remainder: Array, *, order: int | None = None, like: Noise | None = None) -> Noise:
+def fit_ar_noise(remainder: Array, *, order: int | None = None, shares: Sequence[float] = ()) -> Noise:
     """Noise of the channels of (w, s, 4), pooled over windows, with autoregressions of one order.
+
+    Only yaw rates may be differences, of headings: along axes that turn, differences of positions add up to none.
 
     Args:
         remainder: nan where not measured.
         order: None to choose it by Schwarz's criterion; zero for white noise.
-        like: noise whose differences are kept; None to choose them by the same criterion. Only yaw rates may be
-            differences, of headings: along axes that turn, differences of positions add up to none.
+        shares: of the differences of white noise that yaw rates may have, chosen by the same criterion.
     """
     longest = remainder.shape[1] // TUNING.samples_per_order
     orders = [p for p in TUNING.ar_orders if p <= max(1, longest)] if order is None else [order]
     most = max(orders)
-    turning = (NO_DIFFERENCE, *TUNING.differences) if most else (NO_DIFFERENCE,)
-    kinds = [(one,) for one in like.differences] if like else [(NO_DIFFERENCE,), (NO_DIFFERENCE,), turning, turning]
+    turning = (NO_DIFFERENCE, *((share, lag) for share in shares for lag in TUNING.lags if most))
+    kinds = ((NO_DIFFERENCE,), (NO_DIFFERENCE,), turning, turning)
     tried = [_in_sums(remainder[..., channel], most, kind) for channel, kind in enumerate(kinds)]
     best: tuple[float, Noise] | None = None
     for p in orders:
@@ -210,11 +209,3 @@ def channel_std(values: Array) -> Array:
     count = np.maximum(seen.sum(axis=(0, 1)), 1)
     mean = np.where(seen, values, 0.0).sum(axis=(0, 1)) / count
     return np.asarray(np.sqrt(np.where(seen, (values - mean) ** 2, 0.0).sum(axis=(0, 1)) / count))
-
-
-def white_noise_std(measured: Array) -> Array:
-    """(n,) standard deviation of white noise in (w, s, n), from second differences, which include some motion."""
-    second = np.diff(measured, 2, axis=1)
-    seen = np.isfinite(second)
-    mean = np.where(seen, second, 0.0) ** 2
-    return np.asarray(np.sqrt(mean.sum(axis=(0, 1)) / np.maximum(seen.sum(axis=(0, 1)), 1)) / PER_SECOND_DIFFERENCE)

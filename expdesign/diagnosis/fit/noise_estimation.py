@@ -49,14 +49,15 @@ def estimate_noise(
         grams: of the sensitivities under the first guess, if they are known.
         ar_order: of the autoregressions, or None to choose it.
     """
-    passes, like = 1, None if ar_order is None else noise
+    passes = 1
     if noise is None:
         size = channel_std(found.error)
         noise, passes, grams = white_noise(np.where(size > 0, size, np.inf)), TUNING.first_noise_passes, None
     for number in range(passes):
         grams = gram_matrices(found, noise) if grams is None or number else grams
         noise = _estimate_random_current(grams, found, noise, prior)
-        ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order, like=like)
+        shares = TUNING.shares_beside_current if noise.current_std_mps else TUNING.shares
+        ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order, shares=shares)
         noise = replace(ar_noise, current_std_mps=noise.current_std_mps, current_time_s=noise.current_time_s)
     return noise
 

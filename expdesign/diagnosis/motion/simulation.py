@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.data import Windows, white_noise_std
+from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
 from expdesign.diagnosis.motion.integration import (
@@ -216,7 +216,7 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
         motion = _motion(ship, head, inputs, line + propagated(transition, np.zeros_like(line[:, 0]), gaps))
     seen = np.isfinite(motion.error[..., :3])
     fitted = (seen.sum(axis=1) >= TUNING.fewest_start_samples) & modelled & ~motion.diverged_windows[:, None]  # (w, 3)
-    weight = seen / np.maximum(white_noise_std(windows.measured[..., :3]), TUNING.newton_tolerance)
+    weight = seen * np.array([1.0, 1.0, ship.length_m / 2.0])  # a yaw rate counts as the speed of the bow
     by_start = start_responses(motion, transition)[..., :3] * weight * fitted.T[:, :, None, None]
     table = np.nan_to_num(np.moveaxis(by_start, 0, -1), posinf=0.0, neginf=0.0).reshape(len(first), -1, 3)
     missed = (np.nan_to_num(motion.error[..., :3]) * weight).reshape(len(first), -1, 1)
