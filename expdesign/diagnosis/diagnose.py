@@ -110,7 +110,8 @@ def diagnose(
     begun, windows = with_longer_windows(ship, record, windows)
     motion = simulate_from_measured(ship, windows)
     reported.done = SIMULATED
-    chosen = select_causes(ship, begun, (windows, record), seed, reported)
+    before = accuracy(ship, record)
+    chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
     concluding = reported.part(CONCLUDED, 0.0)
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)
@@ -127,7 +128,7 @@ def diagnose(
     extended, not_written = (
         extend(vessel, final, _standard_errors(chosen.kept), estimated) if refined else extend(vessel, final, {})
     )
-    before, after = accuracy(ship, record), accuracy(final, record)
+    after = before if final is ship else accuracy(final, record)
     unexplained = _unexplained(chosen, after, windows, seed)
     unit = unit_name(windows, in_stretches=chosen.held[0].in_stretches)
     concluding("measuring the gain on held-out runs", 1.0)

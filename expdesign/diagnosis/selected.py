@@ -19,7 +19,7 @@ from expdesign.diagnosis.judgement import (
     without_harm,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states
+from expdesign.diagnosis.motion import fitted_start
 from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
 from expdesign.diagnosis.remainder import Remainder, with_unlisted_terms
 from expdesign.diagnosis.select import Selection, Step, eliminate_backward, select_forward
@@ -69,12 +69,16 @@ class Selected:
 
 
 def select_causes(
-    ship: ExtendedModel, begun: ExtendedModel, data: tuple[Windows, Record], seed: int, reported: Estimated
+    in_use: tuple[ExtendedModel, Accuracy],
+    begun: ExtendedModel,
+    data: tuple[Windows, Record],
+    seed: int,
+    reported: Estimated,
 ) -> Selected:
     """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
-    rng, (windows, _) = np.random.default_rng(seed), data
+    rng, (windows, _), (ship, before) = np.random.default_rng(seed), data, in_use
     validation = CrossValidation(*data)
-    found = select_forward(begun, windows, initial_states(windows), rng, reported, validation)
+    found = select_forward(begun, windows, fitted_start(begun, windows), rng, reported, validation)
     as_stated = validation.without(None, ship)
 
     def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
@@ -86,7 +90,8 @@ def select_causes(
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
     searched, compared = kept, None
-    if explains_little(accuracy(kept.last.ship if kept.steps else ship, data[1]), windows) or _imitates(kept):
+    reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
+    if explains_little(reached, windows) or _imitates(kept):
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)

@@ -8,6 +8,7 @@ Source: A. Wald, Transactions of the American Mathematical Society 54 (1943), 42
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -31,7 +32,7 @@ TINY = 1e-300
 
 def level_of(multiplicity: float) -> float:
     """Largest p-value of one candidate's test that a diagnosis accepts, its many tests counted."""
-    return SELECTION_TUNING.accepted_p_value / max(multiplicity, 1.0)
+    return -math.expm1(math.log1p(-SELECTION_TUNING.accepted_p_value) / max(multiplicity, 1.0))
 
 
 def power(noncentrality: Array | float, freedom: int, level: float) -> Array:

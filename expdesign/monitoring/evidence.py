@@ -155,7 +155,9 @@ def _columns(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Se
     """(m + 3 + q, w, s, 4) responses to changes of their sizes, to initial velocities and to the force."""
     moved = responses(linear, [*known, *_forces(linear)])
     moved[: len(changes)] *= np.array([change.size for change in changes])[:, None, None, None]
-    return np.concatenate([moved[: len(changes)], start_responses(linear), moved[len(changes) :]])
+    return np.concatenate(
+        [moved[: len(changes)], start_responses(linear.motion, linear.transition), moved[len(changes) :]]
+    )
 
 
 def _compared(linear: LinearisedMotion) -> Array:

@@ -3,6 +3,7 @@
 from expdesign.diagnosis.data.measured_channels import derived_outputs, has_heading, missing_wind_share
 from expdesign.diagnosis.data.noise import (
     Noise,
+    before_windows,
     channel_std,
     fit_ar_noise,
     linear_basis,
@@ -17,6 +18,7 @@ __all__ = [
     "Noise",
     "Windows",
     "averaging_half_width",
+    "before_windows",
     "channel_std",
     "cut_windows",
     "derived_outputs",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,22 +11,27 @@ import scipy
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
 
+NO_DIFFERENCE = 0.0, 1
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Noise:
-    """Spectrum and size of the remainder.
+    """Spectrum and size of the remainder: in every channel an autoregression of e_k - share e_(k - lag), e white.
 
     Attributes:
-        filters: (4, p + 1) whitening filters, the first tap one.
+        filters: (4, p + 1) whitening filters of the autoregressions, the first tap one.
         std: (4,) of the whitened remainder; infinite for channels that are not measured.
         current_std_mps: standard deviation of the random current [m/s].
         current_time_s: its correlation time [s].
+        differences: (share, lag) of every channel; differences of a noisy position or heading have a share of nearly
+            one, and hardly any noise at low frequencies.
     """
 
     filters: Array
     std: Array
     current_std_mps: float = 0.0
     current_time_s: float = 300.0
+    differences: tuple[tuple[float, int], ...] = (NO_DIFFERENCE,) * 4
 
     @property
     def order(self) -> int:
@@ -52,10 +58,36 @@ def whitened(values: Array, noise: Noise, *, out: Array | None = None) -> Array:
     result = np.empty((4, *values.shape[:-2], values.shape[-2] - p)) if out is None else out
     for channel, (taps, std) in enumerate(zip(noise.filters, noise.std, strict=True)):
         if np.isfinite(std):
-            result[channel] = _filtered(values[..., channel], taps / std)[..., p:]
+            result[channel] = _filtered(_summed(values[..., channel], *noise.differences[channel]), taps / std)[..., p:]
         else:
             result[channel] = 0.0 * values[..., p:, channel]
     return np.moveaxis(result, 0, -1)
+
+
+def _summed(values: Array, share: float, lag: int) -> Array:
+    """(..., s) z with z_k = values_k + share z_(k - lag), from zero at the first value; nan from the first gap on."""
+    if not share:
+        return values
+    seen = np.isfinite(values)
+    recursion = [1.0, *[0.0] * (lag - 1), -share]
+    sums = np.asarray(scipy.signal.lfilter([1.0], recursion, np.where(seen, values, 0.0), axis=-1))
+    if seen.all():
+        return sums
+    begun = np.logical_or.accumulate(seen, axis=-1)
+    return np.where(seen & np.logical_and.accumulate(seen | ~begun, axis=-1), sums, np.nan)
+
+
+def before_windows(measured: Array, noise: Noise) -> Array:
+    """(n, w, s, 4) what white noise of unit variance before the first samples of windows (w, s, 4) makes of them."""
+    seen = np.isfinite(measured)
+    rows = []
+    for channel, (share, lag) in enumerate(noise.differences):
+        for place in range(lag if share and np.isfinite(noise.std[channel]) else 0):
+            at = np.argmax(seen[..., channel], axis=1) + place
+            row = np.zeros_like(measured)
+            row[np.arange(len(row)), np.minimum(at, row.shape[1] - 1), channel] = -share * noise.std[channel]
+            rows.append(row)
+    return np.array(rows).reshape(-1, *measured.shape)
 
 
 def _filtered(values: Array, taps: Array) -> Array:
@@ -74,38 +106,78 @@ def _convolved(values: Array, taps: Array) -> Array:
     )
 
 
-def fit_ar_noise(remainder: Array, *, order: int | None = None) -> Noise:
-    """Autoregressions of the channels of (w, s, 4), pooled over windows, all of one order.
+def fit_ar_noise(remainder: Array, *, order: int | None = None, shares: Sequence[float] = ()) -> Noise:
+    """Noise of the channels of (w, s, 4), pooled over windows, with autoregressions of one order.
+
+    Only yaw rates may be differences, of headings: along axes that turn, differences of positions add up to none.
 
     Args:
         remainder: nan where not measured.
         order: None to choose it by Schwarz's criterion; zero for white noise.
+        shares: of the differences of white noise that yaw rates may have, chosen by the same criterion.
     """
     longest = remainder.shape[1] // TUNING.samples_per_order
     orders = [p for p in TUNING.ar_orders if p <= max(1, longest)] if order is None else [order]
     most = max(orders)
+    turning = (NO_DIFFERENCE, *((share, lag) for share in shares for lag in TUNING.lags if most))
+    kinds = ((NO_DIFFERENCE,), (NO_DIFFERENCE,), turning, turning)
+    tried = [_in_sums(remainder[..., channel], most, kind) for channel, kind in enumerate(kinds)]
     best: tuple[float, Noise] | None = None
     for p in orders:
-        filters, std = np.zeros((4, p + 1)), np.full(4, np.inf)
+        filters, std, chosen = np.zeros((4, p + 1)), np.full(4, np.inf), [NO_DIFFERENCE] * 4
         filters[:, 0] = 1.0
         criterion = 0.0
-        for channel in range(4):
-            rows = _lagged_rows(remainder[..., channel], most)
-            if len(rows) < 10 * (p + 1):
+        for channel, tables in enumerate(tried):
+            found = [(*_autoregression(rows, p), len(rows), how) for how, rows in tables if len(rows) >= 10 * (p + 1)]
+            if not found:
                 continue
-            target, past = rows[:, 0], rows[:, 1 : p + 1]
-            floor = TUNING.white_share * float(np.mean(target**2))
-            moments = past.T @ past + floor * len(rows) * np.eye(p)
-            taps = np.linalg.lstsq(moments, past.T @ target, rcond=None)[0] if p else np.zeros(0)
+            costs = [
+                n * np.log(max(variance, 1e-24)) + (p + 2 * (share > 0)) * np.log(n)
+                for _, variance, n, (share, _) in found
+            ]
+            place = int(np.argmin(costs))
+            taps, variance, _, chosen[channel] = found[place]
             filters[channel, 1:] = -taps
-            variance = float(np.mean((target - past @ taps) ** 2)) + floor * (1.0 + float(taps @ taps))
             std[channel] = max(np.sqrt(variance), 1e-12)
-            criterion += len(rows) * np.log(max(variance, 1e-24)) + p * np.log(len(rows))
-        noise = Noise(filters=filters, std=std)
+            criterion += costs[place]
+        noise = Noise(filters=filters, std=std, differences=tuple(chosen))
         if best is None or criterion < best[0]:
             best = criterion, noise
     assert best is not None
     return best[1]
+
+
+def _in_sums(values: Array, order: int, kinds: Sequence[tuple[float, int]]) -> list[tuple[tuple[float, int], Array]]:
+    """Kinds of differences that (w, s) values may be, with the lagged rows of what they are differences of.
+
+    Values with gaps are none, as nothing is known of the sum after a gap.
+    """
+    found = [(kind, _lagged_rows(_without_beginnings(_summed(values, *kind), *kind), order)) for kind in kinds]
+    most = max(len(rows) for _, rows in found)
+    return [(kind, rows) for kind, rows in found if len(rows) == most]
+
+
+def _without_beginnings(sums: Array, share: float, lag: int) -> Array:
+    """Sums (w, s) less what noise before their first samples explains of them, by ridge regression."""
+    if not share:
+        return sums
+    seen = np.isfinite(sums)
+    since = np.arange(sums.shape[1]) - np.argmax(seen, axis=1)[:, None]
+    result = sums.copy()
+    for place in range(lag):
+        column = np.where(seen & (since % lag == place), share ** (since // lag + 1.0), 0.0)
+        size = (column * np.where(seen, sums, 0.0)).sum(axis=1) / (1.0 + (column**2).sum(axis=1))
+        result -= size[:, None] * column
+    return result
+
+
+def _autoregression(rows: Array, order: int) -> tuple[Array, float]:
+    """(p,) coefficients and the variance of the rest, with the white share of the variance in `rows`."""
+    target, past = rows[:, 0], rows[:, 1 : order + 1]
+    floor = TUNING.white_share * float(np.mean(target**2))
+    moments = past.T @ past + floor * len(rows) * np.eye(order)
+    taps = np.asarray(np.linalg.lstsq(moments, past.T @ target, rcond=None)[0]) if order else np.zeros(0)
+    return taps, float(np.mean((target - past @ taps) ** 2)) + floor * (1.0 + float(taps @ taps))
 
 
 def _lagged_rows(values: Array, order: int) -> Array:

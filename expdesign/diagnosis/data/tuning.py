@@ -17,6 +17,7 @@ class Tuning:
         same_time: relative difference up to which sample times count as equal.
         ar_orders: of the autoregressions that are tried.
         samples_per_order: of a window, for each order of its autoregression, at least.
+        lags: of differences of white noise that are tried [samples]; one for those of means whose samples meet.
         white_share: of the remainder's variance that is always taken as white. No model is right at every frequency,
             and smoothed data would otherwise give the fastest motions, of which they show nothing, the most weight.
     """
@@ -28,6 +29,7 @@ class Tuning:
     same_time: float = 1e-6
     ar_orders: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 12)
     samples_per_order: int = 6
+    lags: tuple[int, ...] = (1, 2)
     white_share: float = 0.05
 
 

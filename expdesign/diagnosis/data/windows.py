@@ -112,6 +112,12 @@ class Windows:
         others = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in ROWS}
         return Windows(**parts, **others)
 
+    def begun(self, samples: int) -> Windows:
+        """The first samples of every window."""
+        steps = samples * self.steps_per_sample
+        parts = {name: getattr(self, name)[:, :steps] for name in ROWS if getattr(self, name).ndim > 1}
+        return replace(self, **{**parts, "measured": self.measured[:, :samples]})
+
     def cut_shorter(self, samples: int) -> Windows:
         """The same data in windows of fewer samples, the last of each padded."""
         s, between = self.measured.shape[1], self.steps_per_sample

@@ -12,7 +12,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.diagnosis.data import Noise, random_current_covariance, whitened
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.data import Noise, before_windows, random_current_covariance, whitened
 from expdesign.diagnosis.fit.linear_model import Sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.values import Array
@@ -24,8 +25,9 @@ class GramMatrices:
 
     Attributes:
         XX: (w, c, c); Xe: (w, c); ee: (w,).
-        effect_starts: (w, 3, c) initial velocities that imitate each sensitivity best.
-        error_starts: (w, 3) those that imitate the error best.
+        effect_starts: (w, n, c) what windows begin with that imitates each sensitivity best.
+        error_starts: (w, n) what imitates the error best.
+        log_det: (w,) of the covariance of the noise before the windows, beside that of white noise in them.
     """
 
     XX: Array
@@ -33,6 +35,7 @@ class GramMatrices:
     ee: Array
     effect_starts: Array
     error_starts: Array
+    log_det: Array
 
     def selected(self, keep: NDArray[np.bool_]) -> GramMatrices:
         """Only some of the windows, by a mask (w,)."""
@@ -40,6 +43,10 @@ class GramMatrices:
 
     def initial_state_steps(self, effects: Array) -> Array:
         """(w, 3) change of the initial velocities that explains most of the error left by steps (w, z) of effects."""
+        return self.start_steps(effects)[:, : len(OUTPUTS)]
+
+    def start_steps(self, effects: Array) -> Array:
+        """(w, n) the same of all that windows begin with, as in `start_columns`."""
         imitated = self.effect_starts[..., : effects.shape[1]]
         return np.asarray(self.error_starts - np.einsum("wnz,wz->wn", imitated, effects))
 
@@ -47,17 +54,20 @@ class GramMatrices:
 def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
     """Whiten, leave out samples that are not measured, project the initial states out."""
     e, seen = whitened_error(found.error, noise)
-    n, c = len(found.starts), len(found.values)
+    starts = start_columns(found, noise)
+    n, c, states = len(starts), len(found.values), len(found.starts)
     rows = np.empty((4, n + c + 1, *e.shape[:2]))
-    whitened(found.starts, noise, out=rows[:, :n])
+    whitened(starts, noise, out=rows[:, :n])
     whitened(found.values, noise, out=rows[:, n:-1])
     rows[:, -1] = np.moveaxis(e, -1, 0)
     if not seen.all():
         rows *= np.moveaxis(seen, -1, 0)[:, None]
     G = _gram(rows)
-    SS = G[:, :n, :n]
-    scale = np.trace(SS, axis1=1, axis2=2)[:, None, None] / n
-    half = np.linalg.solve(SS + (1e-9 * scale + 1e-12) * np.eye(n), G[:, :n, n:])
+    own = np.diagonal(G[:, :states, :states], axis1=1, axis2=2)
+    ridge = np.ones((len(G), n))
+    ridge[:, :states] = 1e-9 * own.mean(axis=1, keepdims=True) + 1e-12
+    SS = G[:, :n, :n] + ridge[:, :, None] * np.eye(n)
+    half = np.asarray(np.linalg.solve(SS, G[:, :n, n:]), dtype=float)
     rest = G[:, n:, n:] - np.swapaxes(G[:, :n, n:], 1, 2) @ half
     return GramMatrices(
         XX=rest[:, :-1, :-1],
@@ -65,7 +75,13 @@ def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
         ee=rest[:, -1, -1],
         effect_starts=half[..., :-1],
         error_starts=half[..., -1],
+        log_det=np.linalg.slogdet(SS[:, states:, states:])[1],
     )
+
+
+def start_columns(found: Sensitivities, noise: Noise) -> Array:
+    """(n, w, s, 4) sensitivities to what windows begin with: velocities, and earlier noise where it goes on in them."""
+    return np.concatenate([found.starts, before_windows(found.error, noise)])
 
 
 def whitened_error(error: Array, noise: Noise) -> tuple[Array, NDArray[np.bool_]]:
@@ -131,7 +147,11 @@ def marginalised(grams: GramMatrices, found: Sensitivities, noise: Noise) -> Mar
         c = found.numbers
         A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
         return MarginalInformation(
-            A=A.sum(axis=0), s=s.sum(axis=0), each=s, quadratic=float(grams.ee.sum()), log_det=0.0
+            A=A.sum(axis=0),
+            s=s.sum(axis=0),
+            each=s,
+            quadratic=float(grams.ee.sum()),
+            log_det=float(grams.log_det.sum()),
         )
     return marginalised_under(grams, found, [noise])[0]
 
@@ -153,7 +173,7 @@ def marginalised_under(grams: GramMatrices, found: Sensitivities, noises: Sequen
             s=each[place].sum(axis=0),
             each=each[place],
             quadratic=float(grams.ee.sum() - np.einsum("wz,wz->", Ze, solved[place, ..., -1])),
-            log_det=float(log_det),
+            log_det=float(log_det + grams.log_det.sum()),
         )
         for place, log_det in enumerate(log_dets)
     ]

@@ -75,7 +75,7 @@ def build_sensitivities(
             extra += [Disturbance(force=None if force is None else force * row[:, None], sensor=None) for row in basis]
     return Sensitivities(
         values=responses(linear, [*disturbances, *extra]),
-        starts=start_responses(linear),
+        starts=start_responses(linear.motion, linear.transition),
         error=motion.error,
         numbers=len(disturbances),
         spacing_s=spacing,

@@ -56,7 +56,8 @@ def estimate_noise(
     for number in range(passes):
         grams = gram_matrices(found, noise) if grams is None or number else grams
         noise = _estimate_random_current(grams, found, noise, prior)
-        ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order)
+        shares = TUNING.shares_beside_current if noise.current_std_mps else TUNING.shares
+        ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order, shares=shares)
         noise = replace(ar_noise, current_std_mps=noise.current_std_mps, current_time_s=noise.current_time_s)
     return noise
 

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.gram_matrices import GramMatrices, current_prior, gram_matrices, whitened_error
+from expdesign.diagnosis.fit.gram_matrices import (
+    GramMatrices,
+    current_prior,
+    gram_matrices,
+    start_columns,
+    whitened_error,
+)
 from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.fit.linear_model import Sensitivities, build_sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
@@ -66,7 +72,7 @@ def _squares(held_out: NDArray[np.bool_], ship: ExtendedModel | None, windows: W
     grams = gram_matrices(found, noise)
     current = _current(grams, found, noise) if moving else grams.Xe
     by_current = np.einsum("wc,cwsn->wsn", current, found.values)
-    by_start = np.einsum("wn,nwsk->wsk", grams.initial_state_steps(current), found.starts)
+    by_start = np.einsum("wn,nwsk->wsk", grams.start_steps(current), start_columns(found, noise))
     whole = whitened_error(found.error - by_current - by_start, noise)
     errors, seen = (part[..., : len(OUTPUTS)] for part in whole)
     count = -(-errors.shape[1] // size)

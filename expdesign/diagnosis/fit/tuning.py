@@ -17,6 +17,8 @@ class Tuning:
         first_noise_passes: alternations between effects and noise without a first guess of the noise.
         current_stds_mps: standard deviations of the random current that are tried [m/s].
         current_times_s: correlation times of the random current that are tried [s].
+        shares: of differences of white noise, as noise of yaw rates, that are tried; shares_beside_current: beside a
+            random current, which leaves some noise at low frequencies, as it is known at its knots alone.
         numbers_at_once: in matrices of random currents that are tried together, at most.
         sensitivities_at_once: numbers in sensitivities and their inner products of windows that are taken together, so
             that memory does not grow with the data.
@@ -48,6 +50,8 @@ class Tuning:
     first_noise_passes: int = 3
     current_stds_mps: tuple[float, ...] = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
     current_times_s: tuple[float, ...] = (60.0, 150.0, 400.0, 1000.0)
+    shares: tuple[float, ...] = (0.9, 1.0)
+    shares_beside_current: tuple[float, ...] = (0.95,)
     numbers_at_once: int = 200_000
     sensitivities_at_once: int = 20_000_000
     knot_spacing_s: float = 20.0

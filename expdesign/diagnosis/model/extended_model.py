@@ -30,9 +30,10 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from expdesign.diagnosis.model.terms import Effects, ScaledTerm, library_terms, own_terms, unit_terms
+from expdesign.diagnosis.model.terms import Effects, ScaledTerm, input_products, library_terms, own_terms, unit_terms
 from expdesign.simulation.tape import Evaluation, evaluation
 from expdesign.vessel import Roll, Term, VesselModel
+from expdesign.vessel.expressions import Expression
 from expdesign.waves import G_MPS2
 
 ANGLE_STEMS = ("a", "rudder")
@@ -80,6 +81,11 @@ class ExtendedModel:
     def regressors(self) -> Evaluation:
         """Regressors of `scaled_terms`, to be evaluated together."""
         return evaluation([part.expression for part in self.scaled_terms])
+
+    @property
+    def input_products(self) -> Mapping[str, Expression]:
+        """What inputs alone make, by the signal that the terms read instead."""
+        return input_products(self.model, tuple(self.library.values()))
 
     @cached_property
     def unit_terms(self) -> Mapping[str, ScaledTerm]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
-from expdesign.vessel import Term, VesselModel, stem
-from expdesign.vessel.expressions import Expression, parse_expression
+from expdesign.vessel import Operators, Term, VesselModel, stem
+from expdesign.vessel.expressions import FUNCTIONS, Expression, parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
 
 Effects = Mapping[str, float]
@@ -19,6 +19,8 @@ AIR_SIGNALS = frozenset({"u_q", "v_q"})
 """Velocity through the air."""
 LINEAR = 2.0 + 1e-9
 """Growth of a linear term from one speed to its double."""
+MOST_PRODUCTS = 500
+"""In a regressor written as a sum; those of ship models have a few."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +29,7 @@ class ScaledTerm:
 
     Attributes:
         equation: u, v or r.
-        expression: its regressor.
+        expression: its regressor, with what inputs alone make as signals of their own (`with_input_products`).
         factor: its parameter with all factors, as an acceleration.
         after: change of the factor after the change point.
         coriolis, damping, reads_air, reads_turn: its kind.
@@ -99,7 +101,7 @@ def library_terms(model: VesselModel, library: Mapping[str, Term], effects: Effe
             parts.append(
                 ScaledTerm(
                     equation=term.equation,
-                    expression=expression,
+                    expression=with_input_products(expression, driving_signals(model)),
                     factor=value / model.time_scale_s,
                     reads_air=bool(AIR_SIGNALS & set(expression.signals)),
                     reads_turn="tau_psi" in expression.signals,
@@ -142,11 +144,12 @@ class TermKind:
 
 @lru_cache(maxsize=64)
 def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
+    inputs = driving_signals(model)
     return tuple(
         TermKind(
             name=term.name,
             equation=term.equation,
-            expression=expression,
+            expression=with_input_products(expression, inputs),
             thrust=is_thrust(expression, model),
             rudder=reads_rudder(expression),
             damping=is_damping(term, expression, model),
@@ -158,19 +161,118 @@ def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
     )
 
 
+_Factors = tuple[tuple[str, ...], tuple[str, ...]]
+"""Of a product: those that inputs alone make, and others."""
+
+
+@dataclass(frozen=True)
+class _Polynomial:
+    """A regressor as a sum of products with coefficients."""
+
+    products: Mapping[_Factors, float]
+
+    def __add__(self, other: _Polynomial | float) -> _Polynomial:
+        found = dict(self.products)
+        for key, number in self._like(other).products.items():
+            found[key] = found.get(key, 0.0) + number
+        return _Polynomial(found)
+
+    def __mul__(self, other: _Polynomial | float) -> _Polynomial:
+        found: dict[_Factors, float] = {}
+        factors = self._like(other).products
+        if len(self.products) * len(factors) > MOST_PRODUCTS:
+            raise OverflowError
+        for (own, rest), number in self.products.items():
+            for (more, others), size in factors.items():
+                key = tuple(sorted((*own, *more))), tuple(sorted((*rest, *others)))
+                found[key] = found.get(key, 0.0) + number * size
+        return _Polynomial(found)
+
+    def __neg__(self) -> _Polynomial:
+        return self * -1.0
+
+    def __sub__(self, other: _Polynomial | float) -> _Polynomial:
+        return self + -self._like(other)
+
+    def __rsub__(self, other: float) -> _Polynomial:
+        return -self + other
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __str__(self) -> str:
+        rows = [(own + rest, size) for (own, rest), size in self.products.items()]
+        return " + ".join("*".join(names if size == 1.0 and names else (repr(size), *names)) for names, size in rows)
+
+    def factor(self, text: str) -> _Polynomial:
+        """A factor that reads what this reads."""
+        alone = not any(rest for _, rest in self.products)
+        return _Polynomial({((text,), ()) if alone else ((), (text,)): 1.0})
+
+    def _like(self, other: _Polynomial | float) -> _Polynomial:
+        return other if isinstance(other, _Polynomial) else _Polynomial({((), ()): other})
+
+
+def _factor(name: str) -> Callable[[_Polynomial | float], _Polynomial | float]:
+    return lambda x: x.factor(f"{name}({x})") if isinstance(x, _Polynomial) else float(getattr(np, name)(x))
+
+
+PRODUCTS = Operators(*map(_factor, FUNCTIONS))
+MEAN = "mean_"
+"""Before the name of what inputs alone make, the hexadecimal digits of its expression."""
+
+
+def driving_signals(model: VesselModel) -> tuple[str, ...]:
+    """Inputs and forces, but for the yaw moment, which may lean on the force ahead (`ahead_force`)."""
+    return tuple(name for name in dict.fromkeys((*model.inputs, *FORCE_SIGNALS)) if name != "tau_psi")
+
+
+def with_input_products(expression: Expression, inputs: tuple[str, ...]) -> Expression:
+    """The same with every product of inputs as one signal, whose mean over an integrator step is the mean to take.
+
+    Inputs may change within a step, and the mean of n |n| is not that of the mean n. Products with the motion are left,
+    because motion hardly changes within a step, and so are expressions of more than `MOST_PRODUCTS`.
+    """
+    return _with_input_products(expression.text, expression.signals, inputs)
+
+
+@lru_cache(maxsize=512)
+def _with_input_products(text: str, signals: tuple[str, ...], inputs: tuple[str, ...]) -> Expression:
+    expression = parse_expression(text, signals=signals)
+    table = {n: _Polynomial({((n,), ()) if n in inputs else ((), (n,)): 1.0}) for n in signals}
+    try:
+        whole = expression.evaluate(table, PRODUCTS) if {*inputs} & {*signals} else 0.0
+    except OverflowError:
+        return expression
+    plain = {(), *((name,) for name in inputs)}
+    if not isinstance(whole, _Polynomial) or plain.issuperset(own for own, _ in whole.products):
+        return expression
+    names = {own: (f"{MEAN}{'*'.join(own).encode().hex()}",) for own, _ in whole.products if own not in plain}
+    parts: dict[_Factors, float] = {(names.get(own, own), rest): size for (own, rest), size in whole.products.items()}
+    return parse_expression(str(_Polynomial(parts)), signals=(*signals, *(name for (name,) in names.values())))
+
+
+@lru_cache(maxsize=64)
+def input_products(model: VesselModel, library: tuple[Term, ...]) -> Mapping[str, Expression]:
+    """Signal -> what inputs alone make in the model's terms, in those of the library and in the force ahead."""
+    inputs = driving_signals(model)
+    known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *inputs)))
+    texts = [*(term.expression for term in (*model.terms, *library)), ahead_force_text(model)]
+    read = [name for text in texts for name in with_input_products(_parsed(text, known), inputs).signals]
+    names = [name for name in dict.fromkeys(read) if name.startswith(MEAN)]
+    return {name: _parsed(bytes.fromhex(name.removeprefix(MEAN)).decode(), inputs) for name in names}
+
+
 def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
-    """tau_x, of rudder ships n |n| of their propellers."""
-    if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
-        return signals["tau_x"]
-    speeds = [signals[name] for name in model.inputs if stem(name) == "n"]
-    return sum((np.abs(n) * n for n in speeds), np.zeros(1))
+    """tau_x, of rudder ships n |n| of their propellers; zero without either."""
+    expression = _parsed(ahead_force_text(model), (*FORCE_SIGNALS, *model.inputs))
+    return np.asarray(evaluation([with_input_products(expression, driving_signals(model))]).values(signals)[0])
 
 
 def ahead_force_text(model: VesselModel) -> str:
     """The signal of `ahead_force` as an expression."""
     if any(set(e.signals) & set(FORCE_SIGNALS) for e in model.expressions):
         return "tau_x"
-    return " + ".join(f"abs({name})*{name}" for name in model.inputs if stem(name) == "n")
+    return " + ".join(f"abs({name})*{name}" for name in model.inputs if stem(name) == "n") or "0"
 
 
 def asymmetry_terms(model: VesselModel) -> list[str]:

@@ -14,6 +14,7 @@ from expdesign.diagnosis.motion.linearisation import (
 )
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.simulation import (
+    fitted_start,
     initial_states,
     simulate_from_measured,
     simulate_nearby,
@@ -28,6 +29,7 @@ __all__ = [
     "channels_apart",
     "disturbance_of",
     "exogenous_inputs",
+    "fitted_start",
     "initial_states",
     "linearise",
     "linearised_like",

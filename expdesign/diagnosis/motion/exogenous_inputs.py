@@ -11,8 +11,9 @@ from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import ExtendedModel, mean_wind
 from expdesign.diagnosis.motion.delivered_inputs import actuator_effects, delivered_inputs
 from expdesign.simulation.motion import to_body
+from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, VesselModel, generalised_force
+from expdesign.vessel import NUMPY, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 RISE = "rise "
@@ -47,9 +48,13 @@ class ExogenousInputs(dict[str, Array]):
             result[name] = self[name] + share * self[rise]
         return result
 
+    def begun(self, steps: int) -> ExogenousInputs:
+        """The first steps."""
+        return ExogenousInputs({name: values[:, :steps] for name, values in self.items()})
+
     def without_last_step(self) -> ExogenousInputs:
         """All steps but the last."""
-        return ExogenousInputs({name: values[:, :-1] for name, values in self.items()})
+        return self.begun(-1)
 
 
 def exogenous_inputs(
@@ -84,10 +89,10 @@ def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
     for length in dict.fromkeys(len(batches[place]) for place in used):
         places = [place for place in used if len(batches[place]) == length]
         rows, finer = delivered_inputs(ship, np.stack([batches[place] for place in places], axis=-1), windows)
-        acting = _acting(ship.model, rows, finer, windows.rows_per_step)
+        acting = _acting(ship, rows, finer, windows.rows_per_step)
         found |= {place: acting[..., at] for at, place in enumerate(places)}
     signals = windows.gather(found)
-    names = _force_names(ship.model)
+    names = _force_names(ship)
     names = (*names, *(f"{RISE}{name}" for name in names)) if finer > 1 else names
     return ExogenousInputs({name: signals[..., i] for i, name in enumerate(names)})
 
@@ -96,27 +101,28 @@ def _forces_like(
     ship: ExtendedModel, windows: Windows, other: ExtendedModel, known: ExogenousInputs
 ) -> ExogenousInputs:
     """Forces as of `_forces`, from the signals of another ship where its actuators deliver the same."""
-    names = _force_names(ship.model)
+    names = _force_names(ship)
     shape = known[names[0]].shape if names[0] in known else None
-    if actuator_effects(ship) != actuator_effects(other) or shape != windows.heading.shape:
+    if actuator_effects(ship) != actuator_effects(other) or shape != windows.heading.shape or {*names} - {*known}:
         return _forces(ship, windows)
     rises = [f"{RISE}{name}" for name in names]
     return ExogenousInputs({name: known[name] for name in (*names, *rises) if name in known})
 
 
-def _force_names(model: VesselModel) -> tuple[str, ...]:
-    return (*dict.fromkeys((*model.inputs, *FORCE_SIGNALS)),)
+def _force_names(ship: ExtendedModel) -> tuple[str, ...]:
+    return (*dict.fromkeys((*ship.model.inputs, *FORCE_SIGNALS)), *ship.input_products)
 
 
-def _acting(model: VesselModel, rows: Array, finer: int, rows_per_step: int) -> Array:
-    """(k, m, b) inputs and forces, as means over integrator steps, and (k, m, b) their rises where steps have parts.
+def _acting(ship: ExtendedModel, rows: Array, finer: int, rows_per_step: int) -> Array:
+    """(k, m, b) inputs, forces and products, as means over integrator steps, and their rises where steps have parts.
 
     A straight line with this mean and rise has the mean and the first moment of the signal within the step. Where
     measurements are averaged over samples, so is the signal, because the mean force drives the mean motion.
     """
-    table = dict(zip(model.inputs, np.moveaxis(rows, 1, 0), strict=True))
-    forces = generalised_force(model.actuators, table, NUMPY)
+    table = dict(zip(ship.model.inputs, np.moveaxis(rows, 1, 0), strict=True))
+    forces = generalised_force(ship.model.actuators, table, NUMPY)
     table |= dict(zip(FORCE_SIGNALS, forces, strict=True))
+    table |= dict(zip(ship.input_products, evaluation([*ship.input_products.values()]).values(table), strict=True))
     known = np.empty((len(rows), len(table), rows.shape[2]))
     for column, values in enumerate(table.values()):
         known[:, column] = values

@@ -136,7 +136,7 @@ def responses(linear: LinearisedMotion, disturbances: Sequence[Disturbance]) -> 
         result[:] = 0.0
     if forces:
         with np.errstate(over="ignore", invalid="ignore"):
-            result[list(forces)] = _shown(linear, _driven(linear, list(forces.values())))
+            result[list(forces)] = _shown(linear.motion, _driven(linear, list(forces.values())))
     for index, disturbance in enumerate(disturbances):
         if disturbance.sensor is not None:
             result[index] += disturbance.sensor
@@ -154,13 +154,13 @@ def _driven(linear: LinearisedMotion, forces: Sequence[Array]) -> Array:
     return path
 
 
-def start_responses(linear: LinearisedMotion) -> Array:
+def start_responses(motion: Motion, transition: Array) -> Array:
     """(3, w, s, 4) responses to unit initial velocities of every window; roll begins at rest."""
-    w, k, n = linear.motion.states.shape
+    w, k, n = motion.states.shape
     still = np.zeros((w, k - 1, n))
     with np.errstate(over="ignore", invalid="ignore"):
-        paths = [propagated(linear.transition, np.tile(unit, (w, 1)), still) for unit in np.eye(n)[:3]]
-        return _shown(linear, np.stack(paths, axis=-1))
+        paths = [propagated(transition, np.tile(unit, (w, 1)), still) for unit in np.eye(n)[:3]]
+        return _shown(motion, np.stack(paths, axis=-1))
 
 
 def channels_apart(count: int, shape: tuple[int, ...]) -> Array:
@@ -168,12 +168,11 @@ def channels_apart(count: int, shape: tuple[int, ...]) -> Array:
     return np.moveaxis(np.empty((4, count, *shape)), 0, -1)
 
 
-def _shown(linear: LinearisedMotion, moved: Array) -> Array:
+def _shown(motion: Motion, moved: Array) -> Array:
     """(c, w, s, 4) changes of the channels for changes of the states (w, k, n, c).
 
     Sensors are nearly linear in the states.
     """
-    motion = linear.motion
     windows, count = motion.windows, moved.shape[-1]
     result = channels_apart(count, motion.predicted.shape[:2])
     if any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):

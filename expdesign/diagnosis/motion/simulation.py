@@ -15,6 +15,7 @@ from expdesign.diagnosis.motion.integration import (
     state_jacobian,
     transition_matrices,
 )
+from expdesign.diagnosis.motion.linearisation import start_responses
 from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.sensors import sensor_outputs, ship_velocities
 from expdesign.diagnosis.motion.tuning import TUNING
@@ -32,7 +33,16 @@ def simulate_windows(
         start: (w, n) initial states.
         near: linearised motion of a similar ship; it speeds up the simulation and does not change it.
     """
-    exogenous = _exogenous_near(ship, windows, warm_start)
+    return _simulated(ship, windows, _exogenous_near(ship, windows, warm_start), start, warm_start)
+
+
+def _simulated(
+    ship: ExtendedModel,
+    windows: Windows,
+    exogenous: ExogenousInputs,
+    start: Array,
+    warm_start: LinearisedMotion | None = None,
+) -> Motion:
     with np.errstate(over="ignore", invalid="ignore"):
         states = None if warm_start is None else _newton_from(ship, windows, exogenous, start, warm_start)
         states = _newton_from_measured(ship, windows, exogenous, start) if states is None else states
@@ -156,6 +166,13 @@ def _transition(ship: ExtendedModel, windows: Windows, middle: ExogenousInputs, 
 
 def initial_states(windows: Windows, states: int = 3) -> Array:
     """(w, n) state at the beginning of every window: a straight line through its first samples, without roll."""
+    result = np.zeros((len(windows.batch), states))
+    result[:, :3] = _first_line(windows)[0]
+    return result
+
+
+def _first_line(windows: Windows) -> tuple[Array, Array]:
+    """(w, 3) value at the first sample and (w, 3) rise per sample of straight lines through the first samples."""
     rows = windows.measured[:, : TUNING.start_samples, :3]
     seen = np.isfinite(rows)
     count = np.maximum(seen.sum(axis=1), 1)  # (w, 3)
@@ -163,16 +180,46 @@ def initial_states(windows: Windows, states: int = 3) -> Array:
     middle, mean = time.sum(axis=1) / count, np.where(seen, rows, 0.0).sum(axis=1) / count
     apart = np.where(seen, time - middle[:, None], 0.0)
     slope = (apart * np.where(seen, rows, 0.0)).sum(axis=1) / np.maximum((apart**2).sum(axis=1), 1e-300)
-    result = np.zeros((len(rows), states))
-    result[:, :3] = np.where(count >= 3, mean - slope * middle, mean)
-    return result
+    slope = np.where(count >= TUNING.fewest_start_samples, slope, 0.0)
+    return np.where(count >= TUNING.fewest_start_samples, mean - slope * middle, mean), slope
 
 
 def simulate_from_measured(ship: ExtendedModel, windows: Windows, warm_start: LinearisedMotion | None = None) -> Motion:
-    """Every window from its first measured state; the linearised motion of a similar ship speeds it up."""
-    start = initial_states(windows, ship.states)
-    start[:, :3] = ship_velocities(ship, start[:, :3])
-    for axis, name in enumerate(OUTPUTS):
-        if name not in ship.model.outputs:
-            start[:, axis] = 0.0
-    return simulate_windows(ship, windows, start, warm_start=warm_start)
+    """Every window from the state that fits its first measurements; the motion of a similar ship speeds it up."""
+    exogenous = _exogenous_near(ship, windows, warm_start)
+    return _simulated(ship, windows, exogenous, _fitted_start(ship, windows, exogenous), warm_start)
+
+
+def fitted_start(ship: ExtendedModel, windows: Windows) -> Array:
+    """(w, n) initial states by least squares of the simulated first samples: no ship that accelerates moves in a line.
+
+    What is not measured, and windows that diverge, begin as their first samples are (`initial_states`).
+    """
+    return _fitted_start(ship, windows, exogenous_inputs(ship, windows))
+
+
+def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs) -> Array:
+    """One step of Newton's method from the straight line, which is near."""
+    head = windows.begun(TUNING.start_samples)
+    first, rise = _first_line(windows)
+    modelled = np.isin(OUTPUTS, ship.model.outputs)
+    line = np.zeros((len(first), head.steps, ship.states))
+    for step in range(head.steps):
+        now = ship_velocities(ship, first + rise * step / head.steps_per_sample)
+        line[:, step, :3] = np.where(modelled, now, 0.0)
+    inputs = exogenous.begun(head.steps)
+    middle = inputs.without_last_step()
+    with np.errstate(over="ignore", invalid="ignore"):
+        transition = _transition(ship, head, middle, line)
+        made = runge_kutta_step(ship, tuple(np.moveaxis(line[:, :-1], -1, 0)), middle, head.step_s)[0]
+        gaps = np.stack(made, axis=-1) - line[:, 1:]
+        motion = _motion(ship, head, inputs, line + propagated(transition, np.zeros_like(line[:, 0]), gaps))
+    seen = np.isfinite(motion.error[..., :3])
+    fitted = (seen.sum(axis=1) >= TUNING.fewest_start_samples) & modelled & ~motion.diverged_windows[:, None]  # (w, 3)
+    weight = seen * np.array([1.0, 1.0, ship.length_m / 2.0])  # a yaw rate counts as the speed of the bow
+    by_start = start_responses(motion, transition)[..., :3] * weight * fitted.T[:, :, None, None]
+    table = np.nan_to_num(np.moveaxis(by_start, 0, -1), posinf=0.0, neginf=0.0).reshape(len(first), -1, 3)
+    missed = (np.nan_to_num(motion.error[..., :3]) * weight).reshape(len(first), -1, 1)
+    start = line[:, 0].copy()
+    start[:, :3] += (np.linalg.pinv(table) @ missed)[..., 0]
+    return start

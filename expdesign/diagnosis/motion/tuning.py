@@ -24,6 +24,7 @@ class Tuning:
         newton_tolerance: correction below which it has converged.
         newton_safety: share of the tolerance below which the next correction must lie not to be made.
         start_samples: samples that measured initial states are estimated from.
+        fewest_start_samples: of them that are measured, for a state to be fitted to them.
         fewest_windows: into which data are cut.
         window_rounds: of shortening the windows of an unstable model.
         fewest_window_samples: of shortened windows.
@@ -42,6 +43,7 @@ class Tuning:
     newton_tolerance: float = 1e-8
     newton_safety: float = 0.1
     start_samples: int = 5
+    fewest_start_samples: int = 3
     fewest_windows: int = 4
     window_rounds: int = 4
     fewest_window_samples: int = 30

@@ -39,7 +39,8 @@ def _stable_time(ship: ExtendedModel, windows: Windows) -> float:
         return windows.steps * windows.step_s / 2
     size = channel_std(windows.measured[..., :3])
     scale = np.where(size > 0, size, 1.0)
-    answers = np.moveaxis(start_responses(linearise(motion))[..., :3], 0, -1) * scale / scale[:, None]
+    by_start = start_responses(motion, linearise(motion).transition)
+    answers = np.moveaxis(by_start[..., :3], 0, -1) * scale / scale[:, None]
     growth = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
     unstable = (growth > TUNING.largest_growth).any(axis=0)
     if not unstable.any():

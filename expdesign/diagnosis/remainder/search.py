@@ -22,7 +22,7 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
     window_information,
 )
-from expdesign.diagnosis.motion import initial_states, term_disturbances
+from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
 from expdesign.diagnosis.remainder.kinds import WORDS, Kind, kinds
 from expdesign.diagnosis.remainder.stability_selection import Chosen, UnitInformation, stable_selection
 from expdesign.diagnosis.remainder.term_dictionary import term_dictionary
@@ -71,7 +71,9 @@ def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
     others, unit, size, names = kinds(base.linear), _units(windows), 0.0, list[str]()
     sums: tuple[Array, Array] | None = None
     for mask, linear in in_groups(base.linear, len(base.keys) + len(keys) + len(others)):
-        steady = term_disturbances(replace(linear, motion=replace(linear.motion, ship=wider)), keys)
+        motion = linear.motion
+        motion = replace(motion, ship=wider, exogenous=exogenous_inputs(wider, motion.windows))
+        steady = term_disturbances(replace(linear, motion=motion), keys)
         names = [key.removeprefix("term:") for key in steady]
         disturbances = [
             *effect_disturbances(linear, base.keys),

@@ -11,6 +11,7 @@ import scipy
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, likeliest, log_likelihood_gain, profile_cost
+from expdesign.diagnosis.select.score_tests import of_several
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, start_nearer
 from expdesign.diagnosis.select.tuning import TUNING
 
@@ -26,7 +27,7 @@ class FittedCandidate:
         penalised_gain: the same less the price of its effects.
         keys: its own estimated effects.
         profiled: the effect that a grid or a profile likelihood found, with its standard error.
-        multiplicity: factor of its p-value for multiple tests.
+        multiplicity: number of independent tests that it is among.
     """
 
     candidate: Candidate
@@ -45,9 +46,8 @@ class FittedCandidate:
     @property
     def p_value(self) -> float:
         """Of the likelihood ratio test, adjusted for multiple tests."""
-        return min(
-            1.0, self.multiplicity * float(scipy.stats.chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys))))
-        )
+        alone = float(scipy.stats.chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys))))
+        return of_several(alone, self.multiplicity)
 
     def with_gain(self, likelihood_gain: float) -> FittedCandidate:
         """The same with another gain at the same price."""

@@ -12,6 +12,7 @@ C. R. Genovese, K. Roeder and L. Wasserman, Biometrika 93 (2006), 509-524, for s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -47,7 +48,7 @@ class ScoreTest:
         statistic: chi-squared with `candidate.size` degrees of freedom if the model is correct.
         p_value: of this candidate alone.
         step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
-        multiplicity: factor of its p-value for multiple tests.
+        multiplicity: number of independent tests that all of its round are worth, for its p-value.
     """
 
     candidate: Candidate
@@ -59,7 +60,15 @@ class ScoreTest:
     @property
     def adjusted(self) -> float:
         """The p-value adjusted for multiple tests."""
-        return min(1.0, self.p_value * self.multiplicity)
+        return of_several(self.p_value, self.multiplicity)
+
+
+def of_several(p_value: float, tests: float) -> float:
+    """The probability that the smallest p-value of so many independent tests is no larger.
+
+    Source: Z. Sidak, Journal of the American Statistical Association 62 (1967), 626-633.
+    """
+    return 1.0 if p_value >= 1.0 else -math.expm1(tests * math.log1p(-p_value))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,7 +170,7 @@ def _p_value(statistic: Any, freedom: int, *, positive: bool) -> Any:
 def _effective_tests(
     A: Array, roots: list[tuple[Array, Array]], candidates: Sequence[Candidate], rng: np.random.Generator
 ) -> list[float]:
-    """Factor of every p-value, for the candidates of its cause and for the number of causes."""
+    """How many independent tests each one is among: candidates of its cause, times causes."""
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than floating-point numbers
     values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -174,13 +183,15 @@ def _effective_tests(
         largest[key] = np.maximum(largest[key], statistic) if key in largest else statistic
     smallest: dict[str, Array] = {}
     for (cause, freedom, positive), statistic in largest.items():
-        p_values = np.where(statistic > 0.0, _p_value(statistic, freedom, positive=positive), 1.0)
+        p_values = np.where(statistic > 0.0, _p_value(statistic, freedom, positive=positive), 1.0 - TINY)
         smallest[cause] = np.minimum(smallest[cause], p_values) if cause in smallest else p_values
-    own = {cause: _inflation(p_values) for cause, p_values in smallest.items()}
-    every = _inflation(np.min([own[cause] * p_values for cause, p_values in smallest.items()], axis=0))
+    own = {cause: _independent_tests(p_values) for cause, p_values in smallest.items()}
+    adjusted = [-np.expm1(own[cause] * np.log1p(-p_values)) for cause, p_values in smallest.items()]
+    every = _independent_tests(np.min(adjusted, axis=0))
     return [own[cause] * every for cause in causes]
 
 
-def _inflation(smallest: Array) -> float:
-    """Ratio of the level to the quantile of the smallest p-value at that level; one for a single test."""
-    return float(max(1.0, TUNING.level / max(float(np.quantile(smallest, TUNING.level)), TINY)))
+def _independent_tests(smallest: Array) -> float:
+    """Number of independent tests whose smallest p-value has the same quantile at the level; one for a single test."""
+    found = max(float(np.quantile(smallest, TUNING.level)), TINY)
+    return max(1.0, math.log1p(-TUNING.level) / math.log1p(-found))

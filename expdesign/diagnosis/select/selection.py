@@ -11,7 +11,7 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, continuing, fit, fit_ahead, log_likelihood_gain
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
-from expdesign.diagnosis.select.score_tests import ScoreTest
+from expdesign.diagnosis.select.score_tests import ScoreTest, of_several
 from expdesign.diagnosis.select.tuning import TUNING
 
 SHAPE = ("roll:period", "roll:damping")
@@ -96,7 +96,7 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
         if reduced is None:
             continue
         lost, count = log_likelihood_gain(reduced, whole), len(_own_effects(step))
-        p_value = step.chosen.multiplicity * float(scipy.stats.chi2.sf(max(lost, 0.0), max(1, count)))
+        p_value = of_several(float(scipy.stats.chi2.sf(max(lost, 0.0), max(1, count))), step.chosen.multiplicity)
         if p_value > TUNING.level or lost < TUNING.price * count:
             return index
     return None
