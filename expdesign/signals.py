@@ -222,8 +222,10 @@ class Record:
         batches: with the same inputs and the same sample time.
         notes: on flaws of the files and their treatment, one sentence each.
         doubts: those of the notes that put results into question, whatever is done with the data.
+        faults: those of the doubts that stand in the data as they are used.
     """
 
     batches: tuple[Batch, ...]
     notes: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ from expdesign.diagnosis.data.measured_channels import derived_outputs
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.motion.sensors import sensor_outputs
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.result_names import public_name
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.records import load_records
 from expdesign.signals import Commands
@@ -86,3 +87,33 @@ def test_surge_leaks_into_sway_by_the_sine_of_the_bias(tmp_path):
     states[..., 0] = 2.0
     predicted = sensor_outputs(ship, states, windows)
     np.testing.assert_allclose(predicted[..., 1], 2.0 * np.sin(BIAS), rtol=1e-12)
+
+
+@pytest.mark.parametrize("pose_only", [True, False])
+def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_only, tmp_path):
+    """One name, one sign, one definition: what a page prints and what the written vessel file states."""
+    record, _ = trial(tmp_path, Sensors(), pose_only=pose_only)
+    place = "position" if pose_only else "velocity"
+    effects = {
+        "heading_bias": 0.04, "lever:forward": 2.0, "lever:starboard": -1.0, "late:psi": 0.5, "current:north": 0.2,
+        "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"gyro": -0.05, "late:r": 0.7}),
+    }  # fmt: skip
+    driven = SHIP.model.inputs[0]
+    effects |= {f"{kind}:{driven}": value for kind, value in {"offset": 0.03, "lag": 2.0, "delay": 1.0}.items()}
+    found = extended_model(SHIP, record).with_effects(effects)
+    ship, missing = extend(SHIP, found, {})
+    assert not missing
+    sensors, response = ship.sensors, ship.responses[0]
+    written = {
+        "heading_bias": sensors.heading_bias_rad if pose_only else sensors.velocity_angle_rad,
+        "lever:forward": getattr(sensors, place).forward_m, "lever:starboard": getattr(sensors, place).starboard_m,
+        "late:psi": sensors.heading.delay_s, "late:position": sensors.position.delay_s,
+        "late:r": sensors.yaw_rate.delay_s, "gyro": sensors.yaw_rate_scale,
+        "current:north": ship.environment.current_to[0], "current:east": ship.environment.current_to[1],
+        f"offset:{driven}": response.offset, f"lag:{driven}": response.lag_s,
+        f"delay:{driven}": response.delay_s,
+    }  # fmt: skip
+    for key, effect in effects.items():
+        name, factor, offset, _ = public_name(key, found)
+        assert offset + factor * effect == pytest.approx(written[key]), name
+    assert public_name("heading_bias", found)[0] == ("heading_bias_rad" if pose_only else "velocity_angle_rad")

@@ -16,7 +16,7 @@ CASES = (
     ("barge", "thrust_advance_loss", {"kappa": -0.002}, {}, "X_kappa", -0.002),
     ("barge", "thruster_asymmetry", {"asymmetry": 0.6}, {}, "thrust_offset_m", 0.6),
     ("barge", "missing_term:Y_abs_v_v", {"Y_abs_v_v": -0.06}, {}, "Y_abs_v_v", -0.06),
-    ("barge", "heading_bias", {}, {"heading_bias": 0.04}, "heading_bias_rad", 0.04),
+    ("barge", "heading_bias", {}, {"heading_bias": 0.04}, "velocity_angle_rad", -0.04),
     ("barge", "lever_arm", {}, {"lever_m": 3.0}, "forward_m", 3.0),
     ("barge", "gyro_scale", {}, {"gyro": 0.08}, "factor", 1.08),
     ("barge", "sensor_delay", {}, {"late_v": 2.0}, "v_delay_s", 2.0),

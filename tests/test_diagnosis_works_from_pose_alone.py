@@ -29,7 +29,7 @@ def test_a_compass_that_shows_too_little_is_named():
     """v_measured = v + u sin(bias) where the heading that turns the positions lacks the bias."""
     record = pose_only("barge", seed=21, faults={"heading_bias": 0.06}, batches=3, samples=200)
     found = diagnose(vessel_of("barge"), record)
-    check(found, "heading_bias", "heading_bias_rad", 0.06)
+    check(found, "heading_bias", "heading_bias_rad", -0.06)
     assert "compass shows" in found.findings[0].explanation
     assert "too little" in found.findings[0].explanation
     assert found.extended.sensors.heading_bias_rad == pytest.approx(-0.06, abs=0.02)

@@ -140,7 +140,7 @@ def test_held_out_runs_show_most_of_what_is_certain_and_never_more_than_the_test
     sized = [item for item in foreseen.values() if item.sized]
     assert all(0.0 <= item.found <= item.power for item in sized)
     assert foreseen["north/east_mps"].found == foreseen["north/east_mps"].power  # far more than any noise
-    assert foreseen["heading_bias_rad"].found == foreseen["heading_bias_rad"].power
+    assert foreseen["velocity_angle_rad"].found == foreseen["velocity_angle_rad"].power
     assert foreseen["inertia_factor_r"].found < 0.9 * foreseen["inertia_factor_r"].power
 
 
@@ -207,7 +207,7 @@ def shares_found(case, known, found, wanted: float, trials: int) -> tuple[float,
 
 
 TRIALS = 100
-EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
+EFFECTS = ("inertia_factor_r", "velocity_angle_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
 
 
 @pytest.mark.slow

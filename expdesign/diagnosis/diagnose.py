@@ -16,6 +16,7 @@ from expdesign.diagnosis.accuracy import (
 )
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
+    doubted,
     error_reductions_of,
     finding_of,
     note_beside_the_same_fit,
@@ -141,7 +142,8 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(
+        verdict=doubted(record.faults)
+        + verdict(
             ranked,
             before,
             unit,
@@ -188,7 +190,7 @@ def _unexplained(chosen: Selected, after: Accuracy, windows: Windows, seed: int)
         fitted = leading_candidates(chosen.kept.last, windows, chosen.kept.last_tests)
         held = [chosen.validation.measured_like(base, item.fit) for item in fitted]
         gains = [held_out_gain(base, one, seed) for one in held]
-        leads = [Lead(item.candidate.cause, *gain) for item, gain in zip(fitted, gains, strict=True)]
+        leads = [Lead(item.candidate.cause, *gain, item.parameters) for item, gain in zip(fitted, gains, strict=True)]
     return Unexplained(
         outputs=after.outputs,
         fit=after.fit,
@@ -210,7 +212,8 @@ def _signs(chosen: Selected, after: Accuracy, windows: Windows, seed: int) -> tu
     for step in rejected:
         pair = judged([chosen.validation.of(one) for one in (step.before, step.chosen.fit)])
         cause = step.chosen.candidate.cause
-        found.setdefault(cause, Lead(cause, *held_out_gain(pair[0], pair[1], seed)))
+        gain = held_out_gain(pair[0], pair[1], seed)
+        found.setdefault(cause, Lead(cause, *gain, step.chosen.parameters))
     return tuple(found.values())
 
 

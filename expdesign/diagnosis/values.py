@@ -83,11 +83,13 @@ class Lead:
     Attributes:
         cause: name in the catalogue.
         gain: on held-out batches, mean over outputs [points of fit]; gain_interval: 95 %, bootstrap over batches.
+        parameters: those that it changes, by most standard errors first.
     """
 
     cause: str
     gain: float
     gain_interval: tuple[float, float]
+    parameters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -39,8 +39,9 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     in_time = [_in_time(batch, vessel.sensors, smoothed=smoothed) for batch in record.batches]
     record = replace(record, batches=tuple(batch for batch, _ in in_time))
     held_notes = _shared([(batch.name, note) for batch, notes in in_time for note in notes])
-    doubts = (*held_notes, *_findings(record, vessel, smoothed=smoothed))
-    return replace(record, notes=(*doubts, *record.notes), doubts=doubts)
+    faults = tuple(_findings(record, vessel, smoothed=smoothed))
+    doubts = (*held_notes, *faults)
+    return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=faults)
 
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:

@@ -106,7 +106,8 @@ class Hidden:
             "Y_phi": e.get("roll_sway", 0.0),
             "N_phi": e.get("roll_yaw", 0.0), "time_s": e.get("change_s", 0.0),
             "gain_factor": 1 + e.get("change_gain", 0.0), "damping_factor": 1 + e.get("change_damping", 0.0),
-            "heading_bias_rad": f.get("heading_bias", 0.0), "forward_m": f.get("lever_m", 0.0), "starboard_m": 0.0,
+            "heading_bias_rad": -f.get("heading_bias", 0.0), "velocity_angle_rad": -f.get("heading_bias", 0.0),
+            "forward_m": f.get("lever_m", 0.0), "starboard_m": 0.0,
             **{f"{axis}_delay_s": f.get(f"late_{axis}", 0.0) for axis in "uvr"},
             "factor": 1 + (f["gyro"] if "gyro" in f else e.get("gain", 0.0)),
         }  # fmt: skip

@@ -37,7 +37,7 @@ from expdesign.vessel import Vessel
 
 STORY = Path(__file__).parents[2] / "scenarios" / "story.toml"
 RUNS = {"zigzag-speed-1.4": 1, "sway-zigzag-sway-0.6": 1, "telegraph": 1}
-EFFECTS = ("inertia_factor_r", "heading_bias_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s", "factor")
+EFFECTS = ("inertia_factor_r", "velocity_angle_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s", "factor")
 
 
 def drawn(vessel: Vessel, rng: np.random.Generator) -> Vessel:

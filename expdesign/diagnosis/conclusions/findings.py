@@ -67,6 +67,8 @@ def _values(step: Step, last: Fit) -> dict[str, tuple[float, float]]:
     """Effects of a step with estimate and standard error; a profiled effect comes last."""
     chosen = step.chosen
     values = {key: (last.value(key), (last if key in last.keys else chosen.fit).std(key)) for key in chosen.keys}
+    if chosen.candidate.cause == "parameters":  # the surest change first
+        values = dict(sorted(values.items(), key=lambda item: -abs(item[1][0]) / max(item[1][1], 1e-300)))
     if chosen.profiled is not None:
         key, error = chosen.profiled
         values[key] = (last.value(key), error)

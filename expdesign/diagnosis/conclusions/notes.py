@@ -108,12 +108,12 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
         unit: what gains are measured on.
     """
     named = [step.chosen.candidate for step in kept.steps]
+    rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
-        f"The data show a sign of {missing_effect(step.chosen.candidate.cause)} (p = {step.p_value:.1g}). It is not "
-        f"a finding: on {unit} held out of the fit it takes less than 1 % off any error or gains nothing significant, "
-        "or its size may be zero."
-        for step in found.steps
-        if not same_effects_as_any(step.chosen.candidate, named)
+        f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
+        f"{step.p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off any error "
+        "or gains nothing significant, or its size may be zero."
+        for step in rejected
     )
 
 

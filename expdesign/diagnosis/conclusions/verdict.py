@@ -50,18 +50,28 @@ MANOEUVRES = {
 """Standard proposals in words; those of a scenario's dictionary keep their names."""
 
 
-def missing_effect(cause: str) -> str:
-    """Missing effect of a cause, e.g. of "missing_term:Y_r"."""
+LITTLE_FIT = 50.0
+"""Fit [%] of an output below which data are not called free of error, whatever noise there is."""
+MOST_NAMED = 3
+"""Parameters in a sentence."""
+
+
+def missing_effect(cause: str, parameters: Sequence[str] = ()) -> str:
+    """Missing effect of a cause, e.g. of "missing_term:Y_r"; wrong values of parameters by their names."""
     kind, _, term = cause.partition(":")
     if kind == "unlisted_term":
         return term
+    if kind == "parameters" and parameters:
+        named = [*parameters[:MOST_NAMED], *["others"] * (len(parameters) > MOST_NAMED)]
+        return f"the correct value{'s' if len(parameters) > 1 else ''} of {listed(named)}"
     return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
 
 
 def lacking(item: Finding) -> str:
     """Missing effect of a finding: as of its cause, but an offset is named after its actuators."""
     kind, _, group = (item.keys or ("",))[0].partition(":")
-    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(item.cause)
+    parameters = [key.split(":", 1)[1] for key in item.keys if key.startswith("theta:")]
+    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(item.cause, parameters)
 
 
 def manoeuvre(name: str) -> str:
@@ -141,6 +151,10 @@ def verdict(
         open_signs = [f"Signs of {listed(named)} improve nothing for certain on {unit} held out"] if named else []
         certain = f"No cause of the remaining error is certain: {accuracy_in_words(before)}"
         return _sentences([certain, *open_signs, *harmful])
+    if not findings and (before.fit < LITTLE_FIT).any():
+        little = "The simulation explains little of these data, and no cause of the catalogue explains more"
+        noise = "What remains is like the noise of the sensors, which may hide the motion or an error of it"
+        return _sentences([f"{little}: {accuracy_in_words(before)}", noise])
     if not findings:
         return _sentences([f"These data show no error of the model: {accuracy_in_words(before)}"])
     lacks = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
@@ -149,6 +163,11 @@ def verdict(
     others = listed(instead, "or") if instead else ""
     also = [f"A cause outside the catalogue explains these data about as well: {others}"] if others else []
     return _sentences(["; ".join(lacks), *harmful, *remains, *also, *beyond])
+
+
+def doubted(faults: Sequence[str]) -> str:
+    """What is to be looked at before any cause is believed: the first fault of the record itself; "" without any."""
+    return "".join(f"Look at the record first: {fault.rstrip('.')}. " for fault in faults[:1])
 
 
 def _sentences(texts: Sequence[str]) -> str:
@@ -184,7 +203,7 @@ def _remainder(unexplained: Unexplained, unit: str, opening: str) -> list[str]:
 def _lead(lead: Lead) -> str:
     """An uncertain candidate with its gain."""
     low, high = lead.gain_interval
-    return f"{missing_effect(lead.cause)} ({lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f})"
+    return f"{missing_effect(lead.cause, lead.parameters)} ({lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:

@@ -39,6 +39,16 @@ class FittedCandidate:
     multiplicity: float = 1.0
 
     @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that it changes, by most standard errors first."""
+        changes = {
+            key.split(":", 1)[1]: abs(self.fit.value(key)) / max(self.fit.std(key), 1e-300)
+            for key in self.keys
+            if key.startswith("theta:")
+        }
+        return tuple(sorted(changes, key=lambda name: -changes[name]))
+
+    @property
     def numbers(self) -> int:
         """How many it takes from the data."""
         return len(self.keys) + (self.profiled is not None)

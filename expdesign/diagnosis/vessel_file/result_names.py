@@ -24,6 +24,8 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
     model = ship.model
     if kind == "theta":
         return rest, 1.0, float(model.parameters[model.names.index(rest)]), ""
+    if key == "heading_bias":  # as the vessel file counts it: of the compass, or of the velocity sensor's axes
+        return ("heading_bias_rad" if "u" in ship.derived else "velocity_angle_rad"), -1.0, 0.0, "rad"
     if key in NAMES:
         return NAMES[key][0], 1.0, 0.0, NAMES[key][1]
     if kind == "deadband":
@@ -41,7 +43,7 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
 
 
 NAMES = {
-    "wind:toward": ("toward_rad", "rad"), "change:time": ("time_s", "s"), "heading_bias": ("heading_bias_rad", "rad"),
+    "wind:toward": ("toward_rad", "rad"), "change:time": ("time_s", "s"),
     "roll:period": ("roll_period_s", "s"), "roll:damping": ("roll_damping_ratio", ""),
 }  # fmt: skip
 """Effect -> name in results and unit."""
