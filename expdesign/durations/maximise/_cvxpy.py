@@ -159,6 +159,6 @@ def _solve(problem: Any) -> None:
         warnings.simplefilter("ignore")  # an inaccurate answer is judged by its certificate
         tolerance = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TUNING.solver_tolerance)
         try:
-            problem.solve(solver=cp.CLARABEL, **tolerance)
+            problem.solve(solver=cp.CLARABEL, max_threads=1, **tolerance)  # more threads mostly wait for each other
         except cp.error.SolverError:
             return
