@@ -267,7 +267,8 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
     elif isinstance(value, (type, FunctionType, BuiltinFunctionType)):
         parts = (_place(value),)
     elif dataclasses.is_dataclass(value):
-        made_from = [item.name for item in dataclasses.fields(value) if item.init]  # the rest follows from these
+        fields = [item for item in dataclasses.fields(value) if item.init]  # the rest follows from these
+        made_from = [item.name for item in fields if not item.metadata.get("aside")]
         parts = [part for name in made_from for part in (name, getattr(value, name))]
     elif kind.__module__.startswith("expdesign."):
         parts = (vars(value),)

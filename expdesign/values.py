@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from expdesign.errors import ShapeError
 
 Array = NDArray[np.float64]
+ASIDE = {"aside": True}
+"""Metadata of a field that says how a value came about, on which no result depends."""
 
 
 def readonly(values: ArrayLike) -> Array:

@@ -1,8 +1,5 @@
 """The durations are optimal, proven from the problem, and no independent search finds better ones."""
 
-import subprocess
-import sys
-
 import cvxpy
 import numpy as np
 import pytest
@@ -223,21 +220,3 @@ def test_an_outside_solver_finds_the_same(draw: int):
     own = solved(duration_problem(matrices, means=2))
     assert own.log_det == pytest.approx(theirs, abs=1e-5)  # the tolerance of that solver
     assert theirs <= own.log_det_bound + 1e-6
-
-
-PLAIN_D = """
-import sys
-import numpy as np
-import expdesign
-from expdesign.durations import DurationProblem, solve_durations
-matrices = np.array([np.diag([1.0, 0.0]), np.diag([0.0, 1.0])])
-problem = DurationProblem(
-    names=("a", "b"), parameters=("x", "y"), mean_subtraction="none", matrices=matrices, run_s=np.ones(2), total_s=4.0
-)
-assert solve_durations(problem).repeats == (2, 2)
-assert "cvxpy" not in sys.modules
-"""
-
-
-def test_plain_d_does_not_load_the_conic_solver():
-    subprocess.run([sys.executable, "-c", PLAIN_D], check=True)

@@ -1,6 +1,14 @@
 """Durations: how long to run each primitive, with a certificate."""
 
-from expdesign.durations.certificate import Certificate, DurationDesign, log_det, scaled, sensitivities, whitened
+from expdesign.durations.certificate import (
+    Certificate,
+    DurationDesign,
+    Solver,
+    log_det,
+    scaled,
+    sensitivities,
+    whitened,
+)
 from expdesign.durations.concave import Collected
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
 from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept, pool_gains
@@ -37,6 +45,7 @@ __all__ = [
     "InformationFloor",
     "Kept",
     "LargeDesign",
+    "Solver",
     "Subset",
     "best_subset",
     "bordered",

@@ -16,7 +16,7 @@ F. Pukelsheim, Optimal Design of Experiments (2006), 7.19-7.23 (general equivale
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
@@ -25,7 +25,7 @@ from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria.models import Tangent
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.tuning import TUNING
-from expdesign.values import Array, seal
+from expdesign.values import ASIDE, Array, seal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,6 +67,21 @@ class Certificate:
         return self.bound - self.value
 
 
+@dataclass(frozen=True, kw_only=True)
+class Solver:
+    """What found optimal fractions.
+
+    Attributes:
+        name: of the method, or of the solver.
+        versions: of the packages that it is part of.
+        wall_s: how long it took [s], with loading these packages where they were not there.
+    """
+
+    name: str
+    versions: Mapping[str, str]
+    wall_s: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DurationDesign:
     """Optimal durations with their certificate.
@@ -85,6 +100,7 @@ class DurationDesign:
             that or not.
         certificate: proof of optimality.
         note: a warning about the whole runs in one sentence, or "".
+        solver: what found the fractions; the result does not depend on how long it took.
     """
 
     problem: DurationProblem
@@ -97,6 +113,7 @@ class DurationDesign:
     efficiency_uniform: float
     certificate: Certificate
     note: str = ""
+    solver: Solver | None = field(default=None, metadata=ASIDE)
 
     def __post_init__(self) -> None:
         seal(self, fractions="q", sensitivities="q")

@@ -13,7 +13,7 @@ import numpy as np
 
 from expdesign.durations.criteria import LogDet, LogTrace, Measure, criterion
 from expdesign.durations.criteria.measures import SmoothMeasure
-from expdesign.durations.criteria.models import Objective, Piece, congruent, pieces_of, stacked_values
+from expdesign.durations.criteria.models import Indices, Objective, Piece, congruent, pieces_of, stacked_values
 from expdesign.durations.limits import Polytope, feasible_set
 from expdesign.durations.problem import DurationProblem, InformationFloor
 from expdesign.durations.tuning import TUNING
@@ -45,6 +45,15 @@ class ConcaveProblem:
     def smooth(self) -> bool:
         """Whether every measure has second derivatives."""
         return all(isinstance(piece.measure, SmoothMeasure) for piece in self.objective.pieces)
+
+    def among(self, chosen: Indices) -> ConcaveProblem:
+        """The problem of some of the candidates (c,), which keep what least times there are; others have no time."""
+        return replace(
+            self,
+            objective=self.objective.among(chosen),
+            polytope=self.polytope.among(chosen),
+            floors=tuple(floor.among(chosen) for floor in self.floors),
+        )
 
     @property
     def plain_d(self) -> bool:

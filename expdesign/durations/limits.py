@@ -10,10 +10,11 @@ for any prices; dual optimal ones make it tight.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, UnknownName
@@ -107,8 +108,10 @@ class Polytope:
         margin = np.where(free, 1.0 / len(free), 0.0)
         upper = np.where(self.most < 1.0, margin, 0.0)
         weight = np.maximum(np.abs(self.rows).max(axis=1, initial=0.0), 1e-12)
-        eye = np.eye(len(free))
-        A = np.block([[-eye, margin[:, None]], [eye, upper[:, None]], [self.rows, weight[:, None]]])
+        eye = scipy.sparse.eye_array(len(free))
+        A = scipy.sparse.block_array(
+            [[-eye, margin[:, None]], [eye, upper[:, None]], [self.rows, weight[:, None]]], format="csr"
+        )
         b = np.r_[-self.least, np.maximum(self.most, self.least), self.limits]
         sum_row = np.r_[np.ones(len(free)), 0.0][None]
         bounds = [(None, None)] * len(free) + [(None, 1.0)]
@@ -128,26 +131,35 @@ class Polytope:
         return self.tidied(np.array(self.least)) if found is None else found
 
     def tidied(self, w: Array) -> Array:
-        """(q,) projected to the box, with tiny fractions set to their bound, and scaled to sum one."""
-        above = np.clip(w, self.least, np.maximum(self.most, self.least)) - self.least
+        """(q,) projected to the box, with tiny fractions set to their bound, and those between scaled to sum one."""
+        room, left = np.maximum(self.most, self.least) - self.least, 1.0 - float(self.least.sum())
+        above = np.clip(w - self.least, 0.0, room)
         above = np.where(above > TUNING.least_fraction, above, 0.0)
-        return np.asarray(self.least + above * (1.0 - self.least.sum()) / max(float(above.sum()), 1e-300))
+        between = above < room - TUNING.least_fraction
+        if not 0.0 < float(above[~between].sum()) < left or not above[between].any():
+            between[:] = True
+        scale = (left - above[~between].sum()) / max(float(above[between].sum()), 1e-300)
+        return np.asarray(self.least + np.where(between, above * scale, above))
+
+    def among(self, chosen: NDArray[np.intp]) -> Polytope:
+        """Of some of the fractions (c,), the others zero."""
+        return replace(self, least=self.least[chosen], most=self.most[chosen], rows=self.rows[:, chosen])
 
     def feasible(self) -> bool:
         """Whether the polytope is not empty."""
+        return self.corner(np.zeros(len(self.least))) is not None
+
+    def corner(self, slope: Array) -> Array | None:
+        """(q,) fractions that maximise slope w, few of them between their bounds; None where the polytope is empty."""
         bounds = np.stack([self.least, np.maximum(self.most, self.least)], axis=1)
         total = np.clip(1.0, self.least.sum(), self.most.sum())
         ones = np.ones((1, len(self.least)))
-        answer = scipy.optimize.linprog(
-            np.zeros(len(self.least)), self.rows, self.limits, ones, [total], bounds, method="highs"
-        )
-        return bool(answer.status == 0)
+        answer = scipy.optimize.linprog(-slope, self.rows, self.limits, ones, [total], bounds, method="highs-ds")
+        return np.asarray(answer.x) if answer.status == 0 else None
 
     def loosened(self) -> Polytope:
         """The polytope with limits of rows moved by `Tuning.loosening`."""
-        return Polytope(
-            least=self.least, most=self.most, rows=self.rows, limits=self.limits + TUNING.loosening, labels=self.labels
-        )
+        return replace(self, limits=self.limits + TUNING.loosening)
 
 
 def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array, total_s: float) -> Polytope:

@@ -6,13 +6,16 @@ not returned.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from importlib.metadata import version
 
 import numpy as np
 
+from expdesign import __version__
 from expdesign.durations.asymmetric import definite_start, improved, log_abs_det
-from expdesign.durations.certificate import Certificate, DurationDesign
+from expdesign.durations.certificate import Certificate, DurationDesign, Solver
 from expdesign.durations.concave import (
     Collected,
     ConcaveProblem,
@@ -29,7 +32,7 @@ from expdesign.durations.concave import (
 )
 from expdesign.durations.criteria import criterion
 from expdesign.durations.criteria.models import Objective
-from expdesign.durations.maximise import maximised
+from expdesign.durations.maximise import CVXPY, NEWTON, maximised
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, runs_above_floors, whole_runs
 from expdesign.durations.tuning import TUNING
@@ -53,10 +56,16 @@ NOTHING_DEFINITE = (
     "none: recorded primitives make the problem non-convex, and no fractions make the symmetric part positive "
     "definite; found by local search from random starts"
 )
+LOCAL_SEARCH = "local search by SciPy's SLSQP"
+"""Recorded primitives have no concave problem that cvxpy could state: log |det B(w)| of B that are not symmetric."""
+PACKAGES = {CVXPY: ("cvxpy", "clarabel"), NEWTON: ("cvxpy", "clarabel"), LOCAL_SEARCH: ("scipy",)}
+"""What each method is part of; the others are this package's own."""
 
 
 def solve_durations(problem: DurationProblem) -> DurationDesign:
     """The optimal time fractions by the problem's criterion, their certificate, and whole runs.
+
+    A problem of moderate size is solved as it is stated, see `maximise`; `solver` of the answer says what found it.
 
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
@@ -64,7 +73,7 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
         NoAnswer: no fractions satisfy the limits, the gap stays above `Tuning.largest_gap`, or whole runs do
             not fit.
     """
-    design = optimal_shares(problem)
+    design = _shares(problem, as_stated=True)
     if not problem.floors or problem.aim.criterion == T:
         return _with_runs(design, whole_runs(problem, design.fractions))
     return _with_runs(design, runs_above_floors(problem, _tightened(problem, design.fractions), _shortfall(problem)))
@@ -93,11 +102,24 @@ def _tightened(problem: DurationProblem, fractions: Array) -> Iterator[Array]:
 
 
 def optimal_shares(problem: DurationProblem) -> DurationDesign:
-    """As `solve_durations`, but without whole runs: `repeats` are all zero and their efficiency is nan."""
+    """As `solve_durations`, but by the quickest method and without whole runs.
+
+    `repeats` are all zero and their efficiency is nan.
+    """
+    return _shares(problem, as_stated=False)
+
+
+def _shares(problem: DurationProblem, *, as_stated: bool) -> DurationDesign:
+    begun = time.perf_counter()
     try:
-        return _certified_shares(problem, None) if problem.symmetric else _improved_shares(problem)
+        if problem.symmetric:
+            design, method = _certified_shares(problem, None, as_stated=as_stated)
+        else:
+            design, method = _improved_shares(problem), LOCAL_SEARCH
     except np.linalg.LinAlgError:
         raise _not_informative(problem) from None
+    versions = {name: version(name) for name in PACKAGES.get(method, ())} or {"expdesign": __version__}
+    return replace(design, solver=Solver(name=method, versions=versions, wall_s=time.perf_counter() - begun))
 
 
 def _not_informative(problem: DurationProblem) -> NotInformative:
@@ -172,29 +194,30 @@ def _balances(problem: DurationProblem) -> dict[str, Objective]:
     return floors
 
 
-def _certified_shares(problem: DurationProblem, within: Array | None) -> DurationDesign:
-    """The optimum of the concave problem.
+def _certified_shares(problem: DurationProblem, within: Array | None, *, as_stated: bool) -> tuple[DurationDesign, str]:
+    """The optimum of the concave problem, and the method that found it.
 
     Args:
         problem: whose symmetric parts count.
         within: (q,) fractions at which the information is positive definite, where equal ones are not known to be.
+        as_stated: as of `maximised`.
     """
     task = concave_problem(problem, within=within)
     if within is None and not np.isfinite(task.objective.value(task.polytope.middle())):
         raise np.linalg.LinAlgError
-    best = maximised(task, THEOREMS.get(problem.aim.criterion, ""))
+    best = maximised(task, THEOREMS.get(problem.aim.criterion, ""), as_stated=as_stated)
     if not best.gap < TUNING.largest_gap:
         raise NoAnswer(
             f"the durations could not be certified: the gap in {problem.aim.criterion}-efficiency is {best.gap:.2g}, "
             f"at most {TUNING.largest_gap:g} is accepted"
         )
-    gap, count = max(best.certificate.gap, 0.0), len(problem.names)
+    gap, count = max(best.gap * best.certificate.degree, 0.0), len(problem.names)
     certificate = replace(best.certificate, bound=best.certificate.value + gap, prices=best.certificate.prices[:count])
     fractions, own = best.fractions[:count], problem.aim.criterion == "D" and problem.robust == "nominal"
     log_det = log_abs_det(problem, fractions, symmetric=within is not None)
     if problem.constraints.budgets:  # with unused time, the information with means eliminated counts
         log_det = certificate.value if own else Collected.of(problem, "D").value(fractions)
-    return DurationDesign(
+    design = DurationDesign(
         problem=problem,
         fractions=fractions,
         sensitivities=best.sensitivities[:count],
@@ -205,6 +228,7 @@ def _certified_shares(problem: DurationProblem, within: Array | None) -> Duratio
         efficiency_uniform=_uniform_efficiency(problem, fractions),
         certificate=certificate,
     )
+    return design, best.method
 
 
 def _improved_shares(problem: DurationProblem) -> DurationDesign:
@@ -220,7 +244,7 @@ def _improved_shares(problem: DurationProblem) -> DurationDesign:
         raise InputError("design.balance needs primitives that are simulated, not recorded ones")
     polytope = polytope_of(problem)
     within = definite_start(problem, polytope)
-    guaranteed = None if within is None else _certified_shares(problem, within)
+    guaranteed = None if within is None else _certified_shares(problem, within, as_stated=False)[0]
     fractions = improved(problem, polytope, None if guaranteed is None else guaranteed.fractions)
     value = log_abs_det(problem, fractions)
     slope = np.einsum(

@@ -1,4 +1,4 @@
-"""Speed of the durations beside other solvers: many candidates, every criterion under limits, and scoring.
+"""Speed of the durations: the examples, growth with candidates, every criterion under limits, other solvers, scoring.
 
 Run with ``python tests/benchmarks/durations.py``. What counts is the ratio of processor times in one run, all on one
 thread; gaps are relative to the dimension. Baselines that take too long are stopped; their ratio is then "at least".
@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", RAYON_NUM_THREADS="1")  # read on import of NumPy
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -28,25 +31,99 @@ from expdesign.durations import (
     Constraints,
     DurationProblem,
     d_optimal,
+    efficiencies,
     log_det,
     optimal_shares,
     scaled,
     sensitivities,
+    solve_durations,
 )
+from expdesign.durations.maximise import maximised
+from expdesign.durations.maximise.maximise import _by_cvxpy
+from expdesign.durations.solve import concave_problem
 from expdesign.information import score_primitives
+from expdesign.progress import silent
 from expdesign.signals import Commands
 from expdesign.values import Array
+from expdesign.workflows.steps.case import loaded
+from expdesign.workflows.steps.design_problem import duration_problem as stated_problem
+from expdesign.workflows.steps.grown import ready
 
 COUNT, PARAMETERS, OUTPUTS = 1000, 18, 3
 PATIENCE_S = 20.0
 """Baselines are stopped after this time."""
 
 
+EXAMPLES = ("helsinki", "story", "harbour", "narrows", "coaster", "model-ship", "fast-boat-designed", "roll-trial")
+GROWTH = (10, 30, 100, 300, 1000, 3000, 10000)
+LOADING = "import time, scipy.optimize; t, c = time.perf_counter(), time.process_time(); import cvxpy; "
+LOADING += "print(time.perf_counter() - t, time.process_time() - c)"
+
+
 def main() -> None:
+    examples()
+    growth()
     many_candidates()
     dense_candidates()
     every_criterion()
     scoring()
+
+
+def examples() -> None:
+    """The durations of the examples: the problem as stated to cvxpy, polished, beside the quickest method."""
+    times = np.array(
+        [
+            subprocess.run([sys.executable, "-c", LOADING], check=True, capture_output=True, text=True).stdout.split()
+            for _ in range(3)
+        ],
+        dtype=float,
+    ).min(axis=0)
+    print(f"loading cvxpy once: {times[0]:.2f} s, processor {times[1]:.2f} s")
+    print("| scenario | candidates | cvxpy | gap | quickest | gap | times as long | whole step | comparing criteria |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name in EXAMPLES:
+        case = loaded(Path(__file__).parents[2] / "scenarios" / f"{name}.toml", silent)
+        problem = stated_problem(case, ready(case, seed=0, progress=silent)[0], seed=0)
+        row = compared(problem)
+        step, design = cost(partial(solve_durations, problem))
+        comparing, _ = cost(partial(efficiencies, design))
+        print(f"| {name} | {row} | {step:.2f} s | {comparing:.2f} s |", flush=True)
+
+
+def growth() -> None:
+    """The same with the number of candidates; cvxpy also beyond the number up to which it is asked."""
+    print("| criterion | candidates | cvxpy | gap | quickest | gap | times as long |")
+    print("|---|---|---|---|---|---|---|")
+    for count in GROWTH:
+        chosen = dict(variants(count, samples=12 if count > 10 else 60))
+        for what in (
+            "D, no limits",
+            "A, no limits",
+            "D, limits and budgets",
+            "E, no limits",
+            "D, average of 5, limits",
+        ):
+            if count <= 1000 or "average" not in what:
+                print(f"| {what} | {compared(chosen[what])} |", flush=True)
+
+
+def compared(problem: DurationProblem) -> str:
+    """Columns of a table: candidates, seconds of processor and gap of both, and their ratio."""
+    task = concave_problem(problem)
+    theirs_s, theirs = cost(partial(_by_cvxpy, task, ""))
+    own_s, own = cost(partial(maximised, task))
+    gap = f"{max(theirs.gap, 0.0):.0e}" if theirs else "no answer"
+    return (
+        f"{len(problem.names)} | {theirs_s:.3f} s | {gap} | {own_s:.3f} s | {max(own.gap, 0.0):.0e} | "
+        f"{theirs_s / max(own_s, 1e-6):.1f}"
+    )
+
+
+def cost(work: Callable[[], Any]) -> tuple[float, Any]:
+    """Seconds of processor, and the result."""
+    begun = time.process_time()
+    result = work()
+    return time.process_time() - begun, result
 
 
 def many_candidates() -> None:
@@ -143,19 +220,21 @@ def every_criterion() -> None:
     """Each criterion with limits, budgets, balance, prior or several models, 18 parameters and three means."""
     for count in (25, 100, 300):
         for what, problem in variants(count):
-            begun = time.perf_counter()
-            try:
-                design = optimal_shares(problem)
-                found = f"gap {design.gap_relative:.1e}"
-            except Exception as error:
-                found = f"{type(error).__name__}: {error}"
-            print(f"{count:4d} candidates, {what:>26}: {time.perf_counter() - begun:6.2f} s   {found}", flush=True)
+            for how, solve in (("quickest", optimal_shares), ("as written", solve_durations)):
+                begun = time.perf_counter()
+                try:
+                    design = solve(problem)
+                    found = f"gap {design.gap_relative:.1e} by {design.solver.name if design.solver else ''}"
+                except Exception as error:
+                    found = f"{type(error).__name__}: {error}"
+                taken = time.perf_counter() - begun
+                print(f"{count:4d} candidates, {what:>26}, {how:>10}: {taken:6.2f} s   {found}", flush=True)
 
 
-def variants(count: int) -> Iterator[tuple[str, DurationProblem]]:
+def variants(count: int, samples: int = 12) -> Iterator[tuple[str, DurationProblem]]:
     """(what, problem)."""
     rng = np.random.default_rng(count)
-    stacks = [random_matrices(rng, count=count, parameters=18, outputs=3, samples=12) for _ in range(5)]
+    stacks = [random_matrices(rng, count=count, parameters=18, outputs=3, samples=samples) for _ in range(5)]
     plain = duration_problem(stacks[0], means=3, run_s=60.0, total_s=3600.0)
     plain = replace(plain, equations=("u", "v", "r") * 6)
     names, ones = plain.names, np.ones(18)

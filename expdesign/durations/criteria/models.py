@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +105,15 @@ class Objective:
     def degree(self) -> int:
         """Value of twice the information is higher by degree x log 2."""
         return self.pieces[0].measure.degree
+
+    @property
+    def dimension(self) -> int:
+        """Size d of the information matrices."""
+        return len(self.pieces[0].prior)
+
+    def among(self, chosen: Indices) -> Objective:
+        """The objective as a function of some of the fractions (c,)."""
+        return replace(self, pieces=tuple(replace(item, matrices=item.matrices[chosen]) for item in self.pieces))
 
     def value(self, w: Array) -> float:
         """The objective at fractions (q,)."""

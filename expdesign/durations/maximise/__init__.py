@@ -1,6 +1,6 @@
-"""Concave problems solved: by a working set, by Newton's method, or as conic problems."""
+"""Concave problems solved: as stated by cvxpy, by working sets, or by Newton's method."""
 
 from expdesign.durations.maximise.large_scale import LargeDesign, d_optimal, rows_of
-from expdesign.durations.maximise.maximise import Optimum, maximised
+from expdesign.durations.maximise.maximise import CVXPY, NEWTON, Optimum, maximised
 
-__all__ = ["LargeDesign", "Optimum", "d_optimal", "maximised", "rows_of"]
+__all__ = ["CVXPY", "NEWTON", "LargeDesign", "Optimum", "d_optimal", "maximised", "rows_of"]

@@ -13,7 +13,6 @@ Experiments (2006), 3.2 (information matrices for subsystems), and S. Boyd and L
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import cvxpy as cp
@@ -57,7 +56,7 @@ def conic_optimum(task: ConcaveProblem) -> tuple[Array, tuple[Array, ...]] | Non
 
 
 def newton_step(
-    task: ConcaveProblem, w: Array, *, chosen: Indices, mixture: Array, floor_prices: Sequence[float]
+    task: ConcaveProblem, w: Array, *, chosen: Indices, mixture: Array, floor_prices: Array, gain: float
 ) -> Array | None:
     """A step (q,) of sequential quadratic programming under all limits.
 
@@ -69,6 +68,8 @@ def newton_step(
         chosen: (c,) fractions that may change.
         mixture: (m,) weights of the models.
         floor_prices: of the floors.
+        gain: order of magnitude of what the step may gain. The solver's tolerances are absolute, so they are applied to
+            shares of it.
 
     Returns:
         None where the solver gives no numbers.
@@ -91,7 +92,7 @@ def newton_step(
     for floor, piece in zip(task.floors, floors, strict=True):
         tangent = piece.tangent(w)
         constraints.append(tangent.value - float(floor.levels[0]) + tangent.slope[chosen] @ step >= 0)
-    _solve(cp.Problem(cp.Maximize(height - cp.quad_form(step, cp.psd_wrap(H)) / 2), constraints))
+    _solve(cp.Problem(cp.Maximize((height - cp.quad_form(step, cp.psd_wrap(H)) / 2) / gain), constraints))
     if step.value is None or not np.isfinite(step.value).all():
         return None
     whole = np.zeros(len(w))
@@ -158,6 +159,6 @@ def _solve(problem: Any) -> None:
         warnings.simplefilter("ignore")  # an inaccurate answer is judged by its certificate
         tolerance = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TUNING.solver_tolerance)
         try:
-            problem.solve(solver=cp.CLARABEL, **tolerance)
+            problem.solve(solver=cp.CLARABEL, max_threads=1, **tolerance)  # more threads mostly wait for each other
         except cp.error.SolverError:
             return

@@ -85,7 +85,7 @@ def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-
         if not len(joining) and aim <= tolerance:
             break
         if len(joining):
-            joining = joining[np.argsort(-sensitivities[joining], kind="stable")[: _set_size(pool.dimension)]]
+            joining = joining[np.argsort(-sensitivities[joining], kind="stable")[: set_size(pool.dimension)]]
             kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > TUNING.barrier_fraction)
             chosen, w = np.r_[chosen[kept], joining], np.r_[w[kept], np.zeros(len(joining))]
         aim = max(TUNING.sharper * aim, tolerance)
@@ -139,14 +139,15 @@ def _chunks(flat: Array) -> Iterator[Array]:
     return (flat[first : first + length] for first in range(0, len(flat), length))
 
 
-def _set_size(dimension: int) -> int:
+def set_size(dimension: int) -> int:
+    """Of a first working set, and the most that join it at a time."""
     return max(TUNING.smallest_set, TUNING.set_per_dimension * dimension)
 
 
 def _first_set(pool: _Pool) -> Indices:
     """Candidates of largest sensitivity at equal fractions, completed until their information is regular."""
     count, d = len(pool.rows), pool.dimension
-    size = _set_size(d)
+    size = set_size(d)
     if count <= 2 * size:
         return np.arange(count)
     leverage = pool.sensitivities(np.eye(d))

@@ -1,7 +1,13 @@
 """The optimum of a concave problem, with its certificate.
 
-D without limits is solved by the working-set method of `large_scale`. Other smooth criteria are solved by Newton's
-method under the limits, and E, or an optimum with singular information, as a conic problem.
+A problem of moderate size is solved as it is stated, by cvxpy. Newton's method under the limits, from the solver's
+answer, gives the digits that an interior point lacks. Whatever found it, the certificate is computed from the problem.
+
+Other problems, and those solved only to compare, are solved by the quickest method. For D without limits that is the
+working-set method of `large_scale`. Other smooth criteria of few candidates are solved by Newton's method from the
+middle of the limits. Of more candidates than `Tuning.conic_candidates` only a working set is solved at a time, by any
+criterion and under any limits. E, and an optimum with singular information, have no method but cvxpy, which then
+solves the working sets.
 """
 
 from __future__ import annotations
@@ -14,28 +20,45 @@ import numpy as np
 from expdesign.durations.certificate import Certificate, certify
 from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria.models import Indices, Objective
-from expdesign.durations.maximise.large_scale import d_optimal, rows_of
+from expdesign.durations.maximise.large_scale import d_optimal, rows_of, set_size
 from expdesign.durations.tuning import TUNING
-from expdesign.errors import FloorOutOfReach, NoAnswer
+from expdesign.errors import FloorOutOfReach, NoAnswer, NotInformative
 from expdesign.values import Array
+
+CVXPY, WORKING_SET, NEWTON = "cvxpy with CLARABEL", "working-set method", "Newton's method"
+NO_CHOICE = "none: least times take all of the time"
+"""Names of the methods."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """Fractions (q,), their certificate, and the criterion's sensitivities (q,) there."""
+    """An optimum.
+
+    Attributes:
+        fractions: (q,).
+        certificate: of these.
+        sensitivities: (q,) of the criterion there.
+        gap: per degree, with what fractions beyond a budget owe to that.
+        method: that found it.
+        multipliers: (d, d) for each model, which the certificate may be from; () for the criterion's own gradients.
+    """
 
     fractions: Array
     certificate: Certificate
     sensitivities: Array
-
-    @property
-    def gap(self) -> float:
-        """Per degree."""
-        return self.certificate.gap / self.certificate.degree
+    gap: float
+    method: str
+    multipliers: Sequence[Array] = ()
 
 
-def maximised(task: ConcaveProblem, kind: str = "") -> Optimum:
+def maximised(task: ConcaveProblem, kind: str = "", *, as_stated: bool = False) -> Optimum:
     """The optimum with its certificate.
+
+    Args:
+        task: the problem.
+        kind: the theorem, in words.
+        as_stated: solve the problem as it is stated where its size allows that, not by the quickest method. The answers
+            agree to the gaps.
 
     Raises:
         NoAnswer: the floors cannot all be kept.
@@ -43,29 +66,63 @@ def maximised(task: ConcaveProblem, kind: str = "") -> Optimum:
     """
     least = task.polytope.least
     if not 1.0 - least.sum() > TUNING.loosening:  # least times take everything
-        return _proven(task, least / least.sum(), kind)
-    if task.plain_d and (w := _plain_d(task)) is not None:
-        return _proven(task, w, kind)
-    if task.smooth and (found := _by_newton(task, kind)) is not None:
-        return found
+        return _proven(task, least / least.sum(), kind, method=NO_CHOICE)
+    best = _by_cvxpy(task, kind) if as_stated and _moderate(task) else None
+    if best is None or not best.gap < (TUNING.target_gap if task.smooth else TUNING.largest_gap):
+        own = _plain_d(task, kind) or _by_working_sets(task, kind) or _by_newton(task, kind)
+        best = min(filter(None, (best, own)), key=lambda found: found.gap, default=None)
+    if best is not None and best.gap < TUNING.largest_gap and _floors_kept(task, best.fractions):
+        return best
+    best = best or _by_cvxpy(task, kind)
+    if task.floors:
+        _check_floors(task, None if best is None else best.fractions)
+    if best is None:
+        raise np.linalg.LinAlgError
+    return best
+
+
+def _proven(task: ConcaveProblem, w: Array, kind: str, multipliers: Sequence[Array] = (), *, method: str) -> Optimum:
+    proof, slope = certify(task, w, kind=kind, multipliers=multipliers)
+    beyond = np.maximum(task.polytope.rows @ w - task.polytope.limits, 0.0)
+    owed = float(_prices(proof, task.polytope.labels) @ beyond)
+    return Optimum(
+        fractions=w,
+        certificate=proof,
+        sensitivities=slope,
+        gap=(proof.gap + owed) / proof.degree,
+        multipliers=multipliers,
+        method=method,
+    )
+
+
+def _prices(proof: Certificate, names: Sequence[str]) -> Array:
+    return np.array([proof.multipliers[name] for name in names])
+
+
+def _moderate(task: ConcaveProblem) -> bool:
+    """Whether cvxpy takes seconds at most."""
+    few = len(task.objective.pieces) + len(task.floors) <= TUNING.conic_inequalities
+    return few and len(task.polytope.least) <= TUNING.conic_candidates
+
+
+def _by_cvxpy(task: ConcaveProblem, kind: str) -> Optimum | None:
+    """The optimum of the problem as stated, sharpened; None where the solver gives no numbers, or useless ones."""
     from expdesign.durations.maximise._cvxpy import conic_optimum
 
     answer = conic_optimum(task)
-    if task.floors:
-        _check_floors(task, None if answer is None else answer[0])
     if answer is None:
-        raise np.linalg.LinAlgError
-    w, multipliers = answer
-    return _sharpened(task, _proven(task, task.polytope.tidied(w), kind, multipliers))
+        return None
+    try:
+        found = _proven(task, task.polytope.tidied(answer[0]), kind, answer[1], method=CVXPY)
+    except np.linalg.LinAlgError:
+        return None
+    return _sharpened(task, found, least_steps=1)
 
 
-def _proven(task: ConcaveProblem, w: Array, kind: str, multipliers: Sequence[Array] = ()) -> Optimum:
-    certificate, slope = certify(task, w, kind=kind, multipliers=multipliers)
-    return Optimum(fractions=w, certificate=certificate, sensitivities=slope)
-
-
-def _plain_d(task: ConcaveProblem) -> Array | None:
-    """The D-optimal fractions, with the least times as prior; None where a B_q is indefinite."""
+def _plain_d(task: ConcaveProblem, kind: str) -> Optimum | None:
+    """The D-optimal fractions, with the least times as prior; None for other problems, or where a B_q is indefinite."""
+    if not task.plain_d:
+        return None
     (piece,), polytope = task.objective.pieces, task.polytope
     free = np.flatnonzero(polytope.most > polytope.least)
     left = 1.0 - float(polytope.least.sum())
@@ -74,36 +131,101 @@ def _plain_d(task: ConcaveProblem) -> Array | None:
         return None
     w = np.array(polytope.least)
     w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=TUNING.target_gap).fractions
-    return w
+    return _proven(task, w, kind, method=WORKING_SET)
+
+
+def _by_working_sets(task: ConcaveProblem, kind: str) -> Optimum | None:
+    """The optimum of many candidates: of some of them, which those join that would raise it, until none does.
+
+    Returns:
+        None for few candidates, or where the working sets do not lead there.
+    """
+    count, size = len(task.polytope.least), set_size(task.objective.dimension)
+    best: Optimum | None = None
+    if count <= TUNING.conic_candidates:
+        return None
+    try:
+        chosen = _first_set(task)
+        for _ in range(TUNING.most_sets):
+            part = task.among(chosen)
+            found = _by_newton(part, kind) or _by_cvxpy(part, kind)
+            if found is None:
+                break
+            w = np.zeros(count)
+            w[chosen] = found.fractions
+            here = _proven(task, w, kind, found.multipliers, method=WORKING_SET)
+            best = min(filter(None, (best, here)), key=lambda item: item.gap)
+            rising = np.setdiff1d(np.flatnonzero(_excess(here) > TUNING.target_gap), chosen)
+            if best.gap < TUNING.target_gap or not len(rising):
+                break
+            chosen = np.union1d(chosen, rising[np.argsort(-_excess(here)[rising], kind="stable")[:size]])
+    except (np.linalg.LinAlgError, NotInformative):
+        return None
+    return best if best is not None and best.gap < TUNING.largest_gap else None
+
+
+def _excess(here: Optimum) -> Array:
+    """(q,) by how much each net sensitivity is above the level, per degree."""
+    proof = here.certificate
+    return np.asarray((here.sensitivities - proof.prices - proof.level) / proof.degree)
+
+
+def _first_set(task: ConcaveProblem) -> Indices:
+    """(c,) candidates that keep the limits and the floors and inform about everything.
+
+    Raises:
+        NoAnswer: the floors cannot all be kept.
+        numpy.linalg.LinAlgError, NotInformative: there are none, or they are not found.
+    """
+    polytope, pieces = task.polytope, (task.objective.pieces[0], *(floor.pieces[0] for floor in task.floors))
+    allowed, needed = np.flatnonzero(polytope.most > 0), polytope.least > 0
+    for piece in pieces:
+        rows = rows_of(piece.matrices[allowed])
+        if rows is None:
+            raise np.linalg.LinAlgError
+        needed[allowed] |= d_optimal(rows, prior=piece.prior, tolerance=TUNING.first_gap).fractions > 0
+    if not polytope.plain:
+        slope = pieces[0].tangent(polytope.middle()).slope
+        roomy = replace(polytope, most=np.maximum(polytope.least, polytope.most / 2))
+        for corner in (polytope.corner(slope), roomy.corner(slope)):  # of the first alone all would be at their most
+            needed |= np.zeros_like(needed) if corner is None else corner > 0
+    if task.floors:
+        together = ConcaveProblem(objective=_together(task), polytope=polytope)
+        needed |= maximised(together).fractions > 0
+    return np.flatnonzero(needed)
 
 
 def _by_newton(task: ConcaveProblem, kind: str) -> Optimum | None:
     """The optimum of smooth measures by Newton's method from the middle, or None where that does not lead there."""
+    if not task.smooth:
+        return None
     try:
-        found = _sharpened(task, _proven(task, task.polytope.middle(), kind))
+        found = _sharpened(task, _proven(task, task.polytope.middle(), kind, method=NEWTON))
     except np.linalg.LinAlgError:
         return None
     return found if found.gap < TUNING.largest_gap and _floors_kept(task, found.fractions) else None
 
 
-def _sharpened(task: ConcaveProblem, best: Optimum) -> Optimum:
+def _sharpened(task: ConcaveProblem, best: Optimum, *, least_steps: int = 0) -> Optimum:
     """An optimum with a gap no wider, by Newton's method under all limits, where every measure is smooth."""
     if not task.smooth:
         return best
     from expdesign.durations.maximise._cvxpy import newton_step
 
     here = best
-    for _ in range(TUNING.newton_steps):
-        if best.gap < TUNING.target_gap:
+    for number in range(TUNING.newton_steps):
+        if best.gap < TUNING.target_gap and number >= least_steps:
             break
         proof, w = here.certificate, here.fractions
-        prices = [proof.multipliers[name] for name in task.floor_names]
+        prices = _prices(proof, task.floor_names)
         try:
-            step = newton_step(task, w, chosen=_working_set(task, here), mixture=proof.mixture, floor_prices=prices)
-            moved = None if step is None else _ascended(task, w, step, prices)
+            gain = float(np.clip(here.gap, TUNING.least_gap_of_step, 1.0))
+            chosen = _working_set(task, here)
+            step = newton_step(task, w, chosen=chosen, mixture=proof.mixture, floor_prices=prices, gain=gain)
+            moved = None if step is None else _ascended(task, here, step)
             if moved is None:
                 break
-            here = _proven(task, moved, proof.kind)
+            here = _proven(task, moved, proof.kind, method=best.method)
         except np.linalg.LinAlgError:
             break
         before, best = best.gap, min(best, here, key=lambda item: item.gap)
@@ -119,12 +241,14 @@ def _working_set(task: ConcaveProblem, here: Optimum) -> Indices:
     return np.flatnonzero(rising | (here.fractions > task.polytope.least))
 
 
-def _ascended(task: ConcaveProblem, w: Array, step: Array, prices: Sequence[float]) -> Array | None:
+def _ascended(task: ConcaveProblem, here: Optimum, step: Array) -> Array | None:
     """Fractions (q,) along a step that raise the merit, by backtracking; None where none do."""
+    w, polytope = here.fractions, task.polytope
+    penalties = 2 * _prices(here.certificate, (*task.floor_names, *polytope.labels)) + 1
 
     def merit(v: Array) -> float:
-        missed = [min(floor.value(v), 0.0) for floor in task.floors]
-        return task.objective.value(v) + sum((2 * p + 1) * short for p, short in zip(prices, missed, strict=True))
+        kept = np.r_[[floor.value(v) for floor in task.floors], polytope.limits - polytope.rows @ v]
+        return task.objective.value(v) + float(penalties @ np.minimum(kept, 0.0))
 
     before = merit(w)
     for length in 0.5 ** np.arange(20):
@@ -142,12 +266,7 @@ def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
     """Raises NoAnswer where fractions (q,) violate a floor because the floors contradict each other."""
     if w is not None and _floors_kept(task, w):
         return
-    together = Objective(
-        tuple(floor.pieces[0] for floor in task.floors),
-        np.concatenate([floor.levels for floor in task.floors]),
-        worst=True,
-    )
-    best = maximised(ConcaveProblem(objective=together, polytope=task.polytope)).fractions
+    best = maximised(ConcaveProblem(objective=_together(task), polytope=task.polytope)).fractions
     kept = min(float(np.exp(floor.value(best) / floor.degree)) for floor in task.floors)
     balances = tuple(name for name in task.floor_names if name.startswith("balance"))
     if kept < 1.0 and len(balances) < len(task.floors):
@@ -161,6 +280,12 @@ def _check_floors(task: ConcaveProblem, w: Array | None) -> None:
             "design.balance cannot be met: no durations within the other limits are this informative about every "
             f"equation; at most {kept:.3g} times the required share is possible"
         )
+
+
+def _together(task: ConcaveProblem) -> Objective:
+    """The least of the floors."""
+    pieces = tuple(floor.pieces[0] for floor in task.floors)
+    return Objective(pieces, np.concatenate([floor.levels for floor in task.floors]), worst=True)
 
 
 def _check_each(task: ConcaveProblem) -> None:

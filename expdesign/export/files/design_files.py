@@ -6,6 +6,7 @@ The dictionary holds motions in calm water, so velocities over ground and throug
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,7 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
                 "uniform": design.efficiency_uniform,
             },
             "certificate": _certificate_entry(design),
+            "solver": _solver_entry(design),
             "robust": problem.robust,
             "models": len(problem.sampled),
             "interest": list(problem.aim.interest or problem.parameters),
@@ -140,6 +142,12 @@ def _certificate_entry(design: DurationDesign) -> dict[str, Any]:
         "multipliers": dict(proof.multipliers),
         "guaranteed_log_det": finite(proof.guaranteed),
     }
+
+
+def _solver_entry(design: DurationDesign) -> dict[str, Any] | None:
+    """What found the fractions, before they were rounded to whole runs."""
+    found = design.solver
+    return None if found is None else {**asdict(found), "wall_s": round(found.wall_s, 3)}
 
 
 def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
