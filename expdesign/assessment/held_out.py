@@ -84,6 +84,35 @@ def ranked(found: Sequence[HeldOut]) -> list[int]:
     return sorted(range(len(found)), key=place)
 
 
+def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
+    """Why the estimate of a method is chosen, to follow its name; "" where nothing was compared.
+
+    Args:
+        found: the comparison.
+        chosen: label of the chosen one.
+        asked: names of the methods asked for; none where they are the program's choice.
+    """
+    order = [found[place] for place in ranked(found)]
+    own = next((item for item in order if item.label == chosen), None)
+    if own is None:
+        return ""
+    least, others = min(order, key=lambda item: item.share), [item for item in order if item is not own]
+    data = "unseen runs" if own.unseen else "the runs it is from"
+    text = f"predicts {data} {TUNING.ahead_s:g} s ahead with an error of {_bounded(own.share)}"
+    if own is least:
+        text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
+    elif own is order[0]:
+        text += f", {least.label} with {_bounded(least.share)}; noise of the sensors biases {own.label} less"
+    else:
+        text += f"; the model of {order[0].label} cannot simulate every run"
+    return f"{text}; output error starts from it" if asked and own.method.name not in asked else text
+
+
+def _bounded(share: float) -> str:
+    """An error in per cent; beyond `Tuning.largest_error` it is not told."""
+    return f"{100 * share:.3g} %" if share < TUNING.largest_error else f"{100 * TUNING.largest_error:g} % or more"
+
+
 def folds(record: Record) -> Iterator[tuple[Record, Record]]:
     """(estimate from, predict): every run left out once, several at a time where there are many; halves of one run."""
     batches = record.batches

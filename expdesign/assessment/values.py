@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from expdesign.assessment.held_out import HeldOut
+from expdesign.assessment.held_out import HeldOut, reason
 from expdesign.assessment.limits import Limits
 from expdesign.assessment.residuals import OneStep
 from expdesign.assessment.runs import RunCheck
@@ -65,6 +65,11 @@ class Assessed:
     std: Mapping[str, float]
 
     @property
+    def label(self) -> str:
+        """Name of the method, with the horizon of output error."""
+        return HeldOut.label_of(self.method, self.horizon_s)
+
+    @property
     def uses_instruments(self) -> bool:
         """Whether the method is one of instrumental variables."""
         return self.method.name.startswith(INSTRUMENTAL)
@@ -85,6 +90,7 @@ class Assessment:
         methods: one entry for each method that gave an estimate, in the order of the options.
         failures: methods, or horizons of output error, that gave no estimate, and why.
         notes: on methods that were not tried.
+        asked: names of the methods asked for; none where they are the program's choice.
         compared: errors of predictions that decide which estimate is chosen; empty where nothing was to be decided.
         chosen: index of the method whose estimate goes into the vessel file.
         mean: how the mean was subtracted from instruments.
@@ -99,6 +105,7 @@ class Assessment:
     methods: tuple[Assessed, ...]
     failures: tuple[tuple[str, InputError | NoAnswer], ...]
     notes: tuple[str, ...]
+    asked: tuple[str, ...]
     compared: tuple[HeldOut, ...]
     chosen: int
     mean: str
@@ -110,7 +117,13 @@ class Assessment:
     @property
     def left_out(self) -> tuple[str, ...]:
         """One sentence for each method that gave no estimate, or was not tried."""
-        return (*(f"Method {label} gave no estimate: {error}." for label, error in self.failures), *self.notes)
+        return (*(f"No estimate by {label}: {error}." for label, error in self.failures), *self.notes)
+
+    @property
+    def why(self) -> str:
+        """Why the chosen estimate is chosen, a sentence; "" where there was nothing to choose from."""
+        why = reason(self.compared, self.best.label, self.asked)
+        return f"{self.best.label} {why}." if why else ""
 
     @property
     def best(self) -> Assessed:

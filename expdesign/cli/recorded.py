@@ -36,7 +36,8 @@ def estimate(
             help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind iv iv-air iv-augmented "
             "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air oe-current oe-air-current. See "
             "expdesign explain methods. "
-            "Default: ls and iv, and those with wind where wind is measured and the model has terms for it.",
+            "Default: ls, iv and oe, and those with wind where wind is measured and the model has terms for it. The "
+            "vessel file takes the one that predicts best what it has not seen.",
         ),
     ] = None,
     fixed: Fixed = None,
@@ -75,7 +76,7 @@ def estimate(
         typer.Option(
             metavar="SECONDS",
             help="Output error restarts its simulations from the data after this time, for ships unstable on their "
-            "course and for weather that is not measured. Default: never.",
+            "course and for weather that is not measured. Default: 30, or never, whichever predicts better.",
         ),
     ] = None,
     constant: Annotated[

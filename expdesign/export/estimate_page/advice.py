@@ -57,11 +57,11 @@ def advice(content: EstimateContent) -> list[str]:
     """Advice on the choice of the estimate, from the residuals of these data."""
     best = content.found.best
     lag = best.one_step.autocorrelation[1]
-    sentences = [*unstable_warning(content.found)]
+    sentences = [*([content.found.why] if content.found.why else []), *unstable_warning(content.found)]
     if (lag < -0.25).any():
         sentences.append(
             f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
-            "measurement noise in the velocities, which biases least squares. Prefer instrumental variables."
+            "measurement noise in the velocities, which biases least squares."
         )
     if (lag > 0.25).any():
         sentences.append(
@@ -71,13 +71,8 @@ def advice(content: EstimateContent) -> list[str]:
         )
     if not best.stable:
         sentences.append(
-            "No estimate can simulate every run, so none is ready for use. Try output error with a horizon "
-            "(--method oe --horizon 30, or oe-air with measured wind): it needs only short simulations and often gives "
-            "a stable model. Runs with smaller unmodelled effects help too."
-        )
-    elif not best.uses_instruments and not best.method.name.startswith("oe"):
-        sentences.append(
-            f"No instrumental-variable estimate is stable, so the vessel file holds the one by {best.method.title}."
+            "No estimate can simulate every run, so none is ready for use. Runs with smaller unmodelled effects help, "
+            "and a model with fewer terms."
         )
     return sentences
 

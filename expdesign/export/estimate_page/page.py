@@ -11,7 +11,14 @@ from expdesign.export import words
 from expdesign.export.estimate_page.advice import advice, conditions, summary
 from expdesign.export.estimate_page.content import EstimateContent
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
-from expdesign.export.files import disturbance_table, fit_table, motion_words, plus_minus
+from expdesign.export.files import (
+    disturbance_table,
+    fit_table,
+    motion_words,
+    plus_minus,
+    prediction_table,
+    prediction_title,
+)
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.export.tuning import TUNING
@@ -57,6 +64,8 @@ def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> s
         summary=summary(content),
         parameters=parameter_rows(content),
         fits=fit_table(found),
+        predictions=prediction_table(found),
+        prediction_title=prediction_title(found),
         motion=motion_words(found),
         disturbances=disturbance_table(found),
         limits=limit_rows(found),

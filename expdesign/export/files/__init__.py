@@ -11,11 +11,14 @@ if TYPE_CHECKING:
     from expdesign.export.files.estimate_tables import (
         breach_sentences,
         estimate_warnings,
+        failure_rows,
         fit_table,
         limit_table,
         motion_words,
         parameter_table,
         plus_minus,
+        prediction_table,
+        prediction_title,
         unstable_warning,
     )
     from expdesign.export.files.estimates import (
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
         fit_entries,
         limit_entries,
         parameter_entries,
+        prediction_entries,
         rows_entry,
         steered_entry,
     )
@@ -47,6 +51,7 @@ __all__ = [
     "estimate_json",
     "estimate_warnings",
     "estimated_vessel",
+    "failure_rows",
     "finite",
     "fit_entries",
     "fit_table",
@@ -58,6 +63,9 @@ __all__ = [
     "parameter_table",
     "plan_json",
     "plus_minus",
+    "prediction_entries",
+    "prediction_table",
+    "prediction_title",
     "record_csv",
     "recorded_dictionary_json",
     "replan_json",
@@ -80,8 +88,11 @@ if not TYPE_CHECKING:
             "estimate_tables": (
                 "breach_sentences",
                 "estimate_warnings",
+                "failure_rows",
                 "fit_table",
                 "limit_table",
+                "prediction_table",
+                "prediction_title",
                 "motion_words",
                 "parameter_table",
                 "plus_minus",
@@ -90,6 +101,7 @@ if not TYPE_CHECKING:
             "estimates": (
                 "estimate_json",
                 "estimated_vessel",
+                "prediction_entries",
                 "fit_entries",
                 "limit_entries",
                 "parameter_entries",

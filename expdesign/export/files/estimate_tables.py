@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from expdesign.assessment import Assessed, Assessment, RunCheck, sentence
+from expdesign.assessment.held_out import ranked
 from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
 from expdesign.estimation.excitation import Breach
 from expdesign.export import words
@@ -30,7 +31,7 @@ def unstable_warning(found: Assessment) -> tuple[str, ...]:
     return (
         f"The ship is unstable under the recorded inputs in {', '.join(runs)}: with this estimate an initial error of "
         f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {ASSESSMENT_TUNING.ahead_s:g} s "
-        "prediction. Output error needs a horizon (--horizon) with them.",
+        "prediction.",
     )
 
 
@@ -66,6 +67,34 @@ def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]
         for index, run in enumerate(found.best.runs)
     ]
     return ("run", "use", *(f"{item.method.name}: {outputs}" for item in found.methods)), rows
+
+
+def prediction_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: errors of predictions by method, in per cent of the standard deviation, the best first."""
+    rows = [
+        (item.label, *(_error(share) for share in item.shares.tolist()), _error(item.share))
+        for item in (found.compared[place] for place in ranked(found.compared))
+    ]
+    return ("method", *found.best.model.outputs, "together"), rows
+
+
+def failure_rows(found: Assessment) -> list[tuple[str, ...]]:
+    """Methods that gave no estimate, or were not tried, and why."""
+    return [*((label, str(error)) for label, error in found.failures), *(("oe", note) for note in found.notes)]
+
+
+def prediction_title(found: Assessment) -> str:
+    """What that table shows."""
+    of = "runs left out of the estimate" if all(item.unseen for item in found.compared) else "the runs used"
+    return f"Errors of predictions {ASSESSMENT_TUNING.ahead_s:g} s ahead of {of}, in per cent of the standard deviation"
+
+
+def _error(share: float) -> str:
+    if math.isnan(share):
+        return "-"
+    if share >= ASSESSMENT_TUNING.largest_error:
+        return f"over {100 * ASSESSMENT_TUNING.largest_error:g}"
+    return f"{100 * share:.1f}"
 
 
 def limit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,9 @@ from expdesign.export.files.text import finite, named_finite, strict_json
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+COMMENT_WIDTH = 110
+"""Characters of a line of comments."""
 
 
 def estimate_json(found: Assessment, vessel: Vessel) -> str:
@@ -37,6 +41,8 @@ def _method_entry(found: Assessment, item: Assessed, vessel: Vessel) -> dict[str
         ),
         "current_to": _current(item),
         "disturbances": disturbance_entries(item),
+        "horizon_s": item.horizon_s,
+        "predictions": prediction_entries(found, item),
         "form": model.form,
         "parameters_of": found.motion,
         "prior": found.prior,
@@ -66,6 +72,15 @@ def parameter_entries(item: Assessed) -> dict[str, Any]:
     return _valued(item.estimate.names, item.estimate.values, item.estimate.std)
 
 
+def prediction_entries(found: Assessment, item: Assessed) -> dict[str, Any]:
+    """{method with horizon: errors over standard deviations} of predictions of what was left out."""
+    return {
+        own.label: {**named_finite(own.outputs, own.shares), "together": finite(own.share), "unseen": own.unseen}
+        for own in found.compared
+        if own.method is item.method
+    }
+
+
 def fit_entries(item: Assessed) -> dict[str, Any]:
     """Fit of the simulated output [per cent] by use, run and output."""
     return _per_run(item.runs, "fit_percent")
@@ -80,9 +95,8 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
     comments = [
         f"Parameters estimated by {best.method.title} ({best.method.name}) from",
         f"{files}{more}.",
-        "This is the first of the requested methods with instruments whose model can simulate every run; without",
-        "instruments, the first that can. Reason: noisy regressors bias least squares. The other estimates are in",
-        "estimate.json. parameter_std holds the standard deviations of the estimates.",
+        *textwrap.wrap(found.why, COMMENT_WIDTH),
+        "The other estimates are in estimate.json. parameter_std holds the standard deviations of the estimates.",
         motion_words(found),
         *([f"Fixed parameters, without standard deviation: {held}."] if held else []),
         *(["Dead times and lags in [std] are those that output error found."] if best.std != vessel.std else []),

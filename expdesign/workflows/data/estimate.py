@@ -15,12 +15,16 @@ from expdesign.export import (
     estimate_json,
     estimate_warnings,
     estimated_vessel,
+    failure_rows,
     fit_entries,
     fit_table,
     limit_entries,
     limit_table,
     parameter_entries,
     parameter_table,
+    prediction_entries,
+    prediction_table,
+    prediction_title,
     rows_entry,
     steered_entry,
     write_files,
@@ -134,12 +138,15 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
         "samples": sum(len(batch) for batch in batches),
         "runs_kept_apart": len(found.tests.batches),
         "vessel_file_holds": found.best.method.name,
+        **({"why": found.why} if found.why else {}),
         "parameters_of": found.motion,
         "what_limits_the_fit": limit_entries(found),
         "methods_left_out": list(found.left_out),
         "methods": {
             item.method.name: {
                 "parameters": parameter_entries(item),
+                "horizon_s": item.horizon_s,
+                "predictions": prediction_entries(found, item),
                 "fit": fit_entries(item),
                 "samples_used": item.estimate.residuals.rows,
                 "samples_used_by_equation": rows_entry(item),
@@ -153,10 +160,13 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
 
 def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
     tables = [
+        *([(prediction_title(found), prediction_table(found))] if found.compared else []),
         ("Estimates, with standard deviations", parameter_table(found)),
         ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
         (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
     ]
+    if found.left_out:
+        tables.insert(0, ("Methods without an estimate", (("method", "why"), failure_rows(found))))
     disturbances = disturbance_table(found)
     if disturbances[1]:
         tables.append(("Current and wind, with standard deviations", disturbances))
