@@ -172,7 +172,7 @@ def test_runs_held_out_do_not_influence_the_estimates_they_validate(barge):
     apart = _fitted(whole, corrupted, some)
     assert apart is not None
     assert abs(whole.value("gain") - alone.value("gain")) > 10 * alone.std("gain")
-    assert abs(apart.get("gain") - alone.value("gain")) < alone.std("gain")
+    assert abs(apart.get("gain") - alone.value("gain")) < 2 * alone.std("gain")
 
 
 def test_a_change_that_comes_after_the_data_of_a_fold_is_no_part_of_its_fit(barge):

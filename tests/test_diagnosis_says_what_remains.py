@@ -107,7 +107,7 @@ def test_a_cause_stays_that_is_found_with_the_last_of_the_work(monkeypatch: pyte
         return 0
 
     monkeypatch.setattr(forward_selection, "_to_reject", first_of_two)
-    hidden = {"effects": {"gain": -0.3}, "faults": {"heading_bias": 0.1}}
+    hidden = {"effects": {"gain": -0.1}, "faults": {"heading_bias": 0.1}}
     record = hidden_record("barge", seed=6, batches=3, samples=200, **hidden)
     ship = extended_model(vessel_of("barge"), record)
     windows = cut_windows(ship.model, record)
