@@ -138,12 +138,12 @@ import signal
 import sys
 from expdesign.cli import main
 real = builtins.__import__
-def pressed(name, *rest):
+def pressed(name, *rest, **named):
     if name == {module!r}:
         signal.raise_signal(signal.SIGINT)
-        real(name, *rest)
+        real(name, *rest, **named)
         builtins.__import__ = real
-    return real(name, *rest)
+    return real(name, *rest, **named)
 builtins.__import__ = pressed
 status = main(["plan", "none.toml"])
 assert builtins.__import__ is real

@@ -84,7 +84,8 @@ def test_a_current_shows_by_heading_before_any_cause_is_named():
 def test_a_stretch_shows_the_acceleration_that_is_missing():
     """Yaw acceleration g tau_x too much: after t the rate is off by g tau_x (1 - exp(-d t)) / d, with the damping d.
 
-    Less what the initial state takes off the first five samples. What sway does to yaw beside it, and orders that change in a stretch, leave the comparison good to a seventh.
+    Less what the initial state takes off the first five samples. What sway does to yaw beside it, and orders that
+    change in a stretch, leave the comparison good to a seventh.
     """
     record = hidden_record("barge", seed=3, batches=4, samples=200)
     ship = extended_model(vessel_of("barge"), record)
