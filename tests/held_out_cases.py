@@ -20,7 +20,9 @@ def steps_of(*keys: str) -> Selection:
     """A search that found one cause for every key."""
     steps = [
         SimpleNamespace(
-            chosen=SimpleNamespace(parameters=(), keys=(key,), fit=key, candidate=Candidate(cause="current", free={key: 0.0})),
+            chosen=SimpleNamespace(
+                parameters=(), keys=(key,), fit=key, candidate=Candidate(cause="current", free={key: 0.0})
+            ),
             tests=(key,), p_value=1e-4,
         )
         for key in keys

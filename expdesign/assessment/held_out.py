@@ -76,10 +76,10 @@ def ranked(found: Sequence[HeldOut]) -> list[int]:
     """Indices, the best first; of errors that count as equal, the least biased first."""
     least = min((item.share for item in found), default=0.0)
 
-    def place(index: int) -> tuple[bool, float]:
+    def place(index: int) -> tuple[bool, int, float]:
         item = found[index]
         equal = item.share <= (1.0 + TUNING.same_error) * least
-        return not equal, UNBIASED.index(item.method.solver) if equal else item.share
+        return not equal, UNBIASED.index(item.method.solver) if equal else 0, item.share
 
     return sorted(range(len(found)), key=place)
 
@@ -101,9 +101,9 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     text = f"predicts {data} {TUNING.ahead_s:g} s ahead with an error of {_bounded(own.share)}"
     if own is least:
         text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
-    elif own is order[0]:
+    elif own is order[0] and own.method.solver != least.method.solver:
         text += f", {least.label} with {_bounded(least.share)}; noise of the sensors biases {own.label} less"
-    else:
+    elif own is not order[0]:
         text += f"; the model of {order[0].label} cannot simulate every run"
     return f"{text}; output error starts from it" if asked and own.method.name not in asked else text
 

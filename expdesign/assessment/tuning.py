@@ -34,7 +34,7 @@ class Tuning:
     same_error: float = 0.02
     most_folds: int = 4
     smallest_error: float = 1e-4
-    largest_error: float = 3.0
+    largest_error: float = 1.0
     worth_whole: float = 1.5
     most_by_itself: int = 20_000
     unstable_growth: float = 5.0

@@ -174,7 +174,10 @@ def _current(problem: Stretches, drive: ca.SX, values: ca.SX) -> tuple[tuple[Any
 def _at_times(problem: Stretches, drive: ca.SX, values: ca.SX) -> ca.SX:
     """What acts after the changes of times, without the derivatives by them."""
     width, first = drive_width(len(problem.model.inputs), problem.parts), problem.values - len(problem.times)
-    acting, wind = drive[:width], drive[width * (1 + len(problem.times)) :]
+    acting, wind = (
+        drive[:width],
+        drive[width * (1 + len(problem.times)) :, 0],
+    )  # a single row alone has no rest to slice
     for index in range(len(problem.times)):
         acting += values[first + index] * drive[width * (1 + index) : width * (2 + index)]
     return ca.vertcat(acting, wind)
