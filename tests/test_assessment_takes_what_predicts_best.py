@@ -144,7 +144,7 @@ def test_the_least_error_decides_and_of_equal_ones_the_least_bias(shares: dict[s
 
 
 def test_starts_of_stretches_stay_within_the_sensors_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A force that nobody recorded, a hundred times the noise: starts that answer it would hide what the model lacks."""
+    """A force that nobody recorded, a hundred times the noise: starts that answer it would hide what is lacking."""
     ends = []
     search = minimise.minimised
 
