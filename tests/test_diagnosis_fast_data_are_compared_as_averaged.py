@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 import hidden_effects as sea
+from clean_trials import SHIP_50M, at_rate, clean_trial
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows, fastest_rate
 from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
+from expdesign.vessel import Limit, Sensors
 
 CALM = sea.Weather(current_std=0.0, wind_std=0.0)
 IDEAL = sea.Sensors(position=0.0, heading=0.0, velocity=0.0, yaw_rate=0.0, wind=0.0)
+LIMITS = Limit(low=-12.0, high=12.0), Limit(low=-1.0, high=1.0)
 START = 60
 """Compared samples that it takes to forget a first state read from a straight line."""
 
@@ -43,6 +46,18 @@ def test_nothing_is_left_over_where_the_model_is_right(step_s, pose):
     known = np.isfinite(windows.measured[:, START:]).any(axis=(0, 1))
     left = np.sqrt(np.nanmean(motion.error[:, START:, known] ** 2, axis=(0, 1)))
     assert (left < 0.0025 * np.nanstd(windows.measured[:, START:, known], axis=(0, 1))).all()
+
+
+@pytest.mark.parametrize("vessel", [vessel_of("tug"), SHIP_50M, at_rate(SHIP_50M, 0.1)], ids=["tug", "1 Hz", "10 Hz"])
+def test_nothing_is_left_over_from_the_first_sample_on_or_where_orders_change(vessel):
+    """From rest, without noise: 0.1 mm/s and as much of yaw at the bow, where a straight line missed 50 mm/s."""
+    if vessel.name == "tug":
+        actuators = tuple(replace(one, limits=LIMITS) for one in vessel.model.actuators)
+        vessel = replace(vessel, model=replace(vessel.model, actuators=actuators))
+    record = clean_trial(replace(vessel, sensors=Sensors()), np.random.default_rng(1), runs=2, run_s=150.0)
+    ship = extended_model(vessel, record)
+    left = np.sqrt(np.nanmean(simulate_from_measured(ship, cut_windows(ship.model, record)).error ** 2, axis=(0, 1)))
+    assert (left[:3] * [1.0, 1.0, vessel.length_m / 2] < 1e-4).all()
 
 
 def test_commands_are_followed_as_recorded_not_as_averaged():
