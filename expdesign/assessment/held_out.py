@@ -1,9 +1,9 @@
 """Which estimate predicts best: errors of predictions from measured states, on runs that an estimate has not seen.
 
-Runs are left out in turn, or each half of a single one, and every method estimates from the rest. Its model then
-predicts what was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states would hide a
-useless model, and one simulation of a whole run tells more of the ship's stability than of the model. An error is over
-the standard deviation of the measured output, so 1 is no better than a constant; runs and outputs are joined by
+Runs are left out in turn, or pieces of a few, and every method estimates from the rest. Its model then predicts what
+was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states would hide a useless model,
+and one simulation of a whole run tells more of the ship's stability than of the model. An error is over the standard
+deviation of the measured output; 1 is no better than a constant, and more counts as 1. Runs and outputs are joined by
 geometric means, in which no single one decides. Errors that differ by less than `Tuning.same_error` of themselves count
 as equal. Of such methods the one goes first that noise in the measured velocities does not bias: instrumental
 variables, then output error, then least squares.
@@ -13,6 +13,7 @@ Source: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147,
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -114,18 +115,26 @@ def _bounded(share: float) -> str:
 
 
 def folds(record: Record) -> Iterator[tuple[Record, Record]]:
-    """(estimate from, predict): every run left out once, several at a time where there are many; halves of one run."""
-    batches = record.batches
-    if len(batches) == 1:
-        middle = len(batches[0]) // 2
-        batches = (batches[0].cut(slice(0, middle)), batches[0].cut(slice(middle, len(batches[0]))))
-    count = min(len(batches), TUNING.most_folds)
+    """(estimate from, predict): every run left out once, several at a time where there are many.
+
+    Few runs are cut, so that what is left is most of the data, but not into pieces shorter than a prediction.
+    """
+    pieces = [piece for batch in record.batches for piece in _cut(batch, -(-TUNING.most_folds // len(record.batches)))]
+    count = min(len(pieces), TUNING.most_folds)
     for number in range(count):
         rest, apart = (
-            tuple(batch for place, batch in enumerate(batches) if (place % count == number) is left_out)
+            tuple(piece for place, piece in enumerate(pieces) if (place % count == number) is left_out)
             for left_out in (False, True)
         )
         yield replace(record, batches=rest), replace(record, batches=apart)
+
+
+def _cut(batch: Batch, most: int) -> list[Batch]:
+    """Pieces of equal length; two at least where more than one is asked for."""
+    lasts = int(len(batch) * batch.sample_time_s / TUNING.ahead_s)
+    count = max(min(most, lasts), min(most, 2))
+    ends = [round(len(batch) * number / count) for number in range(count + 1)]
+    return [batch.cut(slice(first, end)) for first, end in itertools.pairwise(ends)]
 
 
 Refit = Callable[[Record], VesselModel]
@@ -230,7 +239,7 @@ class Ahead:
         counts = np.array([len(rows) for rows in measured])
         self._measured, drive = _stacked(measured, counts.max(), np.nan), _stacked(drives, counts.max(), None)
         self.owners: Integers = np.array(owners)
-        self._spread = np.stack([whole(batch.velocity[:, self._places]).std(axis=0) for batch in batches])
+        self._spread = np.stack([self._of_run(batch, batches) for batch in batches])
         self._compiled: Compiled = compiled(
             Stretches(
                 model=driven,
@@ -245,6 +254,11 @@ class Ahead:
                 counts=counts,
             )
         )
+
+    def _of_run(self, batch: Batch, batches: Sequence[Batch]) -> Array:
+        """(n,) standard deviations of a run, of all its pieces, which have its name."""
+        pieces = [whole(own.velocity[:, self._places]) for own in batches if own.name == batch.name]
+        return np.asarray(np.concatenate(pieces).std(axis=0))
 
     def shares(self, models: Sequence[VesselModel | None]) -> Array:
         """(runs, n) errors over standard deviations, each run by a model of its own; at most `Tuning.largest_error`."""
