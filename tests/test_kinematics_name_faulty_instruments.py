@@ -77,7 +77,12 @@ def through_water(log: Log) -> Log:
     }
 
 
+def late(name: str, samples: int) -> Callable[[Log], Log]:
+    return lambda log: {**log, name: np.concatenate([np.full(samples, log[name][0]), log[name][:-samples]])}
+
+
 FAULTS: dict[str, tuple[Callable[[Log], Log], float]] = {
+    "yaw_rate_delay_s": (late("r_radps", 3), 1.2),
     "yaw_rate_scale": (scaled("r_radps", by=0.95), 0.95),
     "yaw_rate_bias_radps": (lambda log: {**log, "r_radps": log["r_radps"] + 0.006}, 0.006),
     "velocity_scale": (scaled("u_mps", "v_mps", by=0.95), 0.95),
@@ -127,6 +132,14 @@ def test_a_ship_that_turns_against_her_rudder_is_told(
         (doubt,) = read(tmp_path, log, ship, names).doubts
         assert doubt.startswith("log.csv: the ship turns against the rudder: ")
         assert "Is rudder1 positive to port, or a sign wrong in [model.parameters]?" in doubt
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "random"])
+def test_radians_under_the_name_of_degrees_are_told(tmp_path: Path, ship: Vessel, kind: str) -> None:
+    for log in voyages(COUNT, kind, gust=0.5):
+        log["rudder1_rad"] = np.radians(log["rudder1_rad"])
+        (doubt,) = read(tmp_path, log, ship).doubts
+        assert doubt.endswith("times with rudder1 57.3 times as large: radians under the name of degrees?")
 
 
 def test_the_rudder_sign_is_the_vessel_files_and_no_convention(tmp_path: Path) -> None:

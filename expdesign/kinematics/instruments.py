@@ -44,7 +44,7 @@ class Finding:
 
 
 def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterator[Finding]:
-    """Scale and bias of the yaw rate, and the heading's delay, by the change of heading."""
+    """Scale, bias and delay of the yaw rate, by the change of heading."""
     own = [batch for batch in batches if batch.pose is not None and "r" not in batch.derived]
     found = relation(stretches(own, [_turning(batch) for batch in own], length_m=length_m))
     if found is None:
@@ -63,6 +63,13 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
             name="yaw_rate_bias_radps", value=bias, std=std, rest=found.rest,
             text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of "
             "a gyro?",
+        )  # fmt: skip
+    delay, std = -float(found.others[1].real), float(found.others_std[1, 0])
+    if abs(delay) > max(TUNING.certain * std, TUNING.delay_matters * own[0].sample_time_s):
+        later, sooner = ("r_radps", "the heading")[:: 1 if delay > 0 else -1]
+        yield Finding(
+            name="yaw_rate_delay_s", value=delay, std=std, rest=found.rest,
+            text=f"{later} comes {with_std(abs(delay), std)} s later than {sooner}.",
         )  # fmt: skip
 
 

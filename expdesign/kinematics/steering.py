@@ -10,6 +10,9 @@ record, or the parameter's in the vessel file, k is negative: no convention of e
 A turning circle by itself does not tell k apart from the ship's damping; there the turn itself must be the other way,
 by more than a quarter of a circle while the input is held.
 
+Where k is far above one, and about one with the inputs in the other unit of their kind, the column has the name of the
+wrong unit.
+
 Inputs that answer the ship are no trouble as long as they explain her changes: a helmsman against a gust moves the
 rudder against the turn, but then the rudder does not explain it, and nothing is said.
 """
@@ -39,10 +42,16 @@ GROUPS = (
     ("force", 0, ("tau_x",), "the ship goes against the force", "negative ahead"),
 )
 """Kind of actuator, equation, stems of signals, what is seen where the answer is opposite, and the likely reason."""
+UNITS = {
+    "rudder": (180.0 / np.pi, "radians under the name of degrees"),
+    "propeller": (60.0, "revolutions per second under the name of revolutions per minute"),
+}
+"""Factor between the units of an input and the mistake by which it is recorded so much too small. Too large ones are
+beyond the actuators' limits, which is told where records are read."""
 
 
 def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: float) -> Iterator[Finding]:
-    """Groups of inputs that the ship answers in the opposite sense.
+    """Groups of inputs that the ship answers in the opposite sense, or as if they were recorded in another unit.
 
     Args:
         batches: at the reference point, with delivered inputs.
@@ -73,6 +82,17 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
                     text=f"{seen}: the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel "
                     f"file's model gives. {question}",
                 )  # fmt: skip
+            if abs(answer) > high and kind in UNITS:
+                times, mistake = UNITS[kind]
+                larger = [_answers(batch, model, axis, places, times) for batch in batches]
+                then = relation(stretches(batches, larger, length_m=length_m))
+                if then is not None and 1.0 / TUNING.alike < then.ratio.real < TUNING.alike:
+                    yield Finding(
+                        name=f"unit_of_{kind}", value=answer, std=std, rest=found.rest,
+                        text=f"the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel file's "
+                        f"model gives, and {with_std(then.ratio.real, then.std[0])} times with {names} {times:.3g} "
+                        f"times as large: {mistake}?",
+                    )  # fmt: skip
         elif found is None and OUTPUTS[axis] == "r":
             turned = np.concatenate([_turned(rows) for rows in answers])
             against = -float(turned[turned < 0].sum())
@@ -92,9 +112,10 @@ def _turned(answers: Array) -> Array:
     return np.array([part.sum() for part in np.split(sense * turn, ends)])
 
 
-def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int]) -> Array:
-    """(k, 5) running velocity, integrals of the inputs' share and of the rest, of the velocity, and of time."""
-    inputs = inputs_of(model, batch)
+def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int], times: float = 1.0) -> Array:
+    """(k, 5) running velocity, integrals of the share of inputs so large and of the rest, of the velocity, of time."""
+    inputs = inputs_of(model, batch).copy()
+    inputs[:, places] *= times
     neutral = inputs.copy()
     neutral[:, places] = 0.0
     moving = batch.velocity if batch.wind is None else np.where(np.isfinite(batch.velocity), batch.velocity, 0.0)

@@ -47,6 +47,7 @@ class Tuning:
         turning: drift expected in turns [rad], root mean square, from which heading and course can be told apart.
         opposed: least and most size of an answer to an input, in units of the model's, that has the wrong sign.
         opposed_share: share of the changes that the input explains then.
+        alike: factor from one within which an answer is that of the model.
         turned_rad, turned_share: turn against a held input, and its share of all turns, that count as opposed.
         pushing: share of an input's largest effect below which it is not held to any side.
     """
@@ -87,6 +88,7 @@ class Tuning:
     turning: float = 0.02
     opposed: tuple[float, float] = (0.1, 10.0)
     opposed_share: float = 0.3
+    alike: float = 3.0
     turned_rad: float = 1.6
     turned_share: float = 0.95
     pushing: float = 0.1
