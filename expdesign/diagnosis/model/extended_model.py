@@ -53,7 +53,7 @@ class ExtendedModel:
         library: terms that the model lacks, by name.
         draught_m, length_m, beam_m: of the ship [m].
         derived: those of u, v, r that the data derive from the pose, by its sensors.
-        shoalest: largest draught over depth in the data, 0 where no depth is known.
+        max_draught_over_depth: largest draught over depth in the data, 0 where no depth is known.
         effects: key -> value; others are zero.
         stated: effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of.
     """

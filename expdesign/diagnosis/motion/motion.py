@@ -21,10 +21,10 @@ class Motion:
     Attributes:
         ship: the simulated model.
         windows: the data it is compared with.
-        around: exogenous signals.
+        exogenous: exogenous signals.
         states: (w, k, n) at integrator steps.
-        turned: (w, k) heading since the start [rad].
-        shown: (w, s, 4) sensor outputs.
+        heading_change: (w, k) heading since the start [rad].
+        predicted: (w, s, 4) sensor outputs.
     """
 
     ship: ExtendedModel
@@ -56,9 +56,9 @@ class LinearisedMotion:
 
     Attributes:
         motion: the simulation.
-        onward: (w, k - 1, n, n) transition over each step.
-        driven: (w, k - 1, n, n) effect of a constant acceleration over each step.
-        slopes: (w, k, n) rates along the path at both ends of every step with its inputs, stacked (2, w, k - 1, n).
+        transition: (w, k - 1, n, n) transition over each step.
+        forcing: (w, k - 1, n, n) effect of a constant acceleration over each step.
+        path_rates: (w, k, n) rates along the path at both ends of every step with its inputs, stacked (2, w, k - 1, n).
     """
 
     motion: Motion

@@ -16,7 +16,7 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
         ship: its sensors.
         states: (w, k, n) at integrator steps.
         windows: measured channels and times.
-        turned: (w, k) heading since the start; integrated from the yaw rate when None.
+        heading_change: (w, k) heading since the start; integrated from the yaw rate when None.
     """
     u, v, r = np.moveaxis(states[:, :: windows.steps_per_sample, :3], -1, 0)
     finer = windows.rows_per_step

@@ -31,7 +31,7 @@ def simulate_windows(
         ship: model and effects.
         windows: w windows.
         start: (w, n) initial states.
-        near: linearised motion of a similar ship; it speeds up the simulation and does not change it.
+        warm_start: linearised motion of a similar ship; it speeds up the simulation and does not change it.
     """
     return _simulated(ship, windows, _exogenous_near(ship, windows, warm_start), start, warm_start)
 

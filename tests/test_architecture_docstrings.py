@@ -1,0 +1,60 @@
+"""Docstrings name what exists: every argument and attribute that one describes."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1] / "expdesign"
+ENTRY = re.compile(r"^( +)([A-Za-z_][\w, ]*): ")
+"""Indented names, before what they are."""
+
+
+def described(docstring: str, section: str) -> list[str]:
+    """Names in a section: those of its least indented lines."""
+    _, found, rest = docstring.partition(f"{section}:\n")
+    if not found:
+        return []
+    block = re.split(r"\n[ ]*\n|\n +[A-Z]\w+:\n", rest)[0]
+    entries = [match for line in block.splitlines() if (match := ENTRY.match(line))]
+    least = min((len(match[1]) for match in entries), default=0)
+    return [name.strip() for match in entries if len(match[1]) == least for name in match[2].split(",")]
+
+
+def arguments(node: ast.FunctionDef) -> set[str]:
+    own = node.args
+    every = [*own.posonlyargs, *own.args, *own.kwonlyargs, *filter(None, (own.vararg, own.kwarg))]
+    return {one.arg for one in every}
+
+
+def attributes(node: ast.ClassDef) -> set[str]:
+    """Fields, properties, and what methods set."""
+    names = set()
+    for item in ast.walk(node):
+        match item:
+            case ast.AnnAssign(target=ast.Name(id=name)) | ast.FunctionDef(name=name):
+                names.add(name)
+            case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.Assign(targets=targets):
+                names |= {one.id for one in targets if isinstance(one, ast.Name)}
+    return names
+
+
+def unknown(path: Path) -> Iterator[str]:
+    """Names in the docstrings of a file that do not exist."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.FunctionDef():
+                names, section = arguments(node), "Args"
+            case ast.ClassDef(bases=[]):
+                names, section = attributes(node), "Attributes"
+            case _:
+                continue
+        for name in described(ast.get_docstring(node) or "", section):
+            if name not in names:
+                yield f"{path.relative_to(PACKAGE)}: {node.name}: {name}"
+
+
+def test_what_docstrings_name_exists() -> None:
+    assert [name for path in sorted(PACKAGE.rglob("*.py")) for name in unknown(path)] == []
