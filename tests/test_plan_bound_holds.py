@@ -16,6 +16,7 @@ from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, lea
 from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegTask
 from expdesign.plan.legs.water import leg_speed_mps, through_water
+from expdesign.plan.values import UnderWay
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate, to_body
 from expdesign.vessel import NUMPY
@@ -236,6 +237,30 @@ def test_with_and_against_a_current_the_bound_is_the_distance_by_the_speed_over_
     )
     truth = 400 / (leg_speed_mps(1.3, ()) + 0.2 * along)
     assert bound_s == pytest.approx(truth, abs=1e-6)
+
+
+def test_what_is_lost_by_stopping_is_lost_through_water():
+    """A ship at full speed comes to rest: she sails her way less what stopping loses, and the water carries her on."""
+
+    def bound_s(current: float) -> float:
+        return reposition_bound_s(
+            ship(),
+            area(OPEN),
+            Environment(current_to=np.array([0.0, current])),
+            clearance_m=20.0,
+            primitives=(),
+            repeats={},
+            ends=ENDS,
+            transit_mps=1.3,
+            yaw_rate_radps=0.1,
+            under_way=UnderWay(velocity=np.array([1.3, current, 0.0]), inputs=np.zeros(len(ship().limits))),
+        )
+
+    speed = leg_speed_mps(1.3, (np.array([1.3, 0.0]),))
+    lost_m = speed * bound_s(0.0) - 400
+    assert lost_m > 0
+    for current in (0.1, 0.3):
+        assert bound_s(current) == pytest.approx((400 + lost_m) / (speed + current), rel=1e-9)
 
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (2, 1, 2), (3,), (1, 4)])
