@@ -1,5 +1,6 @@
 """The verdict says what the simulation lacks, how much the error falls, and what would distinguish causes."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from expdesign.diagnosis import CAUSES
 from expdesign.diagnosis.accuracy.simulated_fit import Accuracy
 from expdesign.diagnosis.conclusions.findings import error_reductions_of
 from expdesign.diagnosis.conclusions.notes import note_on_random_current
-from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, verdict
+from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, doubted, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead
@@ -149,3 +150,11 @@ def test_causes_that_would_harm_the_simulation_are_said_in_one_sentence():
     assert text.startswith("No cause of the remaining error is certain: the fit is 60 %")
     assert text.endswith(f"{said}.")
     assert said in verdict([finding("current")], BEFORE, refused=["wind"])
+
+
+@pytest.mark.parametrize("fault", ["the gyro is late.", "is the rudder positive to port?", "read every 5 s"])
+def test_a_fault_of_the_record_is_one_sentence_before_the_verdict(fault):
+    said = doubted([fault, "another"])
+    assert re.fullmatch(r"Look at the record first: [^.?]+[.?] ", said)
+    assert said.endswith("? ") == fault.endswith("?")
+    assert doubted([]) == ""

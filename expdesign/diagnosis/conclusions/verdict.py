@@ -167,7 +167,7 @@ def verdict(
 
 def doubted(faults: Sequence[str]) -> str:
     """What is to be looked at before any cause is believed: the first fault of the record itself; "" without any."""
-    return "".join(f"Look at the record first: {fault.rstrip('.')}. " for fault in faults[:1])
+    return "".join(f"Look at the record first: {fault}{'' if fault[-1] in '.?' else '.'} " for fault in faults[:1])
 
 
 def _sentences(texts: Sequence[str]) -> str:
