@@ -214,7 +214,7 @@ def sentence(limits: Limits, run: RunCheck) -> str:
         return tail
     parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
     if max(abs(share) for _, share in causes) > TUNING.cancelling_share:
-        parts = "large parts of opposite sign that nearly cancel, so no single cause can be named"
+        parts = "parts of opposite sign, so no single cause can be named"
     doubt = limits.parameters[worst]
     uncertain = f" Parameter uncertainty explains {f'{100 * doubt:.0f} %' if not doubt >= 1 else 'all of it'}."
     ceiling = limits.ceiling_percent[worst]
