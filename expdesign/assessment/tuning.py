@@ -19,7 +19,7 @@ class Tuning:
         worth_whole: runs so many horizons long are compared with simulations of their whole length too.
         most_by_itself: samples, averaged, up to which output error is tried without being asked for.
         unstable_growth: growth of an error over a run above which the ship is unstable.
-        cancelling_share: share of the squared misfit above which its parts have opposite signs, so that their sizes have no
+        cancelling_share: share of the squared misfit above which its parts have opposite signs, and their sizes no
             meaning.
         method_work, prediction_work, decomposition_work: how long one method takes, predictions of what is left out and
             the decomposition, for the progress told.
