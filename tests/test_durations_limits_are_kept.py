@@ -52,6 +52,10 @@ def check(design: DurationDesign, draw: int) -> None:
         assert seconds[4] < 1e-6
         assert seconds.sum() <= 300.0 + 1e-6
     assert design.gap_relative < 1e-6
+    net, level = design.sensitivities - design.certificate.prices, design.certificate.level
+    assert (net <= level + 1e-3 * abs(level)).all()  # after the prices of its limits no run is worth more time
+    within = (design.durations_s > 25.0 + 1e-3) & (runs > 0)
+    np.testing.assert_allclose(net[within], level, rtol=1e-3)
 
 
 @pytest.mark.parametrize("draw", range(10))

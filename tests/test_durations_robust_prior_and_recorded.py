@@ -9,6 +9,8 @@ import pytest
 from design_case import duration_problem, example_dictionary, random_matrices, scored_example, vessel
 from expdesign.durations import (
     Aim,
+    Budget,
+    Constraints,
     DurationProblem,
     best_subset,
     build_durations,
@@ -38,16 +40,28 @@ def values(problem: DurationProblem, w: Array) -> Array:
     return np.array([np.linalg.slogdet(np.tensordot(w, stack, axes=1))[1] for stack in problem.sampled])
 
 
+@pytest.mark.parametrize("limited", [False, True])
 @pytest.mark.parametrize("robust", ["average", "worst"])
-def test_no_design_is_better_over_the_models_than_the_bound(robust: str):
+def test_no_design_is_better_over_the_models_than_the_bound(robust: str, limited: bool):
+    """By random mixtures with the optimum, of which those count that keep to the limits."""
     problem = replace(several(), robust=robust)
+    name, other = (problem.names[place] for place in np.argsort(-optimal_shares(problem).fractions)[:2])
+    if limited:
+        cost = Budget(name="energy", cost_per_s={other: 2.0}, limit=0.2 * problem.total_s)
+        problem = replace(problem, constraints=Constraints(most_s={name: 0.1 * problem.total_s}, budgets=(cost,)))
     design = optimal_shares(problem)
     over = np.mean if robust == "average" else np.min
     assert design.gap_relative < 1e-6
     assert design.certificate.value == pytest.approx(over(values(problem, design.fractions)), abs=1e-8)
     assert design.certificate.mixture.sum() == pytest.approx(1.0)
+    own, costly = problem.names.index(name), problem.names.index(other)
+    tried = 0
     for w in np.random.default_rng(0).dirichlet(np.full(10, 0.7), 300):
-        assert over(values(problem, 0.9 * design.fractions + 0.1 * w)) <= design.certificate.bound + 1e-9
+        mixed = 0.9 * design.fractions + 0.1 * w
+        if not limited or (mixed[own] <= 0.1 and 2.0 * mixed[costly] <= 0.2):
+            tried += 1
+            assert over(values(problem, mixed)) <= design.certificate.bound + 1e-9
+    assert tried > 10
 
 
 def test_models_with_a_weight_in_the_worst_case_are_the_worst_ones():
