@@ -224,11 +224,12 @@ def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:
 
 def _findings(chosen: Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
     """Findings in the order of the selection."""
+    before = [chosen.compared_with(seed)[0], *chosen.held[1:]] if chosen.kept.steps else []
     return tuple(
         finding_of(
             step,
             chosen.kept.last,
-            (chosen.held[index], chosen.held[index + 1]),
+            (before[index], chosen.held[index + 1]),
             seed,
             windows,
             would_tell_apart=_discriminating(step, proposals, windows),
@@ -243,7 +244,7 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
         return None
     found = step.chosen.fit
     std = np.where(np.isfinite(found.noise.std), found.noise.std, np.inf)
-    return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
+    return most_discriminating(found.ship, [other.ship for other in step.alternatives], proposals, std, windows)
 
 
 def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ...]:
@@ -256,7 +257,7 @@ def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ..
     else:
         notes = [
             *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
-            *note_beside_the_same_fit(chosen.kept, chosen.held, chosen.re_estimated, seed),
+            *(note_beside_the_same_fit(chosen.kept) if chosen.kept.steps and chosen.compared_with(seed)[1] else ()),
             *rejected,
         ]
         if chosen.kept.first.keys:

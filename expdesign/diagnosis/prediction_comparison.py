@@ -23,7 +23,7 @@ from expdesign.diagnosis.fit import (
     Fit,
     FitOptions,
     HeldOut,
-    cluster_robust,
+    counting_runs,
     cross_validate_ahead,
     fit,
     fit_output_error,
@@ -147,7 +147,7 @@ def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCa
 
     Its standard errors are those of the scatter from stretch to stretch.
     """
-    ahead = cluster_robust(item.fit, np.arange(float(len(item.fit.starts))))
+    ahead = counting_runs(item.fit, np.arange(float(len(item.fit.starts))))
     free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
     try:
         found = fit(ahead.ship, windows, free, starts=starts, options=FitOptions(steps=0))

@@ -39,6 +39,11 @@ class ErrorReduction:
     low: float
     high: float
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is worth a word and its interval excludes zero."""
+        return self.share >= VISIBLE and self.low > 0.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:

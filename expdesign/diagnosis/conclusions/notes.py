@@ -13,7 +13,6 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
-    gain_beside_the_same_fit,
     same_effects_as_any,
 )
 from expdesign.diagnosis.vessel_file import public_name
@@ -204,27 +203,12 @@ def note_on_predictions(
     )
 
 
-def note_beside_the_same_fit(
-    kept: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
-) -> tuple[str, ...]:
-    """The gain of the first cause where that on the model in use is not certain.
-
-    Args:
-        kept: the causes.
-        held: errors on held-out units of the model before any cause, then after every one.
-        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
-        seed: of the intervals.
-    """
-    if not kept.steps or held_out_gain(held[0], held[1], seed)[1][0] > 0.0:
-        return ()
-    known = gain_beside_the_same_fit(kept, held, re_estimated, seed)
-    if known is None or not known[1][0] > 0.0:
-        return ()
-    gain, (low, high) = known
+def note_beside_the_same_fit(kept: Selection) -> tuple[str, ...]:
+    """What the gain of the first cause is relative to, where it is not the model in use."""
     return (
-        "The parameters of the vessel file may have been fitted to these data too. On the model re-estimated without "
-        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} as it is with it, the gain is {gain:+.1f} points "
-        f"({low:.1f} to {high:.1f}).",
+        "The parameters of the vessel file may have been fitted to these data too. So the gain of "
+        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} is that on the model re-estimated without it as it is "
+        "with it.",
     )
 
 

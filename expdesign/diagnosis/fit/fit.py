@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,7 @@ class Fit:
         step: (c,) to the optimum of the linear model within bounds.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
+        freedom: degrees of freedom of the covariance, where it counts how runs differ.
     """
 
     ship: ExtendedModel
@@ -60,6 +62,7 @@ class Fit:
     step: Array
     converged: bool
     simulations: int = 1
+    freedom: float = math.inf
 
     def selected(self, keep: NDArray[np.bool_]) -> Fit:
         """The same effects beside only some of the windows, by a mask (w,): where a fit to these begins.

@@ -10,16 +10,21 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
+    Dispersion,
     Fit,
     FitOptions,
     build_sensitivities,
     continuing,
     deviations_of,
+    directions_between_runs,
     effect_disturbances,
+    few_runs_factor,
     fit,
     gram_matrices,
     in_groups,
     log_likelihood_gain,
+    of_several,
+    tail,
     window_information,
 )
 from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
@@ -88,8 +93,25 @@ def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
     given = UnitInformation(A=sums[0], s=sums[1], precision=base.precision, offset=deviations_of(ship, base.keys))
     chosen = stable_selection(_without(given, _impossible(given, len(names), others)), rng)
     sizes = _sizes(given, [item.index for item in chosen])
-    listed = [wider.library[name] for name in names]
-    return tuple(_missing(listed, others, item, *pair, size) for item, pair in zip(chosen, sizes, strict=True))
+    factors, freedoms = _between_units(given)
+    listed, surely = [wider.library[name] for name in names], list[Missing]()
+    for item, (value, std) in zip(chosen, sizes, strict=True):
+        factor, freedom = float(factors[item.index]), float(freedoms[item.index])
+        p_value = of_several(tail(item.statistic, 1, factor, freedom), TUNING.regressors)
+        if not p_value <= TUNING.level:
+            break  # what was chosen later stands beside this
+        wider_std = std * float(np.sqrt(factor) * few_runs_factor(freedom))
+        surely.append(_missing(listed, others, item, value, wider_std, size))
+    return tuple(surely)
+
+
+def _between_units(given: UnitInformation) -> tuple[Array, Array]:
+    """Factors of the variances of all regressors by how units differ, and their degrees of freedom."""
+    c = len(given.precision)
+    A, s = given.A, given.s
+    each = np.diagonal(A, axis1=1, axis2=2)[:, c:]
+    spread = directions_between_runs((A[:, :c, :c], A[:, :c, c:], each), (s[:, :c], s[:, c:]), given.precision)
+    return Dispersion.of(spread).beside(spread)
 
 
 def _begun_anew(base: Fit, windows: Windows) -> Fit:
