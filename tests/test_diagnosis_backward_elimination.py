@@ -33,7 +33,7 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import Estimated, silent
-from held_out_cases import errors, steps_of
+from held_out_cases import POSSIBLE, errors, steps_of
 
 
 def kept_count(*fits: np.ndarray | float) -> int:
@@ -318,7 +318,7 @@ def test_what_physics_excludes_is_no_finding():
     for value, kept in ((-1.0, True), (1.0, False)):
         candidate = Candidate(cause="wind", free={"drag": 0.0}, bounds=({"drag": 1.0},))
         step = SimpleNamespace(chosen=SimpleNamespace(keys=("drag",), fit="drag", candidate=candidate))
-        last = SimpleNamespace(value={"drag": value}.__getitem__)
+        last = SimpleNamespace(value={"drag": value}.__getitem__, ship=POSSIBLE)
         assert improves_held_out(replace(found, steps=(step,), last=last), held, 0) == [kept]  # type: ignore[arg-type]
 
 

@@ -11,14 +11,14 @@ from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judg
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import silent
-from held_out_cases import errors, steps_of
+from held_out_cases import POSSIBLE, errors, steps_of
 
 
 class Model(SimpleNamespace):
     """A fit by name, all effects zero."""
 
     def __init__(self, name: str, **others: object) -> None:
-        super().__init__(name=name, value=lambda _key: 0.0, **others)
+        super().__init__(**{"name": name, "value": lambda _key: 0.0, "ship": POSSIBLE} | others)
 
 
 def whole_and_ahead(*pairs: tuple[np.ndarray | float, np.ndarray | float]) -> list[HeldOut]:

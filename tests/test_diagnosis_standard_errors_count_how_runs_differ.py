@@ -122,7 +122,7 @@ def test_what_directions_have_in_common_is_found():
 
 @pytest.mark.parametrize(("apart", "share"), [(0.0, 1.0), (3.0, 1.0), (0.0, 30.0)])
 def test_p_values_of_few_runs_are_uniform_whether_or_not_runs_differ(apart, share):
-    """Of three runs; where they do not differ, p-values may be a little larger, since no variance is counted as less."""
+    """Of three runs; where they do not differ, p-values may be a little larger: no variance is counted as less."""
     rng, many = np.random.default_rng(5), 1500
     spread = drawn_runs(rng, apart, runs=3, many=many, share=share)
     factors, freedoms = Dispersion.of(spread).beside(spread)

@@ -12,6 +12,8 @@ from expdesign.diagnosis.select import Step, certain_reductions
 from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
 from expdesign.diagnosis.vessel_file import public_name, stated_values
 
+CHANGED = "change:time"
+
 
 def finding_of(
     step: Step, last: Fit, held: tuple[HeldOut, HeldOut], seed: int, windows: Windows, *, would_tell_apart: str | None
@@ -29,6 +31,12 @@ def finding_of(
     chosen, (before, after) = step.chosen, held
     gain, interval = held_out_gain(before, after, seed)
     values = _values(step, last)
+    explanation = cause_of(chosen.candidate.cause).explain(values, last.ship) + stated_values(values, last.ship)
+    if CHANGED in values:
+        time, std = values[CHANGED]
+        run, begin, _ = windows.place(time)
+        values[CHANGED] = (time - begin, std)
+        explanation = cause_of(chosen.candidate.cause).explain(values, last.ship) + f" Times are of {run}."
     reductions = error_reductions_of(chosen.fit.ship.model.outputs, before, after, seed)
     return Finding(
         cause=chosen.candidate.cause,
@@ -44,7 +52,7 @@ def finding_of(
         gain_interval=interval,
         not_distinguishable_from=tuple(other.candidate.cause for other in step.alternatives),
         would_tell_apart=would_tell_apart,
-        explanation=cause_of(chosen.candidate.cause).explain(values, last.ship) + stated_values(values, last.ship),
+        explanation=explanation,
         likelihood_gain=chosen.likelihood_gain,
         keys=tuple(values),
     )

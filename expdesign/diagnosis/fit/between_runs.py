@@ -161,6 +161,12 @@ def counting_runs(found: Fit, run: Array, known: Dispersion | None = None) -> Fi
     return replace(found, covariance=found.covariance * np.outer(ratio, ratio), freedom=float(freedom.min()))
 
 
+def counting_stretches(found: Fit) -> Fit:
+    """The same fit of short stretches with standard errors that count how these differ, and how runs do."""
+    windows = found.linear.motion.windows
+    return counting_runs(counting_runs(found, np.arange(float(len(windows.batch)))), windows.batch)
+
+
 def few_runs_factor(freedom: Array | float) -> Array:
     """By how much an interval of 95 % is wider with so many degrees of freedom."""
     return np.asarray(scipy.stats.t.ppf(0.975, np.maximum(freedom, 1.0)) / NORMAL_95)

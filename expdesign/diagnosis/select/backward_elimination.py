@@ -131,6 +131,7 @@ def improves_held_out(
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     simulated = [
         step.chosen.candidate.is_possible(found.last.value)
+        and found.last.ship.is_possible(step.chosen.candidate.free)
         and simulates_better(
             held[index],
             held[index + 1],

@@ -157,7 +157,7 @@ def _rough_fits(
 
 
 def _is_possible(item: FittedCandidate) -> bool:
-    return item.candidate.is_possible(item.fit.value)
+    return item.candidate.is_possible(item.fit.value) and item.fit.ship.is_possible(item.candidate.free)
 
 
 def _best_on_held_out(
