@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values
+from expdesign.diagnosis.conclusions.verdict import effect_in_words
 from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit import Fit, HeldOut, held_out_gain, prediction_gain
 from expdesign.diagnosis.model import ExtendedModel
@@ -50,7 +51,10 @@ def finding_of(
         else _predicted(before, after, windows, chosen.fit.noise),
         gain=gain,
         gain_interval=interval,
-        not_distinguishable_from=tuple(other.candidate.cause for other in step.alternatives),
+        not_distinguishable_from=tuple(dict.fromkeys(other.candidate.cause for other in step.alternatives)),
+        alternatives=tuple(
+            effect_in_words(other.candidate.cause, tuple(other.candidate.free)) for other in step.alternatives
+        ),
         would_tell_apart=would_tell_apart,
         explanation=explanation,
         likelihood_gain=chosen.likelihood_gain,

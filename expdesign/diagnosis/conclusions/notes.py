@@ -13,6 +13,7 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
+    p_value_between_runs,
     same_effects_as_any,
 )
 from expdesign.diagnosis.vessel_file import public_name
@@ -53,8 +54,8 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
     if "r" in windows.derived:
         notes.append("The yaw rate is derived from the heading. The scale of a rate gyro was not tested.")
     if constant:
-        verb = "changes" if len(constant) == 1 else "change"
-        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through them cannot be seen.")
+        verb, them = ("changes", "it") if len(constant) == 1 else ("change", "them")
+        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through {them} cannot be seen.")
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file has no parameter_std. Its parameters count as known.")
     return tuple(notes)
@@ -110,8 +111,8 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
         f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
-        f"{step.p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off any error "
-        "or gains nothing significant, or its size may be zero."
+        f"{p_value_between_runs(step.chosen, None, kept.dispersion):.1g}). It is not a finding: on {unit} held out of "
+        "the fit it takes less than 1 % off every error, or its gain or its size may be zero."
         for step in rejected
     )
 
