@@ -35,7 +35,7 @@ def situations() -> list[Situation]:
         batches = batches if wind else [replace(one, wind=None) for one in batches]
         vessel, model = vessel_of(ship), vessel_of(ship).model
         slow = tuple(
-            replace(one, responses=(Response(slew_per_s=0.1),) * len(one.signals)) if one.kind == "rudder" else one
+            replace(one, responses=(Response(rate=0.1),) * len(one.signals)) if one.kind == "rudder" else one
             for one in model.actuators
         )
         vessel = replace(vessel, model=replace(model, actuators=slow))
@@ -88,8 +88,10 @@ def test_every_explanation_has_finite_numbers(candidates, std):
     """Of estimates with any standard error, or none that is known."""
     for situation, item in candidates:
         ship = situation.ship.with_effects({**item.fixed, **dict.fromkeys(item.free, 0.3)})
-        profiled = {} if item.grid is None else {item.grid[0]: (ship.get(item.grid[0]), std)}
-        text = cause_of(item.cause).explain({**dict.fromkeys(item.free, (0.3, std)), **profiled}, ship)
+        fixed = [] if item.grid is None else [item.grid[0]]
+        fixed += [key for key in item.fixed if key.startswith("roll")]
+        values = {**dict.fromkeys(item.free, (0.3, std)), **{key: (ship.get(key), std) for key in fixed}}
+        text = cause_of(item.cause).explain(values, ship)
         assert "nan" not in text.lower()
         assert "inf " not in text.replace("inertia", "")
 
@@ -113,7 +115,7 @@ def test_a_change_lies_within_one_run_and_ends_with_it(candidates):
             for one in (ship.with_effects({**item.fixed, **dict.fromkeys(item.free, 0.3)}), ship)
         )
         mine = np.array(windows.names)[windows.batch.astype(int)] == run
-        differs = (changed != plain).any(axis=(1, 2))
+        differs = (np.abs(changed - plain) > 1e-7).any(axis=(1, 2))  # of rounding in solutions side by side
         assert differs[mine].any()
         assert not differs[~mine].any()
 
