@@ -78,7 +78,7 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert "the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) improves nothing for certain" in text
     assert remarks("runs", None, (delay, wind), (), ()) == (
         "Not certain, by their gains on runs held out: the dead time of the actuators (+0.5 points of fit, -0.6 to "
-        "1.2) and wind (-2.0 points of fit, -3.0 to 0.0).",
+        "1.2).",
     )
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)

@@ -111,10 +111,17 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
         f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
-        f"{p_value_between_runs(step.chosen, None, kept.dispersion):.1g}). It is not a finding: on {unit} held out of "
-        "the fit it takes less than 1 % off every error, or its gain or its size may be zero."
+        f"{p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off every error, "
+        "or its gain or its size may be zero."
         for step in rejected
+        if (p_value := _p_value_left(step, kept)) <= SELECTION_TUNING.level
     )
+
+
+def _p_value_left(step: Step, kept: Selection) -> float:
+    """p-value of a rejected cause beside the findings, if it is tested beside them."""
+    left = [item.adjusted for item in kept.last_tests if same_effects_as_any(item.candidate, [step.chosen.candidate])]
+    return min(left) if left else p_value_between_runs(step.chosen, None, kept.dispersion)
 
 
 def note_on_work(found: Selection) -> tuple[str, ...]:

@@ -166,7 +166,8 @@ def verdict(
         best = f"; the best candidate is {_lead(unexplained.leads[0])} on {unit} held out" if unexplained.leads else ""
         sentences = [what, _capital(_fits(unexplained)) + best, MORE_DATA]
     elif signs:
-        sure = f"{_accuracy(before)}; {_lead(signs[0])} improves nothing for certain on {unit} held out"
+        better = [f"; {_lead(lead)} improves nothing for certain on {unit} held out" for lead in signs if lead.gain > 0]
+        sure = "".join([_accuracy(before), *better[:1]])
         sentences = ["No cause of the remaining error is certain", sure, f"Keep the vessel file; {MORE_RUNS}"]
     elif (before.fit < LITTLE_FIT).any():
         what = "The simulation explains little of these data, and no cause of the catalogue explains more"
@@ -240,7 +241,7 @@ def remarks(
         ]
         found.append(f"A slowly varying force that nobody measured would take {listed(shares)}." if shares else "")
     others = [*signs, *(() if unexplained is None else unexplained.leads)]
-    leads = {lead.cause: lead for lead in others if np.isfinite(lead.gain)}
+    leads = {lead.cause: lead for lead in others if lead.gain > 0.0}
     if leads:
         named = listed([_lead(lead) for lead in leads.values()])
         found.append(f"Not certain, by their gains on {unit} held out: {named}.")
@@ -281,7 +282,8 @@ def _lead(lead: Lead) -> str:
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
     if len(findings) == 1:
-        return f"Adding it {benefit(findings[0])} on {unit} held out of the fit"
+        it = "them" if lacking(findings[0]).startswith("the correct values") else "it"
+        return f"Adding {it} {benefit(findings[0])} on {unit} held out of the fit"
     first, *others = [f"{lacking(item)} {benefit(item)}" for item in findings]
     return f"On {unit} held out of the fit, {listed([f'adding {first}', *others])}"
 

@@ -58,7 +58,7 @@ def eliminate_backward(
             found = later
             continue
         found = before_first_without_gain(found, improves)
-        counted = with_runs_counted(found, open_candidates(found.last, windows))
+        counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
         index = least_significant_step(counted.steps)
         others = None if index is None else without_step(list(found.steps), index, windows)
         if others is None:

@@ -23,6 +23,7 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import (
+    NOISE_ALONE,
     Dispersion,
     Fit,
     Spread,
@@ -94,8 +95,16 @@ def score_tests(
     base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None
 ) -> tuple[ScoreTest, ...]:
     """Tests of every candidate against the fit without it, best first; without `rng` not adjusted for their number."""
+    return scored_between_runs(base, candidates, rng)[0]
+
+
+def scored_between_runs(
+    base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None
+) -> tuple[tuple[ScoreTest, ...], Dispersion]:
+    """The same, and how much the estimates of all candidates differ between runs beside everything in the fit."""
     scores = _scores(base, candidates)
-    factors, freedoms = Dispersion.of(scores.spread).beside(scores.spread)
+    known = Dispersion.of(scores.spread) if len(np.unique(runs_of(base.linear.motion.windows))) > 1 else NOISE_ALONE
+    factors, freedoms = known.beside(scores.spread)
     tests, roots = [], []
     for candidate, index in zip(candidates, scores.index, strict=True):
         size = scores.size[index]
@@ -124,7 +133,7 @@ def score_tests(
     if tests and rng is not None:
         multiplicity = _effective_tests(scores.A, roots, [item.candidate for item in tests], rng)
         tests = [replace(item, multiplicity=number) for item, number in zip(tests, multiplicity, strict=True)]
-    return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity))
+    return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity)), known
 
 
 def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
@@ -132,11 +141,6 @@ def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
     if key not in candidate.free:
         return candidate.fixed.get(key, base.ship.get(key))
     return base.ship.get(key) + float(step[[*candidate.free].index(key)])
-
-
-def dispersion_between_runs(base: Fit, candidates: Sequence[Candidate]) -> Dispersion:
-    """How much the estimates of all candidates differ between runs, beside everything in the fit."""
-    return Dispersion.of(_scores(base, candidates).spread)
 
 
 def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:

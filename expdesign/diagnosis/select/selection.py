@@ -25,7 +25,7 @@ from expdesign.diagnosis.fit import (
     tail,
 )
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
-from expdesign.diagnosis.select.score_tests import ScoreTest, dispersion_between_runs
+from expdesign.diagnosis.select.score_tests import ScoreTest, scored_between_runs
 from expdesign.diagnosis.select.tuning import TUNING
 
 SHAPE = ("roll:period", "roll:damping")
@@ -62,7 +62,7 @@ class Selection:
         steps: one per cause.
         first: the fit before any cause.
         last: the joint fit of all causes.
-        last_tests: score tests of the round that found nothing more.
+        last_tests: score tests of what is left.
         untried: what the limit of work left out.
         beside_stated: causes are fitted beside the parameters of the vessel file, although these are uncertain.
         dispersion: what estimates of causes differ by between runs, beside the last fit.
@@ -145,16 +145,16 @@ def _fit_without(whole: Fit, step: Step, windows: Windows) -> Fit | None:
         return None
 
 
-def with_runs_counted(found: Selection, candidates: Sequence[Candidate]) -> Selection:
-    """The selection with standard errors and p-values that count how runs differ.
+def with_runs_counted(found: Selection, candidates: Sequence[Candidate], rng: np.random.Generator) -> Selection:
+    """The selection with standard errors and p-values that count how runs differ, and tests of what is left.
 
     Args:
         found: the selection, its last fit of all windows.
         candidates: of the catalogue, whose estimates show how runs differ beside the last fit.
+        rng: of the null distribution.
     """
-    run = runs_of(found.last.linear.motion.windows)
-    known = dispersion_between_runs(found.last, candidates) if len(np.unique(run)) > 1 else NOISE_ALONE
-    last = counting_runs(found.last, run, known)
+    tests, known = scored_between_runs(found.last, candidates, rng)
+    last = counting_runs(found.last, runs_of(found.last.linear.motion.windows), known)
     steps = [
         replace(
             step,
@@ -164,7 +164,7 @@ def with_runs_counted(found: Selection, candidates: Sequence[Candidate]) -> Sele
         )
         for step in found.steps
     ]
-    return replace(found, steps=tuple(steps), last=last, dispersion=known)
+    return replace(found, steps=tuple(steps), last=last, last_tests=tests, dispersion=known)
 
 
 def _equivalent(rivals: Sequence[Rival], known: Dispersion) -> tuple[Rival, ...]:
