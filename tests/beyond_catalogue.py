@@ -41,7 +41,7 @@ def trial(
 
     batches = tuple(
         Batch(
-            name=f"run {number}", sample_time_s=1.0, input_names=sea.INPUTS[ship], inputs=orders[number],
+            name=f"trial, batch {number}", sample_time_s=1.0, input_names=sea.INPUTS[ship], inputs=orders[number],
             velocity=shown(number, "u_mps", "v_mps", "r_radps"),
             pose=shown(number, "north_m", "east_m", "heading_rad"),
             wind=shown(number, "wind_u_mps", "wind_v_mps"),

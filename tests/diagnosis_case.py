@@ -114,7 +114,7 @@ def hidden_records(
         Record(
             batches=tuple(
                 Batch(
-                    name=f"run {number}",
+                    name=f"trial, batch {number}",
                     sample_time_s=step_s,
                     input_names=sea.INPUTS[ship],
                     inputs=orders[number],

@@ -9,6 +9,7 @@ from expdesign.diagnosis.fit.held_out import HeldOut
 from expdesign.diagnosis.select.selection import Selection
 
 DEVIATION = np.ones((6, 3))
+POSSIBLE = SimpleNamespace(is_possible=lambda _keys: True)
 
 
 def errors(fit_percent: np.ndarray | float) -> HeldOut:
@@ -27,5 +28,5 @@ def steps_of(*keys: str) -> Selection:
         )
         for key in keys
     ]  # fmt: skip
-    first, last = SimpleNamespace(keys=()), SimpleNamespace(value=lambda _key: 0.0)
+    first, last = SimpleNamespace(keys=()), SimpleNamespace(value=lambda _key: 0.0, ship=POSSIBLE)
     return Selection(steps=tuple(steps), first=first, last=last, last_tests=())  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import AHEAD_S, HeldOut
-from expdesign.diagnosis.prediction_comparison import Compared, _signed_rank_p_value, compare_predictions
+from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions, signed_rank_p_values
 from expdesign.diagnosis.select import Selection, Step
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -73,7 +73,8 @@ def of(cause: str, error: float, *, certain: bool = True, weather: bool = False)
     """A compared cause with this squared error in each of ten stretches."""
     return SimpleNamespace(
         cause=cause, held=errors(np.full((10, 3), error)), is_certain=certain, is_slow_weather=weather, p_value=0.001,
-        fit=SimpleNamespace(ship=cause),
+        fit=SimpleNamespace(ship=cause), point=SimpleNamespace(test=SimpleNamespace(candidate=Candidate(cause=cause,
+        free={}))),
     )  # fmt: skip
 
 
@@ -98,7 +99,7 @@ def judged(monkeypatch, *causes: SimpleNamespace, found: float | None) -> tuple[
         of=lambda _: None if np.isnan(found) else errors(np.full((10, 3), found)),
     )
     by_predictions = judging.found_by_predictions(kept, compared, (None, None), None, 0)
-    kept = by_predictions[0] if by_predictions else judging.with_alternatives(kept, compared, None, 0)
+    kept = by_predictions[0] if by_predictions else judging.with_alternatives(kept, compared, 0)
     return (
         None
         if not kept.steps
@@ -134,9 +135,27 @@ def test_the_signed_rank_test_counts_stretches_not_their_size():
     """Less in each of n stretches has a chance of one in 2^n, however large the errors of some are."""
     lost = np.geomspace(1.0, 1e9, 10)[:, None] * np.ones(3)
     left = lost * np.linspace(0.5, 0.9, 10)[:, None]
-    assert _signed_rank_p_value(errors(lost), errors(left)) == pytest.approx(0.5**10)
-    assert _signed_rank_p_value(errors(left), errors(lost)) == 1.0
-    assert _signed_rank_p_value(errors(lost), errors(lost)) == 1.0
+    assert signed_rank_p_values(errors(lost), [errors(left)])[0] == pytest.approx(0.5**10)
+    assert signed_rank_p_values(errors(left), [errors(lost)])[0] == 1.0
+    assert signed_rank_p_values(errors(lost), [errors(lost)])[0] == 1.0
+
+
+def test_stretches_of_runs_that_differ_are_no_independent_witnesses():
+    """Four runs of 60 stretches with a gain of their own each, none on average: uniform p-values of half-normal causes.
+
+    As if stretches were independent, most causes would seem certain one way or the other.
+    """
+    rng, p_values, plain = np.random.default_rng(4), [], []
+    run = np.repeat(np.arange(4.0), 60)
+    for _ in range(60):
+        lost = replace(errors(np.ones((240, 3))), run=run)
+        gains = np.repeat(rng.standard_normal((6, 4)), 60, axis=1) + rng.standard_normal((6, 240))
+        causes = [replace(errors(np.exp(-gain)[:, None] * np.ones((240, 3))), run=run) for gain in gains]
+        p_values += signed_rank_p_values(lost, causes)
+        plain += signed_rank_p_values(replace(lost, run=None), [replace(one, run=None) for one in causes])
+    small = (np.array(p_values) < 0.05).mean()
+    assert small < 0.05 + 4 * np.sqrt(0.05 * 0.95 / len(p_values))
+    assert (np.array(plain) < 0.05).mean() > 0.3
 
 
 def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeypatch):

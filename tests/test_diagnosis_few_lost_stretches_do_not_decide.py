@@ -10,7 +10,6 @@ from diagnosis_case import hidden_record, vessel_of
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis import judgement
 from expdesign.diagnosis.accuracy import squared_sums
-from expdesign.diagnosis.conclusions.notes import note_beside_the_same_fit
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import CrossValidation
 from expdesign.diagnosis.fit.cross_validation import error_of_constants
@@ -18,7 +17,7 @@ from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.judgement import losses_without
 from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.diagnosis.select import backward_elimination
-from expdesign.diagnosis.select.backward_elimination import improves_held_out
+from expdesign.diagnosis.select.backward_elimination import compared_with, improves_held_out
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from held_out_cases import errors, steps_of
 
@@ -70,11 +69,13 @@ def test_a_first_cause_is_certain_beside_the_same_fit_without_it(monkeypatch, re
     held = [errors(70.0), errors(70.0 + OPEN)]
     without = None if re_estimated is None else errors(re_estimated)
     assert improves_held_out(found, held, 0, object(), without) == [kept]  # type: ignore[arg-type]
-    assert len(note_beside_the_same_fit(found, held, without, 0)) == kept
+    before, beside = compared_with(found, held, without, 0)
+    assert beside == kept
+    assert before is (without if kept else held[0])
 
 
 @pytest.mark.parametrize(("ahead", "kept"), [(75.0, True), (70.0 + OPEN, False)])
-def test_a_first_cause_that_one_of_many_runs_shows_is_certain_in_stretches(monkeypatch, ahead, kept):
+def test_a_first_cause_that_one_of_many_runs_shows_is_told_in_stretches(monkeypatch, ahead, kept):
     """Five runs are simulated alike without and with it, so that its gain in whole runs is open."""
     monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_: (0.0, (-1.0, 1.0)))
     found = steps_of("first")
@@ -84,7 +85,9 @@ def test_a_first_cause_that_one_of_many_runs_shows_is_certain_in_stretches(monke
         replace(errors(whole), ahead=lambda short=short: replace(errors(short), in_stretches=True))
         for whole, short in zip(fits, (70.0, ahead), strict=True)
     ]
-    assert improves_held_out(found, held, 0, object()) == [kept]  # type: ignore[arg-type]
+    told = judgement._where_more_is_certain(found, held, 0)
+    assert all(item.in_stretches is kept for item in told)
+    assert improves_held_out(found, told, 0, object()) == [kept]  # type: ignore[arg-type]
 
 
 def test_causes_are_ordered_by_what_the_model_loses_without_each(monkeypatch):

@@ -7,18 +7,18 @@ import numpy as np
 
 from expdesign.diagnosis import judgement
 from expdesign.diagnosis.fit.held_out import HeldOut
-from expdesign.diagnosis.judgement import _where_certain, errors_as_judged
+from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import silent
-from held_out_cases import errors, steps_of
+from held_out_cases import POSSIBLE, errors, steps_of
 
 
 class Model(SimpleNamespace):
     """A fit by name, all effects zero."""
 
     def __init__(self, name: str, **others: object) -> None:
-        super().__init__(name=name, value=lambda _key: 0.0, **others)
+        super().__init__(**{"name": name, "value": lambda _key: 0.0, "ship": POSSIBLE} | others)
 
 
 def whole_and_ahead(*pairs: tuple[np.ndarray | float, np.ndarray | float]) -> list[HeldOut]:
@@ -30,20 +30,27 @@ def whole_and_ahead(*pairs: tuple[np.ndarray | float, np.ndarray | float]) -> li
 
 
 def test_a_later_cause_is_clear_in_stretches_where_whole_runs_leave_its_gain_open():
-    """More than a point and certain; runs that all gain decide by themselves, and of a first cause no gain is asked."""
+    """More than a point and certain, told in stretches; what whole runs tell is told in these."""
     found = steps_of("first", "later")
     spread = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])  # 4 points on average, perhaps none
     clear = TUNING.clear_gain_points
-    for later, ahead, kept in (
-        (70.0 + spread, 70.0 + 1.1 * clear, True),
-        (70.0 + spread, 70.0 + 0.9 * clear, False),
-        (70.0 + spread, 70.0 + spread, False),
-        (74.0, 70.0, True),
+    for later, ahead, kept, in_stretches in (
+        (70.0 + spread, 70.0 + 1.1 * clear, True, True),
+        (70.0 + spread, 70.0 + 0.9 * clear, False, False),
+        (70.0 + spread, 70.0 + spread, False, False),
+        (74.0, 70.0, True, False),
     ):
-        held = whole_and_ahead((50.0, 50.0), (70.0, 70.0), (later, ahead))
+        held = _where_more_is_certain(found, whole_and_ahead((50.0, 50.0), (70.0, 70.0), (later, ahead)), 0)
+        assert all(item.in_stretches is in_stretches for item in held)
         assert improves_held_out(found, held, 0) == [True, kept]
-    held = whole_and_ahead((70.0, 70.0), (70.0 + spread.mean() + 0.5 * spread, 70.0))
-    assert improves_held_out(steps_of("first"), held, 0) == [True]
+
+
+def test_no_cause_is_found_whose_stated_improvement_may_be_none():
+    """However large it is on average, first or later."""
+    spread = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])
+    for later, kept in ((70.0 + spread, False), (74.0 + 0.1 * spread, True)):
+        assert improves_held_out(steps_of("first"), [errors(70.0), errors(later)], 0) == [kept]
+        assert improves_held_out(steps_of("first", "later"), [errors(50.0), errors(70.0), errors(later)], 0)[1] is kept
 
 
 def test_a_later_cause_judged_in_stretches_needs_a_clear_gain():
@@ -58,7 +65,7 @@ def test_causes_are_judged_in_stretches_where_only_these_tell_of_the_first_one()
     """Stretches that do not tell either leave the runs."""
     spread = np.array([[-9.0], [-9.0], [-9.0], [6.0], [6.0], [6.0]])
     for ahead, in_stretches in ((75.0, True), (70.0 + spread, False), (65.0, False)):
-        held = _where_certain(whole_and_ahead((70.0, 70.0), (70.0 + spread, ahead)), 0)
+        held = _where_more_is_certain(steps_of("wind"), whole_and_ahead((70.0, 70.0), (70.0 + spread, ahead)), 0)
         assert all(item.in_stretches is in_stretches for item in held)
 
 

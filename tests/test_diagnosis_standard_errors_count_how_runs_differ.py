@@ -1,15 +1,24 @@
-"""Standard errors from the scatter of runs: the mean of runs that differ has that of their means."""
+"""Standard errors and p-values count how runs differ: the mean of runs that differ has the spread of their means."""
+
+import math
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, kstest, norm
+from scipy.stats import t as student
 
 from expdesign.diagnosis.data.noise import Noise
-from expdesign.diagnosis.fit.cluster_robust import cluster_covariance, cluster_robust
+from expdesign.diagnosis.fit.between_runs import (
+    Dispersion,
+    Spread,
+    counting_runs,
+    directions_between_runs,
+    few_runs_factor,
+    tail,
+)
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.gram_matrices import gram_matrices, marginalised
 from expdesign.diagnosis.fit.linear_model import Sensitivities
-from expdesign.diagnosis.fit.tuning import TUNING
 
 RUNS, SAMPLES, APART, NOISE = 14, 60, 0.3, 1.0
 
@@ -34,34 +43,103 @@ def mean_of_runs(rng: np.random.Generator, *, runs: int = RUNS, apart: float = A
     )  # type: ignore[arg-type]  # fmt: skip
 
 
+def std_of(found: Fit) -> float:
+    """Without what makes an interval of few runs wider."""
+    return found.std("mean") / float(few_runs_factor(found.freedom))
+
+
 def test_the_scatter_of_run_means_is_found_exactly():
     found = mean_of_runs(np.random.default_rng(0))
     means = found.sensitivities.error[..., 0].mean(axis=1)
-    variance = means.var(ddof=1) / RUNS
-    assert cluster_covariance(found, np.arange(RUNS))[0, 0] == pytest.approx(variance, rel=1e-9)
+    counted = counting_runs(found, np.arange(RUNS))
+    assert std_of(counted) == pytest.approx(means.std(ddof=1) / np.sqrt(RUNS), rel=1e-9)
+    assert counted.freedom == pytest.approx(RUNS - 1)
+    factor = student.ppf(0.975, RUNS - 1) / norm.ppf(0.975)
+    assert counted.std("mean") == pytest.approx(factor * std_of(counted), rel=1e-9)
     assert found.covariance[0, 0] == pytest.approx(NOISE**2 / (RUNS * SAMPLES), rel=1e-9)
 
 
-def test_runs_that_differ_widen_the_standard_error_and_few_runs_do_not():
-    rng = np.random.default_rng(1)
-    wide = cluster_robust(mean_of_runs(rng), np.arange(RUNS))
-    truth = np.sqrt((APART**2 + NOISE**2 / SAMPLES) / RUNS)
-    low, high = np.sqrt(chi2.ppf([0.001, 0.999], RUNS - 1) / (RUNS - 1))
-    assert low * truth < wide.std("mean") < high * truth
-    few = mean_of_runs(rng, runs=TUNING.fewest_runs - 1)
-    assert cluster_robust(few, np.arange(TUNING.fewest_runs - 1)) is few
-
-
-def test_on_average_equal_runs_have_the_plain_standard_error():
-    """Mean of the clustered variance over trials against the exact one, by its own standard error."""
-    rng = np.random.default_rng(2)
-    found = np.array([cluster_covariance(mean_of_runs(rng, apart=0.0), np.arange(RUNS))[0, 0] for _ in range(200)])
-    exact = NOISE**2 / (RUNS * SAMPLES)
-    assert abs(found.mean() - exact) < 4 * found.std() / np.sqrt(len(found))
+@pytest.mark.parametrize("runs", [3, 6])
+def test_two_standard_errors_hold_the_truth_in_95_of_100_however_few_runs_there_are(runs):
+    """Runs that differ by much more than noise: Student's interval, exact for Gaussian runs."""
+    rng, trials, held = np.random.default_rng(runs), 400, 0
+    for _ in range(trials):
+        found = mean_of_runs(rng, runs=runs, apart=3.0)  # its errors are relative to the estimate
+        truth = rng.standard_normal() * np.sqrt((3.0**2 + NOISE**2 / SAMPLES) / runs)  # as far off as an estimate is
+        held += abs(truth) < norm.ppf(0.975) * counting_runs(found, np.arange(runs)).std("mean")
+    assert abs(held / trials - 0.95) < 4 * np.sqrt(0.95 * 0.05 / trials)
 
 
 def test_no_standard_error_gets_smaller():
     rng = np.random.default_rng(3)
     for _ in range(20):
         found = mean_of_runs(rng, apart=0.0)
-        assert cluster_robust(found, np.arange(RUNS)).std("mean") >= found.std("mean")
+        assert counting_runs(found, np.arange(RUNS)).std("mean") >= found.std("mean")
+
+
+def drawn_runs(rng: np.random.Generator, apart: float, *, runs: int, many: int, share: float = 1.0) -> tuple:
+    """Scores and information of many directions in runs, the first of which tells `share` times as much as another.
+
+    Two effects are estimated, which imitate some of each direction; estimates differ by `apart` standard errors.
+    """
+    rows = 20
+    X = rng.standard_normal((runs, rows, 2 + many))
+    X[0] *= np.sqrt(share)
+    size = np.sqrt((X**2).sum(axis=1)).mean(axis=0)
+    y = rng.standard_normal((many, runs, rows))
+    y += np.einsum("grk,gk->kgr", X[..., 2:], apart * rng.standard_normal((runs, many)) / size[2:])
+    A, s = np.einsum("gri,grj->gij", X, X), np.einsum("gri,kgr->kgi", X, y)
+    whole = A.sum(axis=0)[:2, :2]
+    spreads = []
+    for k in range(many):
+        effects = np.linalg.solve(whole, s[k, :, :2].sum(axis=0))  # every direction has data of its own
+        left = s[k] - A[:, :, :2] @ effects
+        own = (A[:, :2, :2], A[:, :2, 2 + k : 3 + k], A[:, 2 + k : 3 + k, 2 + k])
+        spreads.append(directions_between_runs(own, (left[:, :2], left[:, 2 + k : 3 + k]), np.zeros((2, 2))))
+    names = ("ratio", "freedom", "uneven")
+    return Spread(**{name: np.concatenate([getattr(item, name) for item in spreads]) for name in names})
+
+
+@pytest.mark.parametrize("runs", [2, 3, 8])
+def test_the_spread_of_equal_runs_is_one_on_average_whatever_is_estimated_beside(runs):
+    """By the standard error of the mean: the degrees of freedom count what estimated effects and the mean take away."""
+    spread = drawn_runs(np.random.default_rng(runs), 0.0, runs=runs, many=2000)
+    total = spread.ratio * spread.freedom
+    assert abs(total.mean() - spread.freedom.mean()) < 4 * total.std() / np.sqrt(len(total))
+    assert (spread.freedom < runs - 1).all()
+
+
+def test_what_directions_have_in_common_is_found():
+    """Ratios of inverse chi-squared variances: their size and its degrees of freedom, and none where all are alike."""
+    rng, own, many = np.random.default_rng(1), 3.0, 4000
+    alike = chi2.rvs(own, size=many, random_state=rng) / own
+    for scale, freedom in ((1.0, math.inf), (30.0, 4.0), (5.0, 12.0)):
+        each = 1.0 if math.isinf(freedom) else freedom / chi2.rvs(freedom, size=many, random_state=rng)
+        found = Dispersion.of(Spread(ratio=scale * each * alike, freedom=np.full(many, own), uneven=np.ones(many)))
+        assert found.ratio == pytest.approx(scale, rel=0.1)
+        assert found.freedom > 50 if math.isinf(freedom) else found.freedom == pytest.approx(freedom, rel=0.25)
+
+
+@pytest.mark.parametrize(("apart", "share"), [(0.0, 1.0), (3.0, 1.0), (0.0, 30.0)])
+def test_p_values_of_few_runs_are_uniform_whether_or_not_runs_differ(apart, share):
+    """Of three runs; where they do not differ, p-values may be a little larger: no variance is counted as less."""
+    rng, many = np.random.default_rng(5), 1500
+    spread = drawn_runs(rng, apart, runs=3, many=many, share=share)
+    factors, freedoms = Dispersion.of(spread).beside(spread)
+    z = np.sqrt(1.0 + apart**2) * rng.standard_normal(many)
+    p_values = np.array([tail(one**2, 1, *pair) for one, *pair in zip(z, factors, freedoms, strict=True)])
+    assert kstest(p_values, "uniform", alternative="greater").pvalue > 0.01
+    if apart:
+        assert kstest(p_values, "uniform").statistic < 0.06
+        plain = np.array([tail(one**2, 1) for one in z])
+        assert (plain < 0.001).mean() > 20 * (p_values < 0.001).mean()
+
+
+def test_one_run_that_tells_all_is_as_uncertain_as_a_single_run():
+    """A change that one of four runs shows has the whole variance between runs, not a fourth of it."""
+    even = np.array([[1.0], [1.0], [1.0], [1.0]])
+    single = np.array([[1e4], [1.0], [1.0], [1.0]])
+    for information, uneven in ((even, 1.0), (single, 3.0)):
+        A = (np.zeros((4, 0, 0)), np.zeros((4, 0, 1)), information)
+        found = directions_between_runs(A, (np.zeros((4, 0)), np.zeros((4, 1))), np.zeros((0, 0)))
+        assert found.uneven[0] == pytest.approx(uneven)

@@ -16,7 +16,6 @@ from expdesign.diagnosis.accuracy import (
 )
 from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
-    doubted,
     error_reductions_of,
     finding_of,
     note_beside_the_same_fit,
@@ -30,6 +29,7 @@ from expdesign.diagnosis.conclusions import (
     notes_on_data,
     notes_on_found_again,
     notes_on_rejected,
+    remarks,
     unit_name,
     verdict,
 )
@@ -132,6 +132,9 @@ def diagnose(
     after = before if final is ship else accuracy(final, record)
     unexplained = _unexplained(chosen, after, windows, seed)
     unit = unit_name(windows, in_stretches=chosen.held[0].in_stretches)
+    signs = _signs(chosen, after, windows, seed)
+    refused = [step.chosen.candidate.cause for step in chosen.refused]
+    instead = [words for words in _in_words(chosen.rest.instead) if words not in _in_words(chosen.rest.kinds)]
     concluding("measuring the gain on held-out runs", 1.0)
     return Diagnosis(
         vessel=vessel,
@@ -142,18 +145,7 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=doubted(record.faults)
-        + verdict(
-            ranked,
-            before,
-            unit,
-            unexplained,
-            within,
-            _signs(chosen, after, windows, seed),
-            [step.chosen.candidate.cause for step in chosen.refused],
-            _in_words(chosen.rest.kinds),
-            _in_words(chosen.rest.instead),
-        ),
+        verdict=verdict(ranked, before, unit, unexplained, within, signs, _in_words(chosen.rest.kinds), record.faults),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -163,6 +155,7 @@ def diagnose(
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
             *note_on_divergence(before, windows, re_estimated=begun is not ship, uncertain=bool(uncertain_keys(ship))),
+            *remarks(unit, unexplained, signs, refused, instead),
             *_notes_on_selection(chosen, unit, seed),
             *not_written,
         ),
@@ -175,7 +168,8 @@ def _gains_within_std(chosen: Selected, ship: ExtendedModel, seed: int) -> tuple
     gain, (low, _) = held_out_gain(chosen.before, chosen.held[0], seed)
     if not within_stated_std(chosen.kept.first) or not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
         return ()
-    return error_reductions_of(ship.model.outputs, chosen.before, chosen.held[0], seed)
+    reductions = error_reductions_of(ship.model.outputs, chosen.before, chosen.held[0], seed)
+    return reductions if any(item.is_certain for item in reductions) else ()
 
 
 def _unexplained(chosen: Selected, after: Accuracy, windows: Windows, seed: int) -> Unexplained | None:
@@ -224,11 +218,12 @@ def _in_words(found: Sequence[Missing]) -> tuple[str, ...]:
 
 def _findings(chosen: Selected, windows: Windows, proposals: Sequence[Proposal], seed: int) -> tuple[Finding, ...]:
     """Findings in the order of the selection."""
+    before = [chosen.compared_with(seed)[0], *chosen.held[1:]] if chosen.kept.steps else []
     return tuple(
         finding_of(
             step,
             chosen.kept.last,
-            (chosen.held[index], chosen.held[index + 1]),
+            (before[index], chosen.held[index + 1]),
             seed,
             windows,
             would_tell_apart=_discriminating(step, proposals, windows),
@@ -243,7 +238,7 @@ def _discriminating(step: Step, proposals: Sequence[Proposal], windows: Windows)
         return None
     found = step.chosen.fit
     std = np.where(np.isfinite(found.noise.std), found.noise.std, np.inf)
-    return most_discriminating(found.ship, [other.fit.ship for other in step.alternatives], proposals, std, windows)
+    return most_discriminating(found.ship, [other.ship for other in step.alternatives], proposals, std, windows)
 
 
 def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ...]:
@@ -256,7 +251,7 @@ def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ..
     else:
         notes = [
             *note_on_stretches(chosen.held, beside_stated=chosen.kept.beside_stated),
-            *note_beside_the_same_fit(chosen.kept, chosen.held, chosen.re_estimated, seed),
+            *(note_beside_the_same_fit(chosen.kept) if chosen.kept.steps and chosen.compared_with(seed)[1] else ()),
             *rejected,
         ]
         if chosen.kept.first.keys:

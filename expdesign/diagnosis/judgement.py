@@ -13,12 +13,12 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import (
     AHEAD_S,
     CrossValidation,
-    Fit,
     HeldOut,
-    cluster_robust,
+    counting_runs,
     held_out_gain,
     judged,
     leads_away,
+    runs_of,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -26,7 +26,7 @@ from expdesign.diagnosis.motion import simulate_from_measured
 from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause, fitted_to_all
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
-    FittedCandidate,
+    Rival,
     Selection,
     Step,
     fitted_ahead,
@@ -58,9 +58,7 @@ def errors_as_judged(
     if found.beside_stated:
         again = fitted_ahead(found, windows, short, beside_stated=True) or found
         return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
-    held = _cross_validated(found, as_stated, validation, progress)
-    if found.steps and not improves_held_out(found, held, seed)[0]:
-        held = _where_certain(held, seed)
+    held = _where_more_is_certain(found, _cross_validated(found, as_stated, validation, progress), seed)
     known = None
     uncertain = found.steps and found.first.keys and not leads_away(as_stated)
     if uncertain and as_stated.mean_fit > validation.of(found.first).mean_fit:
@@ -74,14 +72,18 @@ def errors_as_judged(
     return found, held
 
 
-def _where_certain(held: list[HeldOut], seed: int) -> list[HeldOut]:
-    """Errors in short stretches, if a first cause gains there for certain; else as given.
+def _where_more_is_certain(found: Selection, held: list[HeldOut], seed: int) -> list[HeldOut]:
+    """Errors in short stretches, if a first cause gains there for certain and more causes improve there; else as given.
 
     Whole runs are few, and an error early in a run stays in its simulation.
     """
-    if held[0].in_stretches or any(item.ahead is None for item in held):
+    if not found.steps or held[0].in_stretches or any(item.ahead is None for item in held):
         return held
-    return _ahead(held) if _gains_for_certain(_ahead(held[:2]), seed) else held
+    in_runs = improves_held_out(found, held, seed)
+    if all(in_runs) or not _gains_for_certain(_ahead(held[:2]), seed):
+        return held
+    in_stretches = improves_held_out(found, _ahead(held), seed)
+    return _ahead(held) if [*in_stretches, False].index(False) > in_runs.index(False) else held
 
 
 def _gains_for_certain(held: Sequence[HeldOut], seed: int) -> bool:
@@ -149,7 +151,7 @@ def found_by_predictions(
         step = Step(
             chosen=chosen,
             p_value=item.p_value,
-            alternatives=_no_worse(others, item.held, kept.first, windows, seed),
+            alternatives=_no_worse(others, item.held, seed),
             before=kept.first,
             tests=compared.tests,
         )
@@ -159,7 +161,7 @@ def found_by_predictions(
     return None
 
 
-def with_alternatives(kept: Selection, compared: Compared, windows: Windows, seed: int) -> Selection:
+def with_alternatives(kept: Selection, compared: Compared, seed: int) -> Selection:
     """A single cause that a search found, with alternatives: those that predict about as well.
 
     Beside one that may imitate others, they need not gain for certain on the model without it.
@@ -174,7 +176,7 @@ def with_alternatives(kept: Selection, compared: Compared, windows: Windows, see
     else:
         others = _certain_besides(kept, compared)
     others = [item for item in others if item.cause not in {*likely, step.chosen.candidate.cause}]
-    more = _no_worse(others, known, kept.first, windows, seed)
+    more = _no_worse(others, known, seed)
     return replace(kept, steps=(replace(step, alternatives=(*step.alternatives, *more)),))
 
 
@@ -184,12 +186,13 @@ def _certain_besides(kept: Selection, compared: Compared) -> list[ComparedCause]
     return [item for item in compared.causes if item.is_certain and item.cause not in named]
 
 
-def _no_worse(
-    causes: Sequence[ComparedCause], held: HeldOut, first: Fit, windows: Windows, seed: int
-) -> tuple[FittedCandidate, ...]:
+def _no_worse(causes: Sequence[ComparedCause], held: HeldOut, seed: int) -> tuple[Rival, ...]:
     """Causes that do not predict worse for certain than a model with these errors."""
-    fitted = [fitted_to_all(item, first, windows) for item in causes if not _gains_for_certain([item.held, held], seed)]
-    return tuple(item for item in fitted if item is not None)
+    return tuple(
+        Rival(candidate=item.point.test.candidate, ship=item.fit.ship, trails_by=0.0)
+        for item in causes
+        if not _gains_for_certain([item.held, held], seed)
+    )
 
 
 def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows) -> Array:
@@ -232,7 +235,8 @@ def without_harm(
     while kept.steps and harms(ship, kept.last.ship, record):
         kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]
         if kept.steps:
-            kept = replace(kept, last=cluster_robust(kept.last, kept.last.linear.motion.windows.batch))
+            last = kept.last
+            kept = replace(kept, last=counting_runs(last, runs_of(last.linear.motion.windows), kept.dispersion))
     return kept, held
 
 
@@ -241,8 +245,8 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
 
     It does if it runs away where the model in use does not; if its mean fit in short stretches is less by more than
     `Tuning.most_loss_points`; and if it simulates some output of whole runs worse than a constant, while the model in
-    use simulates none so. A smaller loss in whole runs is weak evidence: it depends on slow errors, which in a wrong
-    model may cancel by chance.
+    use simulates none so, or all of them worse by more than `Tuning.much_better_points` on average. A smaller loss in
+    whole runs is weak evidence: it depends on slow errors, which in a wrong model may cancel by chance.
     """
     for length_s in (AHEAD_S, WHOLE_S):
         windows = cut_windows(ship.model, record, longest_s=length_s)
@@ -250,7 +254,9 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
         if length_s == AHEAD_S:
             loses = after.mean() < before.mean() - SELECTION_TUNING.most_loss_points
         else:
-            loses = bool((after < 0.0).any() and not (before < 0.0).any())
+            right = not (before < 0.0).any()
+            less = after.mean() < before.mean() - SELECTION_TUNING.much_better_points
+            loses = bool(right and (less or (after < 0.0).any()))
         if loses or (runs_away and not ran_before):
             return True
     return False

@@ -20,16 +20,18 @@ import scipy
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
+    Dispersion,
     Fit,
     FitOptions,
     HeldOut,
-    cluster_robust,
+    counting_stretches,
     cross_validate_ahead,
     fit,
     fit_output_error,
     held_out_gain,
     log_likelihood_gain,
     on_common_units,
+    spread_between_runs,
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states
@@ -45,6 +47,7 @@ from expdesign.diagnosis.select import (
 )
 from expdesign.processes import in_order
 from expdesign.progress import Progress
+from expdesign.values import Array
 
 RE_ESTIMATED = "parameters"
 """No cause here: all models have their uncertain parameters fitted."""
@@ -85,7 +88,9 @@ class ComparedCause:
     @property
     def is_certain(self) -> bool:
         """Whether it is possible, gains clearly, and by more than chance in the sum and in the count of stretches."""
-        possible = self.point.test.candidate.is_possible(self.fit.value) and not self.point.test.candidate.imitates
+        candidate = self.point.test.candidate
+        possible = candidate.is_possible(self.fit.value) and self.fit.ship.is_possible(candidate.free)
+        possible = possible and not candidate.imitates
         clear = self.gain > SELECTION_TUNING.clear_gain_points and self.gain_interval[0] > 0.0
         much = self.cause != CURRENT or self.gain_interval[0] > SELECTION_TUNING.much_better_points
         return possible and clear and much and self.p_value <= SELECTION_TUNING.accepted_p_value
@@ -134,11 +139,15 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
     tests = score_tests(base, candidates)
     without = cross_validate_ahead(base)
     shortlist = _best_of_each_cause(tests)
-    found = []
+    tried = list[tuple[StartingPoint, Fit, HeldOut]]()
     for number, fitted in enumerate(in_order(_fitted, (base,), [(test,) for test in shortlist])):
         progress(activity, (1.0 + number) / (1.0 + len(shortlist)))
-        if fitted is not None:
-            found.append(_compared(*fitted, without, len(shortlist), seed))
+        tried += [] if fitted is None else [fitted]
+    p_values = signed_rank_p_values(without, [held for *_, held in tried])
+    found = [
+        _compared(*fitted, without, min(1.0, len(shortlist) * p_value), seed)
+        for fitted, p_value in zip(tried, p_values, strict=True)
+    ]
     return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests, short=short)
 
 
@@ -147,7 +156,7 @@ def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCa
 
     Its standard errors are those of the scatter from stretch to stretch.
     """
-    ahead = cluster_robust(item.fit, np.arange(float(len(item.fit.starts))))
+    ahead = counting_stretches(item.fit)
     free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
     try:
         found = fit(ahead.ship, windows, free, starts=starts, options=FitOptions(steps=0))
@@ -191,17 +200,34 @@ def _fitted(base: Fit, test: ScoreTest) -> tuple[StartingPoint, Fit, HeldOut] | 
 
 
 def _compared(
-    point: StartingPoint, found: Fit, held: HeldOut, without: HeldOut, count: int, seed: int
+    point: StartingPoint, found: Fit, held: HeldOut, without: HeldOut, p_value: float, seed: int
 ) -> ComparedCause:
     gain, interval = held_out_gain(without, held, seed)
-    p_value = min(1.0, count * _signed_rank_p_value(without, held))
     return ComparedCause(point=point, fit=found, held=held, gain=gain, gain_interval=interval, p_value=p_value)
 
 
-def _signed_rank_p_value(without: HeldOut, held: HeldOut) -> float:
-    """That errors of stretches, as logarithms of squares averaged over outputs, are no less with a cause."""
-    pair = on_common_units(without, held)
-    lost, left = (np.log(np.maximum(item.squared_error, 1e-300)).mean(axis=1) for item in pair)
-    if len(lost) == 0 or not (lost - left).any():
-        return 1.0
-    return float(scipy.stats.wilcoxon(lost - left, alternative="greater").pvalue)
+def signed_rank_p_values(without: HeldOut, others: Sequence[HeldOut]) -> list[float]:
+    """That errors of stretches, as logarithms of squares averaged over outputs, are no less with each of some causes.
+
+    Sums of signed ranks from run to run show how runs differ.
+
+    Source: B. Rosner, R. J. Glynn and M.-L. T. Lee, Biometrics 62 (2006), 185-192, for ranks of clustered data.
+    """
+    ranks, plain = list[tuple[Array, Array]](), list[float]()
+    for held in others:
+        pair = on_common_units(without, held)
+        lost, left = (np.log(np.maximum(item.squared_error, 1e-300)).mean(axis=1) for item in pair)
+        fallen = (lost - left)[lost != left]
+        run = np.zeros(len(fallen)) if pair[0].run is None else pair[0].run[lost != left]
+        ranks.append((np.sign(fallen) * scipy.stats.rankdata(np.abs(fallen)), run))
+        plain.append(float(scipy.stats.wilcoxon(fallen, alternative="greater").pvalue) if len(fallen) else 1.0)
+    names = np.unique(np.concatenate([run for _, run in ranks])) if ranks else np.zeros(0)
+    if len(names) < 2:
+        return plain
+    masks = [(signed, run == names[:, None]) for signed, run in ranks]
+    score, size = (np.stack([same @ signed**power for signed, same in masks], axis=1) for power in (1, 2))
+    spread = spread_between_runs(score, size, np.zeros_like(size), estimated=False)
+    factors, freedoms = Dispersion.of(spread).beside(spread)
+    z = score.sum(axis=0) / np.sqrt(np.maximum(size.sum(axis=0), 1e-300) * factors)
+    wider = scipy.stats.t.sf(z, freedoms)
+    return [max(pair) if pair[0] < 0.5 else pair[0] for pair in zip(plain, wider.tolist(), strict=True)]

@@ -22,7 +22,7 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import fitted_start
 from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions
 from expdesign.diagnosis.remainder import Remainder, with_unlisted_terms
-from expdesign.diagnosis.select import Selection, Step, eliminate_backward, select_forward
+from expdesign.diagnosis.select import Selection, Step, compared_with, eliminate_backward, select_forward
 from expdesign.progress import Estimated
 from expdesign.signals import Record
 
@@ -67,6 +67,10 @@ class Selected:
         """`as_stated` as `held` was measured: of whole units or of short stretches."""
         return self.as_stated.like(self.held[0])
 
+    def compared_with(self, seed: int) -> tuple[HeldOut, bool]:
+        """Errors that the first cause is compared with, and whether they are of the same fit without it."""
+        return compared_with(self.kept, self.held, self.re_estimated, seed)
+
 
 def select_causes(
     in_use: tuple[ExtendedModel, Accuracy],
@@ -96,7 +100,7 @@ def select_causes(
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
         if compared and kept.steps and not by_predictions:
-            kept, compared = with_alternatives(kept, compared, windows, seed), None
+            kept, compared = with_alternatives(kept, compared, seed), None
         kept, held = by_predictions or (kept, held)
     rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])

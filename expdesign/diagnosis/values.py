@@ -39,6 +39,11 @@ class ErrorReduction:
     low: float
     high: float
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is worth a word and its interval excludes zero."""
+        return self.share >= VISIBLE and self.low > 0.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:
@@ -51,7 +56,7 @@ class Finding:
         fit_before, fit_after: (n,) simulated fit [%] of held-out batches, without and with it.
         error_reductions: per output.
         gain: mean over outputs of the difference; gain_interval: 95 %, bootstrap over batches.
-        not_distinguishable_from: causes that explain the data as well.
+        not_distinguishable_from: causes that explain the data as well; alternatives: in words.
         would_tell_apart: the manoeuvre that distinguishes them best, per minute, or None.
         explanation: a sentence or two.
         likelihood_gain: twice the log likelihood gained.
@@ -74,6 +79,7 @@ class Finding:
     likelihood_gain: float
     keys: tuple[str, ...]
     predicted: ErrorReduction | None = None
+    alternatives: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -121,7 +127,7 @@ class Diagnosis:
         before, after: accuracy of both on all batches, in sample.
         findings: by what the model of all loses on held-out data without each; each gain is relative to the model with
             the causes that were found before.
-        verdict: what the simulation lacks in one sentence; one more for each thing that remains.
+        verdict: three sentences: what the simulation lacks, how sure that is, what to do.
         unexplained: what remains; None where the simulation explains much, or all but the noise.
         simulated_before, simulated_after: (w, s, 4) channels beside `windows.measured`.
         errors: per finding, (w, s, 4) error of the model with the earlier findings.

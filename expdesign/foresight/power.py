@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
-from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, falls_for_certain, simulates_better
+from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, shows_for_certain, simulates_better
 from expdesign.foresight.information import SimulatedUnits, beside_nuisance
 from expdesign.foresight.tuning import TUNING
 from expdesign.values import Array
@@ -252,15 +252,16 @@ def _is_shown(before: HeldOut, after: HeldOut, re_estimated: HeldOut, ratios: Ar
         before: errors of simulating them without it; after: with it; re_estimated: without it, parameters fitted.
         ratios: (k b,) logarithms of the squared errors of predicting the blocks of each, with it over without.
     """
-    gained = held_out_gain(before, after, 0)
+    better = simulates_better(before, after, held_out_gain(before, after, 0))
+    if shows_for_certain(before, after, 0):
+        return better
     scatter = float(ratios.std(ddof=1)) if len(ratios) > 1 else np.inf
     middle, error = float(ratios.mean()), 1.96 * scatter / np.sqrt(len(ratios))
     predicts, share = middle + error < 0.0, 1.0 - np.exp(middle)
-    better = simulates_better(before, after, gained)
-    if gained[1][0] > 0.0 or gained[1][1] < 0.0:
-        return better
-    shows = predicts or falls_for_certain(before, after, 0) or held_out_gain(re_estimated, after, 0)[1][0] > 0.0
-    return bool((better and shows) or (predicts and share >= SELECTION_TUNING.least_predicted))
+    if predicts and share >= SELECTION_TUNING.least_predicted:
+        return True
+    shows = (predicts and share >= SELECTION_TUNING.least_reduction) or shows_for_certain(re_estimated, after, 0)
+    return bool(better and shows)
 
 
 def _root(A: Array) -> Array:

@@ -17,11 +17,12 @@ from expdesign.diagnosis.conclusions.notes import (
 from expdesign.diagnosis.conclusions.verdict import (
     DIVERGED_FIT,
     accuracy_in_words,
+    alternatives,
     benefit,
-    doubted,
     has_diverged,
     manoeuvre,
     missing_effect,
+    remarks,
     unit_name,
     verdict,
 )
@@ -29,8 +30,8 @@ from expdesign.diagnosis.conclusions.verdict import (
 __all__ = [
     "DIVERGED_FIT",
     "accuracy_in_words",
+    "alternatives",
     "benefit",
-    "doubted",
     "error_reductions_of",
     "finding_of",
     "has_diverged",
@@ -47,6 +48,7 @@ __all__ = [
     "notes_on_data",
     "notes_on_found_again",
     "notes_on_rejected",
+    "remarks",
     "unit_name",
     "verdict",
 ]

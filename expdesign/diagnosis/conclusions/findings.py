@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values
+from expdesign.diagnosis.conclusions.verdict import effect_in_words
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit import Fit, HeldOut, bootstrap_sums, held_out_gain, on_common_units, prediction_gain
+from expdesign.diagnosis.fit import Fit, HeldOut, held_out_gain, prediction_gain
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select import Step
-from expdesign.diagnosis.values import VISIBLE, ErrorReduction, Estimate, Finding
+from expdesign.diagnosis.select import Step, certain_reductions
+from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
 from expdesign.diagnosis.vessel_file import public_name, stated_values
-from expdesign.values import Array
+
+CHANGED = "change:time"
 
 
 def finding_of(
@@ -32,8 +32,13 @@ def finding_of(
     chosen, (before, after) = step.chosen, held
     gain, interval = held_out_gain(before, after, seed)
     values = _values(step, last)
+    explanation = cause_of(chosen.candidate.cause).explain(values, last.ship) + stated_values(values, last.ship)
+    if CHANGED in values:
+        time, std = values[CHANGED]
+        run, begin, _ = windows.place(time)
+        values[CHANGED] = (time - begin, std)
+        explanation = cause_of(chosen.candidate.cause).explain(values, last.ship) + f" Times are of {run}."
     reductions = error_reductions_of(chosen.fit.ship.model.outputs, before, after, seed)
-    visible = max(reductions, key=lambda item: item.low).share >= VISIBLE
     return Finding(
         cause=chosen.candidate.cause,
         estimates=_estimates(values, chosen.fit.ship),
@@ -41,12 +46,17 @@ def finding_of(
         fit_before=before.fit,
         fit_after=after.fit,
         error_reductions=reductions,
-        predicted=None if visible else _predicted(before, after, windows, chosen.fit.noise),
+        predicted=None
+        if any(item.is_certain for item in reductions)
+        else _predicted(before, after, windows, chosen.fit.noise),
         gain=gain,
         gain_interval=interval,
-        not_distinguishable_from=tuple(other.candidate.cause for other in step.alternatives),
+        not_distinguishable_from=tuple(dict.fromkeys(other.candidate.cause for other in step.alternatives)),
+        alternatives=tuple(
+            effect_in_words(other.candidate.cause, tuple(other.candidate.free)) for other in step.alternatives
+        ),
         would_tell_apart=would_tell_apart,
-        explanation=cause_of(chosen.candidate.cause).explain(values, last.ship) + stated_values(values, last.ship),
+        explanation=explanation,
         likelihood_gain=chosen.likelihood_gain,
         keys=tuple(values),
     )
@@ -87,16 +97,5 @@ def error_reductions_of(
     outputs: Sequence[str], before: HeldOut, after: HeldOut, seed: int
 ) -> tuple[ErrorReduction, ...]:
     """Reductions of the simulated error of held-out units, with 95 % intervals by the bootstrap."""
-    before, after = on_common_units(before, after)
-    whole = _reduction(before.squared_error.sum(axis=0), after.squared_error.sum(axis=0))
-    drawn_before, drawn_after = bootstrap_sums(before, after, seed)
-    drawn = _reduction(drawn_before.squared_error, drawn_after.squared_error)
-    low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0)
-    rows = zip(outputs, whole.tolist(), low.tolist(), high.tolist(), strict=True)
-    return tuple(ErrorReduction(output=name, share=share, low=least, high=most) for name, share, least, most in rows)
-
-
-def _reduction(before: Array, after: Array) -> Array:
-    """Share by which a root mean square error falls, from sums of squares."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(1.0 - np.sqrt(after / before))
+    rows = zip(outputs, *(item.tolist() for item in certain_reductions(before, after, seed)), strict=True)
+    return tuple(ErrorReduction(output=name, share=share, low=low, high=high) for name, share, low, high in rows)

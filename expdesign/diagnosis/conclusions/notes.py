@@ -13,7 +13,7 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
-    gain_beside_the_same_fit,
+    p_value_between_runs,
     same_effects_as_any,
 )
 from expdesign.diagnosis.vessel_file import public_name
@@ -54,8 +54,8 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
     if "r" in windows.derived:
         notes.append("The yaw rate is derived from the heading. The scale of a rate gyro was not tested.")
     if constant:
-        verb = "changes" if len(constant) == 1 else "change"
-        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through them cannot be seen.")
+        verb, them = ("changes", "it") if len(constant) == 1 else ("change", "them")
+        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through {them} cannot be seen.")
     if not (vessel.model.parameter_std > 0).any():
         notes.append("The vessel file has no parameter_std. Its parameters count as known.")
     return tuple(notes)
@@ -111,10 +111,17 @@ def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str
     rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
     return tuple(
         f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
-        f"{step.p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off any error "
-        "or gains nothing significant, or its size may be zero."
+        f"{p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off every error, "
+        "or its gain or its size may be zero."
         for step in rejected
+        if (p_value := _p_value_left(step, kept)) <= SELECTION_TUNING.level
     )
+
+
+def _p_value_left(step: Step, kept: Selection) -> float:
+    """p-value of a rejected cause beside the findings, if it is tested beside them."""
+    left = [item.adjusted for item in kept.last_tests if same_effects_as_any(item.candidate, [step.chosen.candidate])]
+    return min(left) if left else p_value_between_runs(step.chosen, None, kept.dispersion)
 
 
 def note_on_work(found: Selection) -> tuple[str, ...]:
@@ -204,27 +211,12 @@ def note_on_predictions(
     )
 
 
-def note_beside_the_same_fit(
-    kept: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
-) -> tuple[str, ...]:
-    """The gain of the first cause where that on the model in use is not certain.
-
-    Args:
-        kept: the causes.
-        held: errors on held-out units of the model before any cause, then after every one.
-        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
-        seed: of the intervals.
-    """
-    if not kept.steps or held_out_gain(held[0], held[1], seed)[1][0] > 0.0:
-        return ()
-    known = gain_beside_the_same_fit(kept, held, re_estimated, seed)
-    if known is None or not known[1][0] > 0.0:
-        return ()
-    gain, (low, high) = known
+def note_beside_the_same_fit(kept: Selection) -> tuple[str, ...]:
+    """What the gain of the first cause is relative to, where it is not the model in use."""
     return (
-        "The parameters of the vessel file may have been fitted to these data too. On the model re-estimated without "
-        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} as it is with it, the gain is {gain:+.1f} points "
-        f"({low:.1f} to {high:.1f}).",
+        "The parameters of the vessel file may have been fitted to these data too. So the gain of "
+        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} is that on the model re-estimated without it as it is "
+        "with it.",
     )
 
 

@@ -1,4 +1,7 @@
-"""The verdict of a diagnosis: missing effects, their gains and open questions in one sentence, then what remains."""
+"""The verdict of a diagnosis: a sentence of what is missing, one of how sure that is, and one of what to do.
+
+What else is known goes into remarks.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ import numpy as np
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
-from expdesign.diagnosis.values import VISIBLE, ErrorReduction, Finding, Lead, Unexplained
+from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
+from expdesign.values import Array
 
 DIVERGED_FIT = -300.0
 """Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
@@ -53,7 +57,9 @@ MANOEUVRES = {
 LITTLE_FIT = 50.0
 """Fit [%] of an output below which data are not called free of error, whatever noise there is."""
 MOST_NAMED = 3
-"""Parameters in a sentence."""
+"""Parameters, or equivalent causes, in a sentence."""
+SENSORS = ("heading_bias", "lever_arm", "sensor_delay", "gyro_scale")
+WEATHER = ("current", "wind")
 
 
 def missing_effect(cause: str, parameters: Sequence[str] = ()) -> str:
@@ -67,11 +73,23 @@ def missing_effect(cause: str, parameters: Sequence[str] = ()) -> str:
     return f"the term {term}" if kind == "missing_term" else MISSING_EFFECTS[kind]
 
 
+def effect_in_words(cause: str, keys: Sequence[str]) -> str:
+    """Missing effect of a cause with these effects; an offset is named after its actuators."""
+    kind, _, group = (keys or ("",))[0].partition(":")
+    parameters = [key.split(":", 1)[1] for key in keys if key.startswith("theta:")]
+    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(cause, parameters)
+
+
 def lacking(item: Finding) -> str:
-    """Missing effect of a finding: as of its cause, but an offset is named after its actuators."""
-    kind, _, group = (item.keys or ("",))[0].partition(":")
-    parameters = [key.split(":", 1)[1] for key in item.keys if key.startswith("theta:")]
-    return f"the offset of the {group} angle" if kind == "offset" else missing_effect(item.cause, parameters)
+    """Missing effect of a finding."""
+    return effect_in_words(item.cause, item.keys)
+
+
+def alternatives(item: Finding) -> list[str]:
+    """What the data cannot tell from a finding, in words."""
+    words = item.alternatives or [missing_effect(name) for name in item.not_distinguishable_from]
+    words = [word for word in dict.fromkeys(words) if word != lacking(item)]
+    return [*words[:MOST_NAMED], *["others"] * (len(words) > MOST_NAMED)]
 
 
 def manoeuvre(name: str) -> str:
@@ -80,14 +98,14 @@ def manoeuvre(name: str) -> str:
 
 
 def benefit(item: Finding) -> str:
-    """Effect of adding it on the output with the most certain gain, e.g. "cuts the sway error by 52 % (45 to 60 %)"."""
-    known = [reduction for reduction in item.error_reductions if np.isfinite(reduction.share)]
-    if not known:
-        return f"gains {item.gain:.1f} points of fit"
-    best = max(known, key=lambda reduction: reduction.low)
-    if best.share >= VISIBLE:
-        return _reduction(best)
-    return "reduces no error by 1 % or more" if item.predicted is None else _prediction(item.predicted)
+    """Effect of adding it, told by the output whose error falls most, of those of which that is certain.
+
+    E.g. "cuts the sway error by 52 % (45 to 60 %)".
+    """
+    certain = [reduction for reduction in item.error_reductions if reduction.is_certain]
+    if certain:
+        return _reduction(max(certain, key=lambda reduction: reduction.share))
+    return "reduces no error for certain" if item.predicted is None else _prediction(item.predicted)
 
 
 def _prediction(item: ErrorReduction) -> str:
@@ -117,11 +135,10 @@ def verdict(
     unexplained: Unexplained | None = None,
     within_std: Sequence[ErrorReduction] = (),
     signs: Sequence[Lead] = (),
-    refused: Sequence[str] = (),
     kinds: Sequence[str] = (),
-    instead: Sequence[str] = (),
+    faults: Sequence[str] = (),
 ) -> str:
-    """What the simulation lacks, in one sentence; then one sentence for each thing that remains.
+    """What the simulation lacks, how sure that is, and what to do: three sentences.
 
     Args:
         findings: by what the model loses without each.
@@ -129,75 +146,132 @@ def verdict(
         unit: what gains are measured on.
         unexplained: what remains, if that is much.
         within_std: what uncertain parameters gain within their standard deviations, if that is clear.
-        signs: causes that are significant in a test and no findings, where the error is more than noise.
-        refused: causes with which the data would be simulated worse than without, and which are no findings so.
-        kinds: what else the error looks like, which no cause of the catalogue is and no model can get.
-        instead: the same of what explains about as much as the findings do.
+        signs: causes that are no findings, where the error is more than noise.
+        kinds: what the error looks like, which no cause of the catalogue is and no model can get.
+        faults: of the record itself, which are to be looked at before any cause is believed.
     """
-    beyond = [f"No known cause matches what remains: it looks like {listed(kinds)}"] if kinds else []
-    remains = [] if unexplained is None else _remainder(unexplained, unit, "Much remains unexplained")
-    harmful = _refused(refused)
-    if not findings and kinds:
-        return _sentences([*beyond, _capital(accuracy_in_words(before))])
-    if not findings and within_std:
-        best = _reduction(max(within_std, key=lambda item: item.low), verbs=("halve", "cut"))
-        within = f"Parameters re-estimated within their stated standard deviations {best} on {unit} held out"
-        return _sentences([within, *(remains or ["No other cause is certain"])])
-    if not findings and unexplained is not None:
-        little = "The simulation explains little of these data and no cause is certain"
-        return _sentences([*_remainder(unexplained, unit, little), *harmful])
-    if not findings and (signs or refused):
-        named = [_lead(item) for item in signs]
-        open_signs = [f"Signs of {listed(named)} improve nothing for certain on {unit} held out"] if named else []
-        certain = f"No cause of the remaining error is certain: {accuracy_in_words(before)}"
-        return _sentences([certain, *open_signs, *harmful])
-    if not findings and (before.fit < LITTLE_FIT).any():
-        little = "The simulation explains little of these data, and no cause of the catalogue explains more"
-        noise = "What remains is like the noise of the sensors, which may hide the motion or an error of it"
-        return _sentences([f"{little}: {accuracy_in_words(before)}", noise])
-    if not findings:
-        return _sentences([f"These data show no error of the model: {accuracy_in_words(before)}"])
-    lacks = [f"The simulation lacks {listed([lacking(item) for item in findings])}"]
-    lacks += [_benefits(findings, unit), *_invisible(findings)]
-    lacks += [_open_question(item) for item in findings if item.not_distinguishable_from]
-    others = listed(instead, "or") if instead else ""
-    also = [f"A cause outside the catalogue explains these data about as well: {others}"] if others else []
-    return _sentences(["; ".join(lacks), *harmful, *remains, *also, *beyond])
+    if findings:
+        sentences = _of_findings(findings, unit, unexplained)
+    elif kinds:
+        what = f"No cause of the catalogue matches the error: it looks like {listed(kinds)}"
+        sentences = [what, _accuracy(before), "Look for that in the ship and her instruments, and keep the vessel file"]
+    elif within_std:
+        certain = [item for item in within_std if item.is_certain] or list(within_std)
+        best = _reduction(max(certain, key=lambda item: item.share), verbs=("halve", "cut"))
+        what = "These data show no error of the model beyond the stated standard deviations of its parameters"
+        sure = f"Re-estimated within these, the parameters {best} on {unit} held out"
+        sentences = [what, sure, "Use the extended vessel file, which has them"]
+    elif unexplained is not None:
+        what = "The simulation explains little of these data and no cause is certain"
+        best = f"; the best candidate is {_lead(unexplained.leads[0])} on {unit} held out" if unexplained.leads else ""
+        sentences = [what, _capital(_fits(unexplained)) + best, MORE_DATA]
+    elif signs:
+        better = [f"; {_lead(lead)} improves nothing for certain on {unit} held out" for lead in signs if lead.gain > 0]
+        sure = "".join([_accuracy(before), *better[:1]])
+        sentences = ["No cause of the remaining error is certain", sure, f"Keep the vessel file; {MORE_RUNS}"]
+    elif (before.fit < LITTLE_FIT).any():
+        what = "The simulation explains little of these data, and no cause of the catalogue explains more"
+        noise = "what remains is like the noise of the sensors, which may hide the motion or an error of it"
+        sentences = [what, f"{_accuracy(before)}; {noise}", MORE_DATA]
+    else:
+        sentences = ["These data show no error of the model", _accuracy(before), "Keep the vessel file"]
+    if faults:
+        sentences[-1] = f"Look at the record first: {faults[0].rstrip('.')}"
+    return _sentences(sentences)
 
 
-def doubted(faults: Sequence[str]) -> str:
-    """What is to be looked at before any cause is believed: the first fault of the record itself; "" without any."""
-    return "".join(f"Look at the record first: {fault}{'' if fault[-1] in '.?' else '.'} " for fault in faults[:1])
+MORE_RUNS = "more runs would tell"
+MORE_DATA = "Keep the vessel file; sail more runs, and measure wind and current, before it is changed"
+
+
+def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplained | None) -> list[str]:
+    """Three sentences of what is missing."""
+    named = []
+    for item in findings:
+        others = alternatives(item)
+        alike = " (these data cannot tell which)" if others else ""
+        named.append(listed([lacking(item), *others], "or") + alike)
+    sure = _benefits(findings, unit)
+    if unexplained is not None:
+        sure += f"; much remains unexplained, {_fits(unexplained)}"
+    return [f"The simulation lacks {listed(named)}", sure, _advice(findings)]
+
+
+def _advice(findings: Sequence[Finding]) -> str:
+    """What to do about findings: first what would tell them from others, else by the kind of the first."""
+    for item in findings:
+        others = alternatives(item)
+        if others and item.would_tell_apart is not None:
+            return f"Sail {manoeuvre(item.would_tell_apart)} to tell {lacking(item)} from {listed(others, 'or')}"
+    if any(alternatives(item) for item in findings):
+        return "Sail other manoeuvres to tell these apart, before the vessel file is changed"
+    causes = [item.cause for item in findings]
+    if causes[0] in SENSORS:
+        return "Correct the instruments; the extended vessel file describes them as they were"
+    if causes[0] in WEATHER:
+        return "Use the extended vessel file for data in the same weather"
+    if causes[0] == "change_point":
+        return "Diagnose the data before and after the change separately"
+    return "Use the extended vessel file, after a look at runs that it has not seen"
+
+
+def remarks(
+    unit: str, unexplained: Unexplained | None, signs: Sequence[Lead], refused: Sequence[str], instead: Sequence[str]
+) -> tuple[str, ...]:
+    """What a verdict has no room for.
+
+    Args:
+        unit: what gains are measured on.
+        unexplained: what remains, if that is much.
+        signs: causes that are no findings.
+        refused: causes with which the data would be simulated worse than without, and which are no findings so.
+        instead: what no cause of the catalogue is, and explains about as much as the findings do.
+    """
+    found = []
+    if refused:
+        names, verb = listed([missing_effect(cause) for cause in refused]), "it is" if len(refused) == 1 else "they are"
+        found.append(f"With {names} the simulation of these data would diverge or be worse, so {verb} not written.")
+    if instead:
+        found.append(f"A cause outside the catalogue explains these data about as well: {listed(instead, 'or')}.")
+    if unexplained is not None:
+        shares = [
+            f"{_percent(share)} % off the {WORDS[name]} error"
+            for name, share in zip(unexplained.outputs, unexplained.force_share.tolist(), strict=True)
+            if np.isfinite(share)
+        ]
+        found.append(f"A slowly varying force that nobody measured would take {listed(shares)}." if shares else "")
+    others = [*signs, *(() if unexplained is None else unexplained.leads)]
+    leads = {lead.cause: lead for lead in others if lead.gain > 0.0}
+    if leads:
+        named = listed([_lead(lead) for lead in leads.values()])
+        found.append(f"Not certain, by their gains on {unit} held out: {named}.")
+    return tuple(text for text in found if text)
 
 
 def _sentences(texts: Sequence[str]) -> str:
-    return " ".join(f"{text}." for text in texts)
+    return " ".join(text if text.endswith("?") else f"{text}." for text in texts)
 
 
 def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def _remainder(unexplained: Unexplained, unit: str, opening: str) -> list[str]:
-    """How little is explained, what an unmeasured force would account for, and the best candidates."""
-    rows = list(zip([WORDS[name] for name in unexplained.outputs], unexplained.fit.tolist(), strict=True))
+def _accuracy(found: Accuracy) -> str:
+    return _capital(accuracy_in_words(found))
+
+
+def _fits(unexplained: Unexplained) -> str:
+    """How little is explained."""
+    return _fits_in_words(unexplained.outputs, unexplained.fit)
+
+
+def _fits_in_words(outputs: Sequence[str], fits: Array) -> str:
+    rows = [(WORDS[name], fit) for name, fit in zip(outputs, fits.tolist(), strict=True) if np.isfinite(fit)]
     diverged = [word for word, fit in rows if fit < DIVERGED_FIT]
-    fits = [f"{fit:.0f} % in {word}" for word, fit in rows if fit >= DIVERGED_FIT]
-    parts = [f"the fit is {listed(fits)}"] if fits else []
+    known = [f"{fit:.0f} % in {word}" for word, fit in rows if fit >= DIVERGED_FIT]
+    parts = [f"the fit is {listed(known)}"] if known else []
     parts += [f"the simulation diverges in {listed(diverged)}"] if diverged else []
-    shares = [
-        f"{_percent(share)} % off the {word} error"
-        for (word, _), share in zip(rows, unexplained.force_share.tolist(), strict=True)
-    ]
-    sentences = [
-        f"{opening}: {listed(parts)}",
-        f"A slowly varying force that nobody measured would take {listed(shares)}",
-    ]
-    if unexplained.leads:
-        verb = "candidate is" if len(unexplained.leads) == 1 else "candidates are"
-        named = listed([_lead(lead) for lead in unexplained.leads])
-        sentences += [f"The best uncertain {verb} {named} on {unit} held out"]
-    return sentences
+    return listed(parts) if parts else "the fit is not known, as nothing varies"
 
 
 def _lead(lead: Lead) -> str:
@@ -208,56 +282,17 @@ def _lead(lead: Lead) -> str:
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
     if len(findings) == 1:
-        return f"adding it {benefit(findings[0])} on {unit} held out of the fit"
+        it = "them" if lacking(findings[0]).startswith("the correct values") else "it"
+        return f"Adding {it} {benefit(findings[0])} on {unit} held out of the fit"
     first, *others = [f"{lacking(item)} {benefit(item)}" for item in findings]
-    return f"on {unit} held out of the fit, {listed([f'adding {first}', *others])}"
-
-
-def _invisible(findings: Sequence[Finding]) -> list[str]:
-    """Findings that are significant and yet do not improve the simulation visibly."""
-    small = [
-        item
-        for item in findings
-        if item.error_reductions and item.predicted is None and not any(map(_is_visible, item.error_reductions))
-    ]
-    if not small:
-        return []
-    names = "it" if len(findings) == 1 else listed([lacking(item) for item in small])
-    verb = "is" if len(small) == 1 else "are"
-    return [f"{names} {verb} significant in a test, but too small to show in velocities as noisy as these"]
-
-
-def _refused(causes: Sequence[str]) -> list[str]:
-    """Causes that would harm the simulation."""
-    if not causes:
-        return []
-    names = listed([missing_effect(cause) for cause in causes])
-    verb = "it is" if len(causes) == 1 else "they are"
-    return [f"With {names} the simulation of these data would diverge or be worse, so {verb} not written"]
-
-
-def _is_visible(reduction: ErrorReduction) -> bool:
-    return reduction.share >= VISIBLE
-
-
-def _open_question(item: Finding) -> str:
-    """Alternatives of a finding, and the manoeuvre that distinguishes them."""
-    alternatives = listed([missing_effect(name) for name in item.not_distinguishable_from], "or")
-    if item.would_tell_apart is None:
-        return f"these data cannot distinguish {lacking(item)} from {alternatives}"
-    verb = "explains" if len(item.not_distinguishable_from) == 1 else "explain"
-    return (
-        f"{manoeuvre(item.would_tell_apart)} would distinguish {lacking(item)} from {alternatives}, which "
-        f"{verb} these data as well"
-    )
+    return f"On {unit} held out of the fit, {listed([f'adding {first}', *others])}"
 
 
 def accuracy_in_words(found: Accuracy) -> str:
     """How well a model simulates the data."""
     if has_diverged(found):
         return "simulated over whole runs, the model diverges from the ship"
-    rows = zip(found.outputs, found.fit.tolist(), strict=True)
-    return f"the fit is {listed([f'{value:.0f} % in {WORDS[name]}' for name, value in rows])}"
+    return _fits_in_words(found.outputs, found.fit)
 
 
 def has_diverged(found: Accuracy) -> bool:

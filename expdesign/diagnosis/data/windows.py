@@ -46,7 +46,8 @@ class Windows:
         time_s: (w, k) time since the first batch began, batches laid end to end.
         has_heading, has_wind, has_depth: whether these are measured.
         derived: those of u, v, r that come from the pose.
-        names: of the batches.
+        names: of the batches, those of one file "NAME, batch NUMBER".
+        starts: (batches,) where each begins on the clock of `time_s`; empty where nothing depends on it.
         rows_per_step: samples of the data in an integrator step, where several are averaged.
         white_noise: fits take what is left for white noise. In windows too short to tell slow noise or a random current
             from a steady force, either would take the place of any slow effect.
@@ -69,6 +70,7 @@ class Windows:
     names: tuple[str, ...]
     rows_per_step: int = 1
     white_noise: bool = False
+    starts: tuple[float, ...] = ()
 
     @property
     def sample_s(self) -> float:
@@ -95,6 +97,35 @@ class Windows:
         """(w, k) integrator steps of each window in its batch, the last one repeated in the padding."""
         ends = np.array([len(rows) // self.rows_per_step for rows in self.batch_inputs])[self.batch.astype(int)]
         return np.asarray(np.minimum(self.first[:, None] + np.arange(self.steps), ends[:, None] - 1).astype(int))
+
+    @cached_property
+    def run_starts(self) -> Array:
+        """(batches,) where the run begins that each is of, on the clock of `time_s`: batches of one file are a run."""
+        files = [name.partition(BATCH)[0] for name in self.names]
+        first = [number for number, name in enumerate(files) if not number or name != files[number - 1]]
+        begun = np.array(self.starts)[first]
+        return np.asarray(begun[np.searchsorted(first, np.arange(len(files)), side="right") - 1])
+
+    @property
+    def run_time_s(self) -> Array:
+        """(w, k) time since the run of each window began [s]: clocks of separate runs tell nothing of each other."""
+        return self.time_s - self.run_starts[self.batch.astype(int)][:, None] if self.starts else self.time_s
+
+    def place(self, time_s: float) -> tuple[str, float, float]:
+        """Run at a time on the clock of `time_s`, where it begins and how long it is [s]."""
+        begin = float(self.run_starts[max(int(np.searchsorted(self.starts, time_s, side="right")) - 1, 0)])
+        batch = int(np.searchsorted(self.starts, begin))
+        last = int(np.flatnonzero(self.run_starts == begin)[-1])
+        rows = len(self.batch_inputs[last]) // self.rows_per_step
+        return self.names[batch].partition(BATCH)[0], begin, self.starts[last] + rows * self.step_s - begin
+
+    def share_after(self, time_s: float) -> Array:
+        """(w, k) share of every step after a time, in the run that is under way then; all that begins after 0 s."""
+        share = np.clip((self.time_s + self.step_s - time_s) / self.step_s, 0.0, 1.0)
+        if not self.starts or time_s <= 0.0:
+            return np.asarray(share)
+        mine = self.run_starts[self.batch.astype(int)] == self.place(time_s)[1]
+        return np.asarray(share * mine[:, None])
 
     @property
     def step_inputs(self) -> Array:
@@ -135,6 +166,7 @@ class Windows:
         return whole.selected(np.isfinite(whole.measured[..., :3]).any(axis=2).sum(axis=1) >= TUNING.fewest_in_window)
 
 
+BATCH = ", batch "
 ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
 
 
@@ -212,6 +244,7 @@ def cut_windows(
         has_depth=all(has_depth(batch) for batch in record.batches),
         derived=derived,
         names=tuple(batch.name for batch in record.batches),
+        starts=tuple(starts[:-1].tolist()),
         rows_per_step=merged,
         white_noise=False,
         **{name: np.stack(values) for name, values in rows.items()},

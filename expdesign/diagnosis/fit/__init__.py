@@ -1,10 +1,23 @@
 """Gauss-Newton fits of effects and parameters to all windows, with their noise, covariance and cross-validation.
 
 A `Fit` holds a model, the noise of its remainder and the linear model around it. `fit` finds one, `log_likelihood_gain`
-compares two, `cluster_robust` corrects standard errors, `cross_validate` measures errors on held-out data.
+compares two, `counting_runs` corrects standard errors, `cross_validate` measures errors on held-out data.
 """
 
-from expdesign.diagnosis.fit.cluster_robust import cluster_robust
+from expdesign.diagnosis.fit.between_runs import (
+    NOISE_ALONE,
+    Dispersion,
+    Spread,
+    counting_runs,
+    counting_stretches,
+    directions_between_runs,
+    few_runs_factor,
+    of_several,
+    runs_of,
+    spread_between_runs,
+    sum_by_run,
+    tail,
+)
 from expdesign.diagnosis.fit.cross_validation import (
     CrossValidation,
     cross_validate,
@@ -60,20 +73,26 @@ __all__ = [
     "AHEAD_S",
     "BLOCK_S",
     "FOLDS",
+    "NOISE_ALONE",
     "CrossValidation",
+    "Dispersion",
     "Fit",
     "FitOptions",
     "HeldOut",
     "MarginalInformation",
+    "Spread",
     "bootstrap_sums",
     "build_sensitivities",
-    "cluster_robust",
     "continuing",
+    "counting_runs",
+    "counting_stretches",
     "cross_validate",
     "cross_validate_ahead",
     "deviations_of",
     "difference_step",
+    "directions_between_runs",
     "effect_disturbances",
+    "few_runs_factor",
     "fit",
     "fit_ahead",
     "fit_output_error",
@@ -86,10 +105,15 @@ __all__ = [
     "likeliest",
     "log_likelihood_gain",
     "marginalised",
+    "of_several",
     "on_common_units",
     "prediction_gain",
     "profile_cost",
+    "runs_of",
     "sensitivities_to",
+    "spread_between_runs",
+    "sum_by_run",
+    "tail",
     "uncertain_keys",
     "unmeasured_force_share",
     "validation_units",

@@ -221,7 +221,13 @@ def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
         lost = lost if lost_at is None else np.minimum(lost, lost_at[test])
         for total, more in ((error, lost), (deviation, varied)):
             np.add.at(total, np.searchsorted(parts, given.part[test]), more)
-    return HeldOut(squared_error=error, squared_deviation=deviation, unconverged=unconverged, models=tuple(tested))
+    return HeldOut(
+        squared_error=error,
+        squared_deviation=deviation,
+        unconverged=unconverged,
+        run=windows.batch if given.in_stretches else None,
+        models=tuple(tested),
+    )
 
 
 def error_of_constants(measured: Array, batch: Array) -> Array:

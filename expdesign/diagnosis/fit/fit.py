@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,7 @@ class Fit:
         step: (c,) to the optimum of the linear model within bounds.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
+        freedom: degrees of freedom of the covariance, where it counts how runs differ.
     """
 
     ship: ExtendedModel
@@ -60,6 +62,7 @@ class Fit:
     step: Array
     converged: bool
     simulations: int = 1
+    freedom: float = math.inf
 
     def selected(self, keep: NDArray[np.bool_]) -> Fit:
         """The same effects beside only some of the windows, by a mask (w,): where a fit to these begins.
@@ -163,26 +166,29 @@ def _prior_std(ship: ExtendedModel) -> dict[str, float]:
 def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 0.0) -> Array:
     """(2, c) least and greatest steps to the bounds of effects; infinite for those without.
 
-    Times cannot be below zero, what holds the ship at high speed cannot push her (`resisting`), samples show no faster
-    oscillation than `Windows.shortest_period_s`, and a stable ship rolls no slower than `longest_roll_s`.
+    Those of the ship, her sensors and the sea are `ExtendedModel.bounds`. Times cannot be below zero, what holds the
+    ship at high speed cannot push her (`resisting`), and samples show no faster oscillation than
+    `Windows.shortest_period_s`. What lies outside may stay there, and comes no further.
 
     Args:
         ship: the model before the step.
         keys: effects.
         shortest_s: that period [s].
     """
-    bounds = np.tile([[-np.inf], [np.inf]], len(keys))
+    now = np.array([ship.get(key) for key in keys])
+    bounds = np.array([ship.bounds(key) for key in keys]).reshape(-1, 2).T - now
     parameters = dict(zip(ship.model.names, ship.model.parameters.tolist(), strict=True))
     signs = resisting(ship.model)
     for place, key in enumerate(keys):
         if key.startswith(POSITIVE):
-            bounds[0, place] = LEAST_TIME_S - ship.get(key)
-        if key == "roll:period":  # one stated shorter may stay
-            bounds[:, place] = min(0.0, shortest_s - ship.get(key)), max(0.0, ship.longest_roll_s - ship.get(key))
+            bounds[0, place] = LEAST_TIME_S - now[place]
+        if key == "roll:period":
+            bounds[0, place] = shortest_s - now[place]
         sign = signs.get(key.removeprefix("theta:"), 0.0)
         if sign:
-            bounds[int(sign < 0), place] = -parameters[key.removeprefix("theta:")] - ship.get(key)
-    return bounds
+            bounds[int(sign < 0), place] = -parameters[key.removeprefix("theta:")] - now[place]
+    kept = np.array([key.startswith(POSITIVE) or key.removeprefix("theta:") in signs for key in keys], dtype=bool)
+    return np.where(kept, bounds, [np.minimum(bounds[0], 0.0), np.maximum(bounds[1], 0.0)])
 
 
 def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:

@@ -27,6 +27,7 @@ class HeldOut:
         unconverged: folds that kept the effects fitted to all units.
         ahead: of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called.
         in_stretches: whether these are such errors.
+        run: (b,) of each unit, where these are stretches of runs: those of one run share its errors.
         models: (mask of windows, model fitted without them) of every fold; None where it could not be fitted.
     """
 
@@ -35,6 +36,7 @@ class HeldOut:
     unconverged: int = 0
     ahead: Callable[[], HeldOut] | None = None
     in_stretches: bool = False
+    run: Array | None = None
     models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
 
     @property
@@ -75,7 +77,11 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
     """Two models on the units that could be fitted for both."""
     both = np.isfinite(before.squared_error).all(axis=1) & np.isfinite(after.squared_error).all(axis=1)
     first, second = (
-        HeldOut(squared_error=item.squared_error[both], squared_deviation=item.squared_deviation[both])
+        HeldOut(
+            squared_error=item.squared_error[both],
+            squared_deviation=item.squared_deviation[both],
+            run=None if item.run is None else item.run[both],
+        )
         for item in (before, after)
     )
     return first, second
@@ -84,9 +90,11 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
 def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut, HeldOut]:
     """Sums over units drawn with replacement, (draws, n), the same units for both models.
 
-    The same seed draws the same units, for decisions and for reports.
+    Of stretches of several runs, runs are drawn, then stretches of each. The same seed draws the same units, for
+    decisions and for reports.
     """
-    times = _times_drawn(len(before.squared_error), TUNING.bootstrap_draws, seed)
+    runs = (0,) * len(before.squared_error) if before.run is None else tuple(before.run.tolist())
+    times = _times_drawn(runs, TUNING.bootstrap_draws, seed)
     first, second = (
         HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
         for item in (before, after)
@@ -95,11 +103,21 @@ def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut,
 
 
 @lru_cache(maxsize=16)
-def _times_drawn(count: int, draws: int, seed: int) -> Array:
-    """(draws, count) how often each unit is drawn."""
-    drawn = np.random.default_rng(seed).integers(0, count, (draws, count))
-    places = drawn + count * np.arange(draws)[:, None]
-    return np.bincount(places.ravel(), minlength=draws * count).reshape(draws, count).astype(float)
+def _times_drawn(runs: tuple[float, ...], draws: int, seed: int) -> Array:
+    """(draws, count) how often each unit is drawn, given its run."""
+    rng = np.random.default_rng(seed)
+    names, run = np.unique(runs, return_inverse=True)
+    runs_drawn = _drawn(rng, np.full(draws, len(names)), len(names)) if len(names) > 1 else np.ones((draws, 1))
+    times = np.zeros((draws, len(run)))
+    for number in range(len(names)):
+        units = np.flatnonzero(run == number)
+        times[:, units] = _drawn(rng, (len(units) * runs_drawn[:, number]).astype(int), len(units))
+    return times
+
+
+def _drawn(rng: np.random.Generator, many: NDArray[np.int64], count: int) -> Array:
+    """(draws, count) how often each of so many is drawn, if (draws,) `many` are drawn with replacement."""
+    return np.asarray(rng.multinomial(many, np.full(count, 1.0 / count)), dtype=float)
 
 
 def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.diagnosis.data import Windows, cut_windows
-from expdesign.diagnosis.fit.cluster_robust import cluster_robust
+from expdesign.diagnosis.fit.between_runs import counting_stretches
 from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, nearest_possible, uncertain_keys
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
@@ -49,7 +49,7 @@ def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bo
         parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
         model = replace(ship.model, parameter_std=np.zeros(len(ship.model.parameters)))
         ship = replace(ship.without_effects(parameters), model=model)
-    ahead = cluster_robust(fit_output_error(ship, short, free), np.arange(float(len(short.batch))))
+    ahead = counting_stretches(fit_output_error(ship, short, free))
     at_these = replace(continuing(found), steps=0, warm_start=None)
     again = fit(ahead.ship, windows, free, starts=found.starts, options=at_these)
     rows = [found.keys.index(key) for key in again.keys]

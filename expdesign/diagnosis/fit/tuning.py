@@ -30,7 +30,6 @@ class Tuning:
         largest_ratio: times and widths change by this factor in a step, at most.
         beyond_std_level: of the test whether parameters are within their stated standard deviations.
         least_correlation_eigenvalue: of stated parameters; smaller ones count as rounded.
-        fewest_runs: for cluster-robust standard errors.
         folds: of the cross-validation.
         parts: of every run, in the cross-validation of short stretches.
         fold_steps: Gauss-Newton steps from the fit to all units to the fit without a fold.
@@ -62,7 +61,6 @@ class Tuning:
     largest_ratio: float = 3.0
     beyond_std_level: float = 1e-3
     least_correlation_eigenvalue: float = 1e-6
-    fewest_runs: int = 10
     folds: int = 3
     parts: int = 5
     fold_steps: int = 6

@@ -26,11 +26,19 @@ The search begins at the values that the vessel file states; every test is of th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from expdesign.diagnosis.model.terms import Effects, ScaledTerm, input_products, library_terms, own_terms, unit_terms
+from expdesign.diagnosis.model.terms import (
+    Effects,
+    ScaledTerm,
+    input_products,
+    library_terms,
+    own_terms,
+    turns_by_force,
+    unit_terms,
+)
 from expdesign.simulation.tape import Evaluation, evaluation
 from expdesign.vessel import Roll, Term, VesselModel
 from expdesign.vessel.expressions import Expression
@@ -42,6 +50,27 @@ ROLL = {"roll:period": "period_s", "roll:damping": "damping_ratio", "roll:sway":
 LEAST_HEIGHT = 0.01
 """Metacentric height over beam of a ship that is hardly stable; a ship of 9 m has the 0.15 m that the code asks for at
 0.017."""
+SLIGHTLY = 1e-6
+"""Distance from a bound that is rounding."""
+BOUNDS: Mapping[str, tuple[float, float]] = {
+    "gain": (-0.8, 1.5),
+    "scale": (-0.8, 1.5),
+    "inertia": (-0.6, 1.5),
+    "gyro": (-0.5, 0.5),
+    "lag": (0.0, 120.0),
+    "delay": (0.0, 120.0),
+    "slew": (0.0, 120.0),
+    "deadband": (0.0, math.inf),
+    "offset": (-0.5, 0.5),
+    "heading_bias": (-0.8, 0.8),
+    "late": (-60.0, 60.0),
+    "current": (-5.0, 5.0),
+    "wind": (-60.0, 60.0),
+    "shallow": (0.0, 20.0),
+    "change": (-0.9, 2.0),
+}
+"""Kind of effect -> least and greatest value that a ship, her sensors and the sea can have. What may have any size is
+not here: parameters and terms, whose signs `resisting` keeps, and times of the data."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,6 +140,28 @@ class ExtendedModel:
     def get(self, key: str) -> float:
         """Value of an effect."""
         return self.effects.get(key, 0.0)
+
+    def bounds(self, key: str) -> tuple[float, float]:
+        """Least and greatest possible value of an effect; what the vessel file states is possible."""
+        kind, _, which = key.partition(":")
+        sizes = {"forward": self.length_m, "starboard": self.beam_m, "asymmetry": self.beam_m / 2}
+        low, high = BOUNDS.get(kind, (-math.inf, math.inf))
+        if kind == "lever" or (kind == "asymmetry" and turns_by_force(self.model)):
+            low, high = -sizes[which or kind], sizes[which or kind]
+        elif key == "roll:period":
+            high = self.longest_roll_s
+        elif key in ("change:time", "wind:toward"):
+            low, high = -math.inf, math.inf
+        stated = self.stated.get(key, 0.0)
+        return min(low, stated), max(high, stated)
+
+    def is_possible(self, keys: Iterable[str]) -> bool:
+        """Whether effects lie within their bounds, and not at one of them, except where that means no effect."""
+        for key in keys:
+            value, (low, high) = self.get(key), self.bounds(key)
+            if not (value - low > (SLIGHTLY if low else -SLIGHTLY) and high - value > SLIGHTLY):
+                return False
+        return True
 
     @property
     def has_roll(self) -> bool:

@@ -77,8 +77,7 @@ def exogenous_inputs(
     if model.reads_depth or any(key.startswith("shallow:") for key in ship.effects):
         table[SHOAL] = ship.draught_m / windows.depth_m
     if "change:time" in ship.effects:
-        since = windows.time_s + windows.step_s - ship.effects["change:time"]
-        table["after"] = np.clip(since / windows.step_s, 0.0, 1.0)  # share of the step
+        table["after"] = windows.share_after(ship.effects["change:time"])
     return table
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
@@ -15,15 +14,23 @@ from expdesign.diagnosis.fit import (
     CrossValidation,
     Fit,
     HeldOut,
-    cluster_robust,
+    counting_runs,
     held_out_gain,
     judged,
     log_likelihood_gain,
     on_common_units,
+    runs_of,
 )
 from expdesign.diagnosis.remainder.search import Missing, as_good_as_causes, missing_effects, with_term
 from expdesign.diagnosis.remainder.tuning import TUNING
-from expdesign.diagnosis.select import FittedCandidate, Selection, Step, redundant_step, without_step
+from expdesign.diagnosis.select import (
+    FittedCandidate,
+    Selection,
+    Step,
+    p_value_between_runs,
+    redundant_step,
+    without_step,
+)
 
 PARAMETERS = "parameters"
 UNLISTED = "unlisted_term"
@@ -127,14 +134,14 @@ def _added(
         keys=(key,),
         multiplicity=float(TUNING.regressors),
     )
-    p_value = min(1.0, TUNING.regressors * float(scipy.stats.chi2.sf(max(statistic, 0.0), 1)))
+    p_value = p_value_between_runs(chosen, None, kept.dispersion)
     step = Step(chosen=chosen, p_value=p_value, alternatives=(), before=kept.last, tests=())
     steps, before = _without_redundant([*kept.steps, step], windows), result.held[-1]
     for order in (list[Step], partial(_last_one_first, windows)):
         ordered = order(steps)
         errors = judged([result.held[0], *(validation.of(item.chosen.fit) for item in ordered)])
         if ordered and before.in_stretches == errors[-1].in_stretches and _clear_gain(before, errors[-1], seed):
-            last = cluster_robust(ordered[-1].chosen.fit, windows.batch)
+            last = counting_runs(ordered[-1].chosen.fit, runs_of(windows), kept.dispersion)
             return replace(result, kept=replace(kept, steps=tuple(ordered), last=last), held=errors)
     return None
 

@@ -60,7 +60,7 @@ def _force(axis: int, values: Callable[[Windows], Array], linear: LinearisedMoti
 
 
 def _steady(linear: LinearisedMotion) -> Iterator[Kind]:
-    end_s = max(float(linear.motion.windows.time_s[:, :-1].max()), 1.0)
+    end_s = max(float(linear.motion.windows.run_time_s[:, :-1].max()), 1.0)
     for name in linear.motion.ship.model.outputs:
         axis, unit = OUTPUTS.index(name), "rad/s\N{SUPERSCRIPT TWO}" if name == "r" else "m/s\N{SUPERSCRIPT TWO}"
         words = f"a steady {'moment' if name == 'r' else 'force'} in {WORDS[name]}"
@@ -74,7 +74,7 @@ def _ones(windows: Windows) -> Array:
 
 
 def _grown(end_s: float, windows: Windows) -> Array:
-    return windows.time_s / end_s
+    return windows.run_time_s / end_s
 
 
 def _by_heading(linear: LinearisedMotion) -> Iterator[Kind]:
@@ -100,7 +100,8 @@ def _inputs(linear: LinearisedMotion) -> Iterator[Kind]:
     for column, name in enumerate(inputs):
         for time in times:
             for held, what in ((True, "stuck"), (False, "without effect")):
-                words = f"{name} {what} from about {time:.0f} s on"
+                run, begin, _ = windows.place(time)
+                words = f"{name} {what} from about {time - begin:.0f} s of {run} on"
                 changed = partial(_with_inputs, [column], partial(_stopped, held), time)
                 yield Kind(words=words, unit="of it", disturbance=changed, whole=True)
     for name in dict.fromkeys(map(stem, inputs)):
@@ -122,11 +123,16 @@ def _with_inputs(
     begin_s: float,
     linear: LinearisedMotion,
 ) -> Disturbance:
-    """The disturbance by another course of some inputs: `change` of their values (k,) from a time on, by mask (k,)."""
+    """The disturbance by another course of some inputs: `change` of their values (k,) from a time on, by mask (k,).
+
+    To the end of the run: what is stuck in one may be free in the next.
+    """
     motion = linear.motion
     windows = motion.windows
     rows = np.concatenate(windows.batch_inputs)  # laid end to end, as the times are
-    since = np.arange(len(rows)) * windows.step_s / windows.rows_per_step >= begin_s
+    times = np.arange(len(rows)) * windows.step_s / windows.rows_per_step
+    _, begin, length = windows.place(begin_s)
+    since = (times >= begin_s) & (times < begin + length)
     for column in columns:
         rows[:, column] = change(rows[:, column], since)
     ends_of_runs = np.cumsum([len(part) for part in windows.batch_inputs])[:-1]
@@ -184,5 +190,5 @@ CLOCK = "time stamps of the sensors that drift against those of the inputs"
 def _drifting(linear: LinearisedMotion) -> Disturbance:
     motion = linear.motion
     windows = motion.windows
-    time = windows.time_s[:, :: windows.steps_per_sample][:, : motion.predicted.shape[1], None]
+    time = windows.run_time_s[:, :: windows.steps_per_sample][:, : motion.predicted.shape[1], None]
     return Disturbance(force=None, sensor=-time * np.gradient(motion.predicted, windows.sample_s, axis=1))

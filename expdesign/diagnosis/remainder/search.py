@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,16 +11,21 @@ from numpy.typing import NDArray
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
+    Dispersion,
     Fit,
     FitOptions,
     build_sensitivities,
     continuing,
     deviations_of,
+    directions_between_runs,
     effect_disturbances,
+    few_runs_factor,
     fit,
     gram_matrices,
     in_groups,
     log_likelihood_gain,
+    of_several,
+    tail,
     window_information,
 )
 from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
@@ -88,8 +94,33 @@ def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
     given = UnitInformation(A=sums[0], s=sums[1], precision=base.precision, offset=deviations_of(ship, base.keys))
     chosen = stable_selection(_without(given, _impossible(given, len(names), others)), rng)
     sizes = _sizes(given, [item.index for item in chosen])
-    listed = [wider.library[name] for name in names]
-    return tuple(_missing(listed, others, item, *pair, size) for item, pair in zip(chosen, sizes, strict=True))
+    known = _between_units(given, [item.index for item in chosen])
+    listed, surely = [wider.library[name] for name in names], list[Missing]()
+    for item, (value, std) in zip(chosen, sizes, strict=True):
+        factor, freedom = known.alone
+        p_value = of_several(tail(item.statistic, 1, factor, freedom), TUNING.regressors)
+        if not p_value <= TUNING.level:
+            break  # what was chosen later stands beside this
+        wider_std = std * float(np.sqrt(factor) * few_runs_factor(freedom))
+        surely.append(_missing(listed, others, item, value, wider_std, size))
+    return tuple(surely)
+
+
+def _between_units(given: UnitInformation, chosen: Sequence[int]) -> Dispersion:
+    """How much the sizes of regressors differ between units, beside those that are chosen."""
+    n = len(given.precision)
+    c = n + len(chosen)
+    order = [*range(n), *(n + place for place in chosen)]
+    order += [place for place in range(given.A.shape[1]) if place not in set(order)]
+    A, s = given.A[:, order][:, :, order], given.s[:, order]
+    precision = np.zeros((c, c))
+    precision[:n, :n] = given.precision
+    score = s.sum(axis=0)[:c]
+    score[:n] -= given.precision @ given.offset
+    step = np.linalg.lstsq(A.sum(axis=0)[:c, :c] + precision, score, rcond=None)[0]
+    left = s - A[:, :, :c] @ step
+    parts = A[:, :c, :c], A[:, :c, c:], np.diagonal(A, axis1=1, axis2=2)[:, c:]
+    return Dispersion.of(directions_between_runs(parts, (left[:, :c], left[:, c:]), precision))
 
 
 def _begun_anew(base: Fit, windows: Windows) -> Fit:

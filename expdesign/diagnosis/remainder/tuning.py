@@ -25,6 +25,7 @@ class Tuning:
         folds: of the held-out likelihood.
         least_held_out: gain of held-out likelihood, as a statistic.
         most_lost: share of it that single units may lose.
+        level: of the p-value of a size, adjusted for the number of regressors.
         least_share: of the whitened squared error of held-out data that a kind of effect must take away to be named.
         as_good: share of the likelihood gained by causes from which on a kind of effect is named beside them.
         least_reduction: share by which the error of some output must fall on held-out data.
@@ -46,6 +47,7 @@ class Tuning:
     folds: int = 4
     least_held_out: float = 15.0
     most_lost: float = 0.25
+    level: float = 0.025
     least_share: float = 0.02
     as_good: float = 0.8
     least_reduction: float = 0.05

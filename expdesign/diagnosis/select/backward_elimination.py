@@ -13,13 +13,20 @@ from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
     HeldOut,
     bootstrap_sums,
-    cluster_robust,
     held_out_gain,
     on_common_units,
     prediction_gain,
 )
-from expdesign.diagnosis.select.selection import Selection, Step, least_significant_step, without_step
+from expdesign.diagnosis.select.selection import (
+    Selection,
+    Step,
+    least_significant_step,
+    with_runs_counted,
+    without_step,
+)
+from expdesign.diagnosis.select.selection_round import open_candidates
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.values import Array
 
 
 def eliminate_backward(
@@ -51,11 +58,11 @@ def eliminate_backward(
             found = later
             continue
         found = before_first_without_gain(found, improves)
-        last = cluster_robust(found.last, windows.batch)
-        index = least_significant_step(found.steps, last)
+        counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
+        index = least_significant_step(counted.steps)
         others = None if index is None else without_step(list(found.steps), index, windows)
         if others is None:
-            return replace(found, last=last), held
+            return counted, held
         found = found.with_steps(tuple(others))
 
 
@@ -106,12 +113,13 @@ def improves_held_out(
     imitates others needs a gain even as the first, and may make no output worse by more than that. Where whole
     simulations lead away, the interval of a later cause must exclude zero, and so must that of any cause beside the
     parameters of the file, as tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off
-    every error is a remark, whatever its p-value, and so is what is impossible (`Candidate.bounds`). A first cause
-    whose gain is not certain has to show for certain in the error of some output, in predictions from one sample to the
-    next, in short stretches, as one of many runs may be all that shows it, or beside the model that is fitted as it is
-    but for the cause. Parameters of a file that were fitted to the same data have seen what is held out, those fitted
-    with a cause have not: a loss by fitting them hides the gain. A cause that imitates none may show in predictions
-    alone, if it makes simulations no worse for certain.
+    every error is a remark, whatever its p-value, and so is what is impossible (`Candidate.bounds`).
+
+    What is stated of a finding has to be certain: the error of some output falls by an interval that excludes zero. Of
+    a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
+    that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
+    predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
+    these alone, if it makes simulations no worse for certain.
 
     Args:
         found: the selection.
@@ -123,6 +131,7 @@ def improves_held_out(
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
     simulated = [
         step.chosen.candidate.is_possible(found.last.value)
+        and found.last.ship.is_possible(step.chosen.candidate.free)
         and simulates_better(
             held[index],
             held[index + 1],
@@ -131,41 +140,57 @@ def improves_held_out(
             imitates=step.chosen.candidate.imitates,
         )
         and ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, (gain, interval)))
+        and (shows_for_certain(held[index], held[index + 1], seed) or (index == 0 and windows is not None))
         for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
     ]
-    if windows is None:
+    if windows is None or not gains or shows_for_certain(held[0], held[1], seed):
         return simulated
-    _, (low, high) = gains[0] if gains else (0.0, (0.0, -np.inf))
-    if high >= 0.0 and low <= 0.0:
-        share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
-        shows = least > 0.0 or falls_for_certain(held[0], held[1], seed)
-        shows = shows or (held[1].ahead is not None and _is_certain_ahead(held, 0, seed, gains[0]))
-        if not shows:
-            beside = gain_beside_the_same_fit(found, held, re_estimated, seed)
-            shows = beside is not None and beside[1][0] > 0.0
-        alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
-        simulated[0] = (simulated[0] and shows) or (alone and least > 0.0)
+    share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
+    alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
+    shows = least > 0.0 and (alone or (simulated[0] and share >= TUNING.least_reduction))
+    low, high = gains[0][1]
+    if not shows and simulated[0] and high >= 0.0 and low <= 0.0:
+        beside = held_beside_the_same_fit(found, held, re_estimated)
+        shows = beside is not None and shows_for_certain(beside, held[1], seed)
+    simulated[0] = shows
     return simulated
 
 
-def gain_beside_the_same_fit(
-    found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
-) -> tuple[float, tuple[float, float]] | None:
-    """Gain of the first cause on the model without it that is fitted in the same way [points], and its interval.
+def held_beside_the_same_fit(found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None) -> HeldOut | None:
+    """Errors of the model without the first cause that is fitted in the same way.
 
     None where there is no such model, or the cause is that its parameters are wrong. Arguments as of
     `improves_held_out`.
     """
     if re_estimated is None or found.beside_stated or found.steps[0].chosen.candidate.cause == "parameters":
         return None
-    return held_out_gain(re_estimated.like(held[1]), held[1], seed)
+    return re_estimated.like(held[1])
 
 
-def falls_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
-    """Whether the error of some output falls, by an interval that excludes zero."""
+def compared_with(
+    found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None, seed: int
+) -> tuple[HeldOut, bool]:
+    """Errors that the first cause is compared with, and whether they are those of the same fit without it."""
+    beside = None if shows_for_certain(held[0], held[1], seed) else held_beside_the_same_fit(found, held, re_estimated)
+    if beside is None or not shows_for_certain(beside, held[1], seed):
+        return held[0], False
+    return beside, True
+
+
+def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
+    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap."""
     one, other = on_common_units(before, after)
-    lost, left = (held.squared_error for held in bootstrap_sums(one, other, seed))
-    return bool((np.quantile(left / np.maximum(lost, 1e-300), 0.975, axis=0) < 1.0).any())
+    drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 1.0 - np.sqrt(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0))
+        low, high = np.nanquantile(1.0 - np.sqrt(drawn[1] / drawn[0]), [0.025, 0.975], axis=0)
+    return share, low, high
+
+
+def shows_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
+    """Whether the error of some output falls by enough to be worth a word, by an interval that excludes zero."""
+    share, low, _ = certain_reductions(before, after, seed)
+    return bool(((share >= TUNING.least_reduction) & (low > 0.0)).any())
 
 
 def _is_certain_ahead(

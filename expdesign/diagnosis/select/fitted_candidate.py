@@ -6,12 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, FitOptions, continuing, fit, likeliest, log_likelihood_gain, profile_cost
-from expdesign.diagnosis.select.score_tests import of_several
+from expdesign.diagnosis.fit import (
+    Fit,
+    FitOptions,
+    continuing,
+    fit,
+    likeliest,
+    log_likelihood_gain,
+    of_several,
+    profile_cost,
+    tail,
+)
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, start_nearer
 from expdesign.diagnosis.select.tuning import TUNING
 
@@ -56,13 +65,32 @@ class FittedCandidate:
     @property
     def p_value(self) -> float:
         """Of the likelihood ratio test, adjusted for multiple tests."""
-        alone = float(scipy.stats.chi2.sf(max(self.likelihood_gain, 0.0), max(1, len(self.keys))))
-        return of_several(alone, self.multiplicity)
+        return of_several(tail(max(self.likelihood_gain, 0.0), max(1, len(self.keys))), self.multiplicity)
 
     def with_gain(self, likelihood_gain: float) -> FittedCandidate:
         """The same with another gain at the same price."""
         price = self.likelihood_gain - self.penalised_gain
         return replace(self, likelihood_gain=likelihood_gain, penalised_gain=likelihood_gain - price)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rival:
+    """Another candidate that explains the data nearly as well.
+
+    Attributes:
+        candidate: the candidate.
+        ship: with its effects fitted.
+        trails_by: penalised gain of the chosen candidate less its own.
+    """
+
+    candidate: Candidate
+    ship: ExtendedModel
+    trails_by: float
+
+
+def kind_of(candidate: Candidate) -> tuple[str, frozenset[str]]:
+    """Its cause, and the kinds of its effects: an offset of angles and a moment of thrust are answers of their own."""
+    return candidate.cause, frozenset(key.split(":")[0] for key in candidate.free)
 
 
 def fit_candidate(

@@ -49,11 +49,11 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
         key: the effect.
         std: a guess of its standard error.
     """
-    centre, span = found.value(key), 4.0 * std
+    centre, span, limits = found.value(key), 4.0 * std, _limits(found, key)
     costs: dict[float, float] = {}
     low = high = centre
     for _ in range(TUNING.profile_rounds):
-        values = centre + span * np.linspace(-1.0, 1.0, TUNING.profile_points)
+        values = np.clip(centre + span * np.linspace(-1.0, 1.0, TUNING.profile_points), *limits)
         for value in values.tolist():
             if value not in costs:
                 costs[value] = _cost(found, key, value)
@@ -61,9 +61,11 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
         likely = [value for value, cost in costs.items() if cost < least + TUNING.equivalent_cost]
         low, high, best = min(likely), max(likely), min(costs, key=lambda value: costs[value])
         spacing = 2.0 * span / (TUNING.profile_points - 1)
-        if best in (values[0], values[-1]):
+        if best in (values[0], values[-1]) and best not in limits:
             centre = best
-        elif low <= values[0] or high >= values[-1]:  # the plateau continues beyond these values
+        elif (low <= values[0] > limits[0]) or (
+            high >= values[-1] < limits[1]
+        ):  # the plateau continues beyond these values
             centre, span = (low + high) / 2, 2.5 * span
         elif sum(low <= value <= high for value in values) >= TUNING.equivalent_values:
             break
@@ -72,6 +74,15 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
     ship, windows = found.ship.with_effects({key: (low + high) / 2}), found.linear.motion.windows
     at_middle = fit(ship, windows, found.free_keys, starts=found.starts, options=continuing(found))
     return at_middle, (high - low + spacing) / 2
+
+
+def _limits(found: Fit, key: str) -> tuple[float, float]:
+    """Least and greatest possible value: of a time, those of its run."""
+    if key != "change:time":
+        return found.ship.bounds(key)
+    windows = found.linear.motion.windows
+    _, begin, length = windows.place(found.value(key))
+    return begin + windows.sample_s, begin + length - windows.sample_s
 
 
 def _cost(found: Fit, key: str, value: float) -> float:

@@ -23,13 +23,20 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import (
+    NOISE_ALONE,
+    Dispersion,
     Fit,
-    MarginalInformation,
+    Spread,
     build_sensitivities,
     deviations_of,
+    directions_between_runs,
     effect_disturbances,
+    gram_matrices,
     in_groups,
-    information,
+    of_several,
+    runs_of,
+    tail,
+    window_information,
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
@@ -49,6 +56,7 @@ class ScoreTest:
         p_value: of this candidate alone.
         step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
         multiplicity: number of independent tests that all of its round are worth, for its p-value.
+        factor, freedom: of its variance, by how runs differ.
     """
 
     candidate: Candidate
@@ -56,19 +64,13 @@ class ScoreTest:
     p_value: float
     step: Array
     multiplicity: float = 1.0
+    factor: float = 1.0
+    freedom: float = math.inf
 
     @property
     def adjusted(self) -> float:
         """The p-value adjusted for multiple tests."""
         return of_several(self.p_value, self.multiplicity)
-
-
-def of_several(p_value: float, tests: float) -> float:
-    """The probability that the smallest p-value of so many independent tests is no larger.
-
-    Source: Z. Sidak, Journal of the American Statistical Association 62 (1967), 626-633.
-    """
-    return 1.0 if p_value >= 1.0 else -math.expm1(tests * math.log1p(-p_value))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,19 +81,30 @@ class _Scores:
         A: (m, m) information, s: (m,) scores.
         size: (m,) norms of the disturbances before anything is projected out of them.
         index: per candidate, its rows.
+        spread: of the (m,) estimates, between runs.
     """
 
     A: Array
     s: Array
     size: Array
     index: tuple[Array, ...]
+    spread: Spread
 
 
 def score_tests(
     base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None
 ) -> tuple[ScoreTest, ...]:
     """Tests of every candidate against the fit without it, best first; without `rng` not adjusted for their number."""
+    return scored_between_runs(base, candidates, rng)[0]
+
+
+def scored_between_runs(
+    base: Fit, candidates: Sequence[Candidate], rng: np.random.Generator | None = None
+) -> tuple[tuple[ScoreTest, ...], Dispersion]:
+    """The same, and how much the estimates of all candidates differ between runs beside everything in the fit."""
     scores = _scores(base, candidates)
+    known = Dispersion.of(scores.spread) if len(np.unique(runs_of(base.linear.motion.windows))) > 1 else NOISE_ALONE
+    factors, freedoms = known.beside(scores.spread)
     tests, roots = [], []
     for candidate, index in zip(candidates, scores.index, strict=True):
         size = scores.size[index]
@@ -104,20 +117,23 @@ def score_tests(
         step = (root @ z) / size
         against = candidate.positive and step[0] < 0.0
         impossible = not candidate.is_possible(partial(_stepped, base, candidate, step))
-        beyond = _p_value(float(z @ z), len(index), positive=candidate.positive)
+        factor, freedom = float(factors[index].mean()), float(freedoms[index].min())
+        beyond = tail(float(z @ z), len(index), factor, freedom) / (2.0 if candidate.positive else 1.0)
         tests.append(
             ScoreTest(
                 candidate=candidate,
                 statistic=0.0 if against or impossible else float(z @ z),
                 p_value=1.0 if impossible else 1.0 - beyond if against else beyond,
                 step=step,
+                factor=factor,
+                freedom=freedom,
             )
         )
         roots.append((index, root / size[:, None]))
     if tests and rng is not None:
         multiplicity = _effective_tests(scores.A, roots, [item.candidate for item in tests], rng)
         tests = [replace(item, multiplicity=number) for item, number in zip(tests, multiplicity, strict=True)]
-    return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity))
+    return tuple(sorted(tests, key=lambda item: item.p_value * item.multiplicity)), known
 
 
 def _stepped(base: Fit, candidate: Candidate, step: Array, key: str) -> float:
@@ -133,20 +149,29 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
         np.array([shared.setdefault(tag, len(shared)) for tag, _ in candidate_disturbances(base.linear, candidate)])
         for candidate in candidates
     ]
-    c, parts = len(base.keys), list[MarginalInformation]()
-    for _, linear in in_groups(base.linear, c + len(shared)):
+    c, (names, run) = len(base.keys), np.unique(runs_of(base.linear.motion.windows), return_inverse=True)
+    own, both = np.zeros((len(names), c, c)), np.zeros((len(names), c, len(shared)))
+    each, s = np.zeros((len(names), len(shared))), np.zeros((len(names), c + len(shared)))
+    A = np.zeros((c + len(shared), c + len(shared)))
+    for taken, linear in in_groups(base.linear, c + len(shared)):
         disturbances = [*effect_disturbances(linear, base.keys), *_distinct(linear, candidates)]
         found = build_sensitivities(linear, disturbances, random_current=base.noise.current_std_mps > 0)
-        parts.append(information(found, base.noise))
-    A, s = np.sum([part.A for part in parts], axis=0), np.sum([part.s for part in parts], axis=0)
+        of_windows, scores = window_information(gram_matrices(found, base.noise), found, base.noise)
+        A = A + of_windows.sum(axis=0)
+        np.add.at(own, run[taken], of_windows[:, :c, :c])
+        np.add.at(both, run[taken], of_windows[:, :c, c:])
+        np.add.at(each, run[taken], np.diagonal(of_windows, axis1=1, axis2=2)[:, c:])
+        np.add.at(s, run[taken], scores)
+    spread = directions_between_runs((own, both, each), (s[:, :c], s[:, c:]), base.precision)
+    score = s.sum(axis=0)
     size = np.sqrt(np.maximum(np.diag(A)[c:], 1e-300))
     now = deviations_of(base.ship, base.keys)
-    own = A[:c, :c] + base.precision
     if c:
-        solved = np.linalg.lstsq(own, np.column_stack([A[:c, c:], s[:c] - base.precision @ now]), rcond=None)[0]
-        s = s[c:] - A[c:, :c] @ solved[:, -1]
+        of_effects = np.column_stack([A[:c, c:], score[:c] - base.precision @ now])
+        solved = np.linalg.lstsq(A[:c, :c] + base.precision, of_effects, rcond=None)[0]
+        score = score[c:] - A[c:, :c] @ solved[:, -1]
         A = A[c:, c:] - A[c:, :c] @ solved[:, :-1]
-    return _Scores(A=A, s=s, size=size, index=tuple(places))
+    return _Scores(A=A, s=score, size=size, index=tuple(places), spread=spread)
 
 
 def _distinct(linear: LinearisedMotion, candidates: Sequence[Candidate]) -> list[Disturbance]:

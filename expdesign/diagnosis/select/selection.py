@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,9 +10,22 @@ import scipy
 
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import Fit, continuing, fit, fit_ahead, log_likelihood_gain
-from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
-from expdesign.diagnosis.select.score_tests import ScoreTest, of_several
+from expdesign.diagnosis.fit import (
+    NOISE_ALONE,
+    Dispersion,
+    Fit,
+    continuing,
+    counting_runs,
+    few_runs_factor,
+    fit,
+    fit_ahead,
+    log_likelihood_gain,
+    of_several,
+    runs_of,
+    tail,
+)
+from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
+from expdesign.diagnosis.select.score_tests import ScoreTest, scored_between_runs
 from expdesign.diagnosis.select.tuning import TUNING
 
 SHAPE = ("roll:period", "roll:damping")
@@ -25,7 +39,8 @@ class Step:
     Attributes:
         chosen: the added candidate.
         p_value: adjusted for multiple tests.
-        alternatives: candidates of other causes that explain the data as well, best first.
+        alternatives: candidates of other kinds that explain the data as well, best first; before runs are counted,
+            all that explain a good share as much.
         before: the fit without it.
         outranked: candidates with more numbers that fit better, and simulate held-out data worse.
         tests: all score tests of the round.
@@ -33,7 +48,7 @@ class Step:
 
     chosen: FittedCandidate
     p_value: float
-    alternatives: tuple[FittedCandidate, ...]
+    alternatives: tuple[Rival, ...]
     before: Fit
     tests: tuple[ScoreTest, ...]
     outranked: tuple[Candidate, ...] = ()
@@ -47,9 +62,10 @@ class Selection:
         steps: one per cause.
         first: the fit before any cause.
         last: the joint fit of all causes.
-        last_tests: score tests of the round that found nothing more.
+        last_tests: score tests of what is left.
         untried: what the limit of work left out.
         beside_stated: causes are fitted beside the parameters of the vessel file, although these are uncertain.
+        dispersion: what estimates of causes differ by between runs, beside the last fit.
     """
 
     steps: tuple[Step, ...]
@@ -58,6 +74,7 @@ class Selection:
     last_tests: tuple[ScoreTest, ...]
     untried: tuple[str, ...] = ()
     beside_stated: bool = False
+    dispersion: Dispersion = NOISE_ALONE
 
     def with_steps(self, steps: tuple[Step, ...]) -> Selection:
         """The selection with other steps; where these are its first ones, the next round's tests become the last."""
@@ -128,27 +145,65 @@ def _fit_without(whole: Fit, step: Step, windows: Windows) -> Fit | None:
         return None
 
 
-def least_significant_step(steps: tuple[Step, ...], last: Fit) -> int | None:
-    """The step with the largest p-value by a Wald test, if that is not significant.
+def with_runs_counted(found: Selection, candidates: Sequence[Candidate], rng: np.random.Generator) -> Selection:
+    """The selection with standard errors and p-values that count how runs differ, and tests of what is left.
 
     Args:
-        steps: of the selection.
-        last: the joint fit of all of them, with the standard errors that are reported.
-
-    Source: A. Wald, Transactions of the American Mathematical Society 54 (1943), 426-482.
+        found: the selection, its last fit of all windows.
+        candidates: of the catalogue, whose estimates show how runs differ beside the last fit.
+        rng: of the null distribution.
     """
-    p_values = [wald_p_value(step.chosen, last) for step in steps]
+    tests, known = scored_between_runs(found.last, candidates, rng)
+    last = counting_runs(found.last, runs_of(found.last.linear.motion.windows), known)
+    steps = [
+        replace(
+            step,
+            chosen=(chosen := _with_wider_profile(step.chosen, known)),
+            p_value=p_value_between_runs(chosen, last, known),
+            alternatives=_equivalent(step.alternatives, known),
+        )
+        for step in found.steps
+    ]
+    return replace(found, steps=tuple(steps), last=last, last_tests=tests, dispersion=known)
+
+
+def _equivalent(rivals: Sequence[Rival], known: Dispersion) -> tuple[Rival, ...]:
+    """Those that the data cannot tell from the chosen candidate: where runs differ, likelihoods decide by less."""
+    return tuple(rival for rival in rivals if rival.trails_by < TUNING.equivalent_within * known.alone[0])
+
+
+def _with_wider_profile(chosen: FittedCandidate, known: Dispersion) -> FittedCandidate:
+    """A candidate whose profiled effect has a standard error that counts how runs differ."""
+    if chosen.profiled is None:
+        return chosen
+    (key, std), (factor, freedom) = chosen.profiled, known.alone
+    return replace(chosen, profiled=(key, std * float(np.sqrt(factor) * few_runs_factor(freedom))))
+
+
+def p_value_between_runs(chosen: FittedCandidate, last: Fit | None, known: Dispersion) -> float:
+    """p-value adjusted for multiple tests: of the likelihood ratio, and of the estimates in the last fit if given."""
+    ratio = tail(max(chosen.likelihood_gain, 0.0), max(1, len(chosen.keys)), *known.alone)
+    return of_several(ratio if last is None else max(ratio, wald_p_value(chosen, last)), chosen.multiplicity)
+
+
+def least_significant_step(steps: tuple[Step, ...]) -> int | None:
+    """The step with the largest p-value, if that is not significant."""
+    p_values = [step.p_value for step in steps]
     worst = int(np.argmax(p_values)) if p_values else 0
     return worst if p_values and p_values[worst] > TUNING.level else None
 
 
 def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
-    """p-value of the joint estimate of a cause's sizes against zero, or against what the vessel file states."""
+    """p-value of the joint estimate of a cause's sizes against zero, or against what the vessel file states.
+
+    Source: A. Wald, Transactions of the American Mathematical Society 54 (1943), 426-482.
+    """
     stated = last.ship.stated
     sized = [key for key in chosen.keys if key in last.keys and (key not in SHAPE or key in stated)]
     index = [last.keys.index(key) for key in sized]
     values = np.array([last.value(key) - stated.get(key, 0.0) for key in sized])
     statistic = float(values @ np.linalg.lstsq(last.covariance[np.ix_(index, index)], values, rcond=None)[0])
+    statistic *= float(few_runs_factor(last.freedom)) ** 2  # in the covariance, for intervals
     freedom = len(sized)
     if chosen.profiled is not None and chosen.profiled[0] in chosen.candidate.free:
         key, error = chosen.profiled
@@ -156,4 +211,4 @@ def wald_p_value(chosen: FittedCandidate, last: Fit) -> float:
         statistic, freedom = statistic + (difference / error) ** 2, freedom + 1
     if not np.isfinite(statistic):  # without a standard error nothing is significant
         return 1.0
-    return float(scipy.stats.chi2.sf(statistic, freedom)) if freedom else 0.0
+    return tail(statistic, freedom, freedom=last.freedom) if freedom else 0.0

@@ -12,8 +12,10 @@ from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import CrossValidation, Fit, judged, leads_away
 from expdesign.diagnosis.select.fitted_candidate import (
     FittedCandidate,
+    Rival,
     fit_candidate,
     fit_to_convergence,
+    kind_of,
     ranked_by_gain,
     with_noise_begun_anew,
 )
@@ -155,7 +157,7 @@ def _rough_fits(
 
 
 def _is_possible(item: FittedCandidate) -> bool:
-    return item.candidate.is_possible(item.fit.value)
+    return item.candidate.is_possible(item.fit.value) and item.fit.ship.is_possible(item.candidate.free)
 
 
 def _best_on_held_out(
@@ -229,13 +231,15 @@ def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
     return next((item for item in simple if item.likelihood_gain >= enough), first)
 
 
-def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tuple[FittedCandidate, ...]:
-    """The best candidate of every other cause that explains the data as well."""
-    found: dict[str, FittedCandidate] = {}
+def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tuple[Rival, ...]:
+    """The best candidate of every other kind that explains the data as well, or a good share as much."""
+    found: dict[object, Rival] = {}
+    most = max(TUNING.equivalent_within, (1.0 - TUNING.rival_share) * chosen.likelihood_gain)
     for other in fitted:
-        close = chosen.penalised_gain - other.penalised_gain < TUNING.equivalent_within
-        if other.candidate.cause != chosen.candidate.cause and close:
-            found.setdefault(other.candidate.cause, other)
+        trails_by = chosen.penalised_gain - other.penalised_gain
+        if kind_of(other.candidate) != kind_of(chosen.candidate) and trails_by < most:
+            rival = Rival(candidate=other.candidate, ship=other.fit.ship, trails_by=trails_by)
+            found.setdefault(kind_of(other.candidate), rival)
     return tuple(found.values())
 
 

@@ -23,6 +23,8 @@ class Tuning:
             the margin, are not fitted.
         equivalent_within: an alternative that trails by less is not distinguishable. A wrong cause that truly trails by
             d comes out ahead by more than this with a probability below Phi(-sqrt(equivalent_within)).
+        rival_share: share of the likelihood gain of the chosen candidate from which on another may be equivalent, where
+            runs differ so that the difference counts less.
         first_steps: Gauss-Newton steps of every candidate.
         leading_share: candidates that then gain less than this share of the best are dropped.
         simple_share: the same of those with fewer numbers than the best.
@@ -72,6 +74,7 @@ class Tuning:
     least_statistic_share: float = 0.4
     statistic_margin: float = 20.0
     equivalent_within: float = 5.0
+    rival_share: float = 0.5
     first_steps: int = 3
     leading_share: float = 0.6
     simple_share: float = 0.3

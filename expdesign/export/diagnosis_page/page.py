@@ -13,9 +13,9 @@ from expdesign.diagnosis.accuracy import mean_residual
 from expdesign.diagnosis.conclusions import (
     DIVERGED_FIT,
     accuracy_in_words,
+    alternatives,
     has_diverged,
     manoeuvre,
-    missing_effect,
 )
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction
@@ -156,7 +156,7 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "signed": has_sign(item),
         "force": is_force(found, item),
         "reductions": [_reduction(reduction) for reduction in item.error_reductions if np.isfinite(reduction.share)],
-        "alternatives": [missing_effect(name) for name in item.not_distinguishable_from],
+        "alternatives": alternatives(item),
         "distinguishing": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
     }
 

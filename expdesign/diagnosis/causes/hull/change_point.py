@@ -1,4 +1,4 @@
-"""A change of parameters during the trial."""
+"""A change of parameters during a run; between separate runs much else may differ."""
 
 from __future__ import annotations
 
@@ -11,32 +11,34 @@ from expdesign.diagnosis.model import ExtendedModel
 COUNT = 12
 FINER = 6
 EDGE = 0.06
-"""Share of the data at either end in which no change is tested."""
+"""Share of a run at either end in which no change is tested."""
 
 
 def _candidates(situation: Situation) -> tuple[Candidate, ...]:
-    if "change:time" in situation.ship.effects:
+    windows = situation.windows
+    if "change:time" in situation.ship.effects or not windows.starts:
         return ()
-    end = float(situation.windows.time_s.max())
-    times = np.linspace(0.0, end, COUNT + 2)[1:-1]
+    end = float(windows.time_s.max())
     outputs = situation.ship.model.outputs
     effects = ["change:gain", "change:damping", *(f"change:damping_{name}" for name in outputs)]
     spacing = end / (COUNT + 1)
-    return tuple(
-        Candidate(
-            cause="change_point",
-            free={key: 0.0},
-            fixed={"change:time": float(time)},
-            grid=(
-                "change:time",
-                tuple(
-                    np.clip(time + spacing * np.linspace(-1, 1, 2 * FINER + 1), EDGE * end, (1 - EDGE) * end).tolist()
-                ),
-            ),
-        )
-        for time in times
-        for key in effects
-    )
+    found = []
+    for time in np.linspace(0.0, end, COUNT + 2)[1:-1].tolist():
+        _, begin, length = windows.place(time)
+        inside = begin + EDGE * length, begin + (1.0 - EDGE) * length
+        finer = np.clip(time + spacing * np.linspace(-1, 1, 2 * FINER + 1), *inside)
+        found += [
+            Candidate(
+                cause="change_point",
+                free={key: 0.0},
+                fixed={"change:time": float(np.clip(time, *inside))},
+                grid=("change:time", tuple(np.unique(finer).tolist())),
+                above={"change:time": begin},
+                below={"change:time": begin + length},
+            )
+            for key in effects
+        ]
+    return tuple(found)
 
 
 def _explain(values: Values, _ship: ExtendedModel) -> str:
