@@ -106,6 +106,10 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
 def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
     """A draft's plan, verified with all of the water; made anew with more room where drawn trials leave it."""
     problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
+    if problem.settings.draft:
+        phases_of(problem, room.space.planner, progress).trials("verifying", 0.0)
+        checks = in_order(_check, (whole, water, draft.sailed), ((verified,), (_bound_s,)))
+        return _plan(whole, draft.sailed, verification=next(checks), bound_s=next(checks))
     confidence = problem.settings.confidence
     budget = _budget(problem)
     sailed, before_s, budget.spent_s, reported = draft.sailed, 0.0, draft.spent_s, progress
@@ -265,9 +269,14 @@ def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> floa
 
 
 def _plan(
-    problem: PlanProblem, sailed: SailedTrial, *, verification: Verification, risk: RiskEstimate, bound_s: float
+    problem: PlanProblem,
+    sailed: SailedTrial,
+    *,
+    verification: Verification,
+    bound_s: float,
+    risk: RiskEstimate | None = None,
 ) -> Plan:
-    """The plan with its bound and its efficiencies."""
+    """The plan with its bound and its efficiencies; a draft without risk."""
     placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
     return Plan(
         area=problem.area,
@@ -275,12 +284,13 @@ def _plan(
         trajectory=sailed.trajectory,
         legs=sailed.legs,
         reposition_bound_s=bound_s,
-        leave_water_probability=risk.left,
-        leave_water_by_leg=tuple(leg.left for leg in risk.legs),
+        leave_water_probability=None if risk is None else risk.left,
+        leave_water_by_leg=() if risk is None else tuple(leg.left for leg in risk.legs),
         design_efficiency_placed=placed,
         design_efficiency_realised=realised,
         verification=verification,
         risk=risk,
         lattice=sailed.lattice,
         standing=sailed.standing,
+        draft=risk is None,
     )

@@ -40,7 +40,8 @@ def shortest_day(
     """The shortest day found that reaches an accuracy, planned and verified.
 
     Args:
-        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used.
+        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used. Where it
+            asks for a draft, the first day is the answer, whatever it reaches.
         accuracy: to be reached by the whole track, legs included.
         added: runs that the day may have although the durations exclude them.
         most_s: longest day allowed [s].
@@ -52,6 +53,8 @@ def shortest_day(
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
     days, last, planning = search.rounds(search.untried, progress)
+    if problem.settings.draft:
+        return search.draft(days, last, planning)
     days += search.pruned(days)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
@@ -88,6 +91,8 @@ def fullest_day(
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
     days, last, planning = search.rounds(partial(search.filling, day_s), progress)
+    if problem.settings.draft:
+        return replace(search.draft(days, last, planning), most_s=day_s)
     allowed = sorted((day for day in days if day.day_s <= day_s), key=lambda day: -day.margin)
     if not allowed:
         least_s = min(day.day_s for day in days)
@@ -144,7 +149,8 @@ class _Search:
             NoPlan: no day was found at all.
         """
         prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
-        *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
+        count = 1 if self.problem.settings.draft else TUNING.rounds
+        *rounds, last = in_phases(progress, *np.ones(count + 1))
         refused, left = NoPlan("no day was planned"), iter(rounds)
         told: Progress | None = next(left)
         while told is not None:
@@ -253,6 +259,12 @@ class _Search:
             self.accuracy.margin(self.offer(prices).information(np.array(day.repeats, dtype=float))) for day in days
         ]
         return replace(prices, level=promised_at_zero(promised, [day.margin for day in days]))
+
+    def draft(self, days: Sequence[DraftedDay], last: Choice, progress: Progress) -> ShortestDay:
+        """The only day, whatever it reaches."""
+        found = self.planned(days, days, last, progress, good=lambda *_: True)
+        assert found is not None  # a refusal is raised
+        return found
 
     def planned(
         self,

@@ -41,10 +41,13 @@ class Drafting:
         """The day with these runs; the water and the transitions of the day before are not worked out again.
 
         Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
-        are taken to be as late as the days before, second for second.
+        are taken to be as late as the days before, second for second. Where a draft is all that is asked for, no trials
+        are drawn.
         """
         like = days[-1].draft if days else None
         day = self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))
+        if self.problem.settings.draft:
+            return day
         if day.margin >= 0 or not days:
             return self._late(day)
         share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0

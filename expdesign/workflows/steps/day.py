@@ -101,7 +101,7 @@ def planned_day(
     check_start(problem, ship_on_legs(problem))
     if asked.day_s is not None:
         check_way_fits(problem, asked.day_s)
-    if asked.starts == 1:
+    if asked.starts == 1 or case.plan.draft:
         return _searched(case, information, design, accuracy, stated, seed, 0, progress)
     return _shortest_of(asked.starts, (case, information, design, accuracy, stated, seed), progress)
 
@@ -161,7 +161,7 @@ def _searched(
     asked = case.design.accuracy
     assert asked is not None  # there is an accuracy
     searching, planning = in_phases(progress, *WORK)
-    problem = plan_problem(case, information, design, seed=seed)
+    problem = plan_problem(replace(case, plan=replace(case.plan, draft=False)), information, design, seed=seed)
     added = _added(case, problem, accuracy, (seed, start), searching)
     if added:
         case = _with_additions(case, added)
@@ -175,7 +175,8 @@ def _searched(
         else partial(fullest_day, day_s=asked.day_s, added=names)
     )
     found = recalled(search, problem, accuracy, progress=planning)
-    found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
+    if not case.plan.draft:
+        found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
 
@@ -228,6 +229,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
     if found is None:
         return {}
     content = {
+        **({"draft": True} if found.plan.draft else {}),
         "day_s": found.plan.commands.duration_s,
         "day_median_s": finite(found.plan.day.median_s),
         "day_95_s": finite(found.plan.day.most_s),
