@@ -115,6 +115,7 @@ class SailedTrial:
         legs: in time order, without gaps.
         lattice: proof of the lattice planner, or None for other planners.
         standing: (m,) commands before the first, which the actuators deliver as the trial begins; None for zeros.
+        placements: of the runs, where the search put them; they begin there up to what a leg may miss its end by.
     """
 
     commands: Commands
@@ -122,6 +123,7 @@ class SailedTrial:
     legs: tuple[Leg, ...]
     lattice: LatticeProof | None = None
     standing: Array | None = None
+    placements: tuple[Placement, ...] = ()
 
     @property
     def states(self) -> Array:

@@ -251,7 +251,7 @@ def found_sentence(day: ShortestDay) -> str:
     tried = words.counted(len(day.tried), "day")
     if day.plan.draft:
         return (
-            "It is a DRAFT, the first day that the search tries; the others may be shorter or tell more. Its track, legs "
+            "It is a DRAFT, the first day that the search tries; others may be shorter or tell more. Its track, legs "
             f"included, holds {words.percent(day.information)} of the information asked for."
         )
     if day.most_s is not None:
