@@ -110,11 +110,11 @@ _memory: ContextVar[Memory | None] = ContextVar("memory", default=None)
 
 
 @contextmanager
-def remembering(memory: Memory | None) -> Iterator[None]:
+def remembering(memory: Memory | None) -> Iterator[Memory | None]:
     """Results that are worked out in this block are remembered there, or nowhere."""
     token = _memory.set(memory)
     try:
-        yield
+        yield memory
     finally:
         _memory.reset(token)
         if memory is not None:

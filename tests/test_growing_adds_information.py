@@ -123,7 +123,7 @@ def test_a_familys_candidates_and_steps_do_not_depend_on_the_others_that_are_sea
 
     def searched(families: tuple[str, ...], run_s: float = 12.5) -> dict[str, np.ndarray]:
         spaces = family_spaces(ship, tuple(family(name) for name in families), limits, run_s)
-        archives = pool_of(spaces, measure, pool=8, seed=1)
+        archives = pool_of(spaces, measure, 8, 1)
         archives = refined(archives, worth, measure, np.random.default_rng(1))
         return {archive.space.family.name: archive.points for archive in archives}
 

@@ -1,13 +1,16 @@
 """The shortest day reaches the accuracy asked for, by information recomputed from its files, and is the least tried."""
 
 import json
+import os
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from expdesign import workflows
 from expdesign.information import regressor_rows
+from expdesign.memory import VARIABLE
 from expdesign.scenario import load_scenario
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, delivered
@@ -23,7 +26,8 @@ def day(made_once):
 
     def run(folder):
         scenario = copied(folder.with_name("day-scenario"), "story", {"total_s = 720.0": ASKED})
-        workflows.run(scenario, folder, seed=1)
+        with patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))}):
+            workflows.run(scenario, folder, seed=1)
         return str(scenario)
 
     return made_once("shortest-day", run)
@@ -119,3 +123,16 @@ def test_files_and_report_say_where_the_minutes_go(day):
     assert days_s == sorted(days_s)  # more information never takes less
     assert "the way to the goal takes 7\N{NO-BREAK SPACE}min" in page
     assert 'id="pareto-' in page
+
+
+def test_a_draft_is_the_first_day_tried_with_what_it_tells(day, tmp_path):
+    folder, scenario = day
+    with patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))}):
+        workflows.run(Path(scenario), tmp_path, draft=True, seed=1)
+    first = json.loads((folder / "day.json").read_text("utf-8"))["tried"][0]
+    found = json.loads((tmp_path / "day.json").read_text("utf-8"))
+    assert found["draft"] is True
+    assert [item["runs"] for item in found["tried"]] == [first["runs"]]
+    assert found["day_s"] == first["day_s"]
+    assert found["information"] == pytest.approx(first["information"], rel=1e-9)
+    assert "day_bound_s" not in found

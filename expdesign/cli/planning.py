@@ -27,6 +27,14 @@ from expdesign.cli.options import (
 def run(
     scenario: ScenarioFile,
     vessel: OtherVessel = None,
+    draft: Annotated[
+        bool,
+        typer.Option(
+            "--draft",
+            help="Only a quick look: one placing of the runs, checked with the nominal ship; no drawn trials, no bound "
+            "on the day, no route files. Marked DRAFT; goes to runs/<name of the scenario>-draft.",
+        ),
+    ] = False,
     out: Out = None,
     jobs: Jobs = 0,
     scheduler: Scheduler = None,
@@ -37,7 +45,17 @@ def run(
 
     Example: expdesign run scenarios/helsinki.toml
     """
-    return ask("run", scenario, out, vessel=vessel, jobs=jobs, scheduler=scheduler, cache=not no_cache, seed=seed)
+    return ask(
+        "run",
+        scenario,
+        out,
+        vessel=vessel,
+        draft=draft,
+        jobs=jobs,
+        scheduler=scheduler,
+        cache=not no_cache,
+        seed=seed,
+    )
 
 
 @command("score")

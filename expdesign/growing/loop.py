@@ -67,7 +67,7 @@ def grow_dictionary(
     primitives = [item.primitive for item in information]
     spaces, measure = searched_spaces(case.vessel, primitives, settings, case.limits), _measure(case)
     rng = np.random.default_rng(settings.seed or 0)
-    archives = pool_of(spaces, measure, pool=settings.pool, seed=settings.seed or 0)
+    archives = pool_of(spaces, measure, settings.pool, settings.seed or 0)
     grown, specs, rounds = list(information), list[PrimitiveSpec](), list[GrowRound]()
     first = best = optimum(grown, mean_subtraction)
     while True:

@@ -204,7 +204,7 @@ class Archive:
         )
 
 
-def pool_of(spaces: Sequence[FamilySpace], measure: Measure, *, pool: int, seed: int) -> tuple[Archive, ...]:
+def pool_of(spaces: Sequence[FamilySpace], measure: Measure, pool: int, seed: int) -> tuple[Archive, ...]:
     """Quasi-random candidates of every family, `pool` or the next power of two of each."""
     from scipy.stats import qmc  # slow to import
 

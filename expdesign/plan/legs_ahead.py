@@ -58,6 +58,11 @@ def legs_ahead(
     return (known[_place(task)] for task in listed)
 
 
+def remember(known: KnownLegs, ahead: LegAhead) -> None:
+    """Make a leg known."""
+    known[_place(ahead.task)] = ahead
+
+
 def _place(task: LegTask) -> tuple[bytes, ...]:
     ends = task.start, task.end, task.start_inputs, task.end_inputs, task.past
     return tuple(np.asarray(part, dtype=float).tobytes() for part in ends)

@@ -13,7 +13,7 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
-from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead
+from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead, remember
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
@@ -28,7 +28,13 @@ GOAL = "goal"
 
 
 def sail_all(
-    problem: PlanProblem, room: PlanRoom, progress: Progress, *, stated: LegWater, budget: WorkBudget
+    problem: PlanProblem,
+    room: PlanRoom,
+    progress: Progress,
+    *,
+    stated: LegWater,
+    budget: WorkBudget,
+    known: KnownLegs | None = None,
 ) -> SailedTrial:
     """Every run and leg from start to goal.
 
@@ -38,11 +44,19 @@ def sail_all(
         progress: of the sailing.
         stated: the water that runs keep to, with the clearance asked for.
         budget: counts what legs cost.
+        known: takes the legs that are found, for `sail_placed`.
 
     Raises:
         NoPlan: there is no place for a run, or none was found within the budget; the message says what failed.
     """
-    voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
+    voyage = _Voyage(
+        problem=problem,
+        water=room.water,
+        stated=stated,
+        planner=room.space.planner,
+        budget=budget,
+        known={} if known is None else known,
+    )
     try:
         return _sailed(voyage, room.space, progress)
     except NoPlan as error:
@@ -66,7 +80,9 @@ def sail_placed(
         placements: of all runs.
         known: legs that are not sought again; grows.
     """
-    voyage = _Voyage(problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget)
+    voyage = _Voyage(
+        problem=problem, water=room.water, stated=stated, planner=room.space.planner, budget=budget, known=known
+    )
     legs = voyage.legs_ahead(placements, known)
     for placement in placements:
         if voyage.sail_run(placement, next(legs)):
@@ -149,7 +165,9 @@ class _Voyage:
     Attributes:
         problem, water, stated, budget: as `sail_all` takes them.
         planner: finds legs.
-        line: what has been sailed; the only part that grows.
+        known: legs found so far; grows.
+        placed: where runs sailed so far were placed; grows.
+        line: what has been sailed; grows.
     """
 
     problem: PlanProblem
@@ -157,6 +175,8 @@ class _Voyage:
     stated: LegWater
     planner: LocalPlanner
     budget: WorkBudget
+    known: KnownLegs
+    placed: list[Placement] = field(default_factory=list)
     line: Timeline = field(init=False)
 
     def __post_init__(self) -> None:
@@ -167,7 +187,8 @@ class _Voyage:
     def sailed(self) -> SailedTrial:
         """Everything so far."""
         vessel = self.problem.vessel
-        return self.line.joined(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs)
+        joined = self.line.joined(sample_time_s=vessel.sample_time_s, names=vessel.model.inputs)
+        return replace(joined, placements=tuple(self.placed))
 
     def legs_ahead(self, placements: Sequence[Placement], known: KnownLegs | None = None) -> Iterator[LegAhead]:
         """Legs to runs, in this order, and on to the goal, as far as can be known now."""
@@ -197,6 +218,7 @@ class _Voyage:
             return f"the run {where} leaves safe water"
         line.sail("reposition", primitive.name, leg, track)
         line.sail("primitive", primitive.name, values, run)
+        self.placed.append(placement)
         return ""
 
     def sail_home(self, ahead: LegAhead) -> bool:
@@ -210,11 +232,13 @@ class _Voyage:
         """Remove the last run and the leg to it; where the run began."""
         if not self.line.stretches:
             raise NoPlan("no leg leads from the start to the goal")
+        self.placed.pop()
         return self.line.undo_run()
 
     def _leg(self, end: Array, end_inputs: Array, ahead: LegAhead) -> Array | None:
         """Commands (k, m) from where the timeline ends, or None: those found ahead, where they arrive from there."""
         self.budget.spent_s += ahead.spent_s
+        remember(self.known, ahead)
         if ahead.commands is None:
             return None
         task = self._task(*self._now, end, end_inputs, stretches=0)

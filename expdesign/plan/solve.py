@@ -106,6 +106,10 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
 def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
     """A draft's plan, verified with all of the water; made anew with more room where drawn trials leave it."""
     problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
+    if problem.settings.draft:
+        phases_of(problem, room.space.planner, progress).trials("verifying", 0.0)
+        checks = in_order(_check, (whole, water, draft.sailed), ((verified,), (_bound_s,)))
+        return _plan(whole, draft.sailed, verification=next(checks), bound_s=next(checks))
     confidence = problem.settings.confidence
     budget = _budget(problem)
     sailed, before_s, budget.spent_s, reported = draft.sailed, 0.0, draft.spent_s, progress
@@ -154,6 +158,7 @@ class Draft:
         made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
         late_s: (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s];
             zero where it is not known.
+        known: legs found for it, which a like trial need not seek again.
     """
 
     area: SeaArea
@@ -165,6 +170,7 @@ class Draft:
     transit_mps: float
     made_good_m: Array
     late_s: Array
+    known: KnownLegs
 
     def __post_init__(self) -> None:
         seal(self, made_good_m="legs", late_s="legs")
@@ -202,28 +208,31 @@ def _drafted(
     progress("measuring the water", 0.0)
     problem = replace(whole, area=area)
     water, room = roomy_water(problem, ship, progress, None if like is None else like.room)
-    budget = _budget(problem)
-    sailed = sail_all(problem, room, progress, stated=water, budget=budget)
-    return _measured(area, water, room, sailed, budget.spent_s)
+    budget, known = _budget(problem), KnownLegs()
+    sailed = sail_all(problem, room, progress, stated=water, budget=budget, known=known)
+    return _measured(area, water, room, sailed, budget.spent_s, known)
 
 
-def redrafted(problem: PlanProblem, draft: Draft, placements: Sequence[Placement], known: KnownLegs) -> Draft | None:
+def redrafted(problem: PlanProblem, draft: Draft, placements: Sequence[Placement]) -> Draft | None:
     """The draft of a trial with other runs at given places, in this order; None where a leg or a run is not found.
+
+    Legs that are known from the draft are not sought again, and those found become known.
 
     Args:
         problem: the trial; its runs are among those of the draft.
         draft: of the same trial with other runs; its water is used.
         placements: of all runs.
-        known: legs that are not sought again; grows.
     """
     problem, budget, used = replace(problem, area=draft.area), _budget(problem), {run.name for run in problem.used}
     runs = tuple(run for run in draft.room.space.footprints if run.name in used)
     room = replace(draft.room, space=replace(draft.room.space, footprints=runs))
-    sailed = sail_placed(problem, room, placements, stated=draft.water, budget=budget, known=known)
-    return None if sailed is None else _measured(draft.area, draft.water, room, sailed, budget.spent_s)
+    sailed = sail_placed(problem, room, placements, stated=draft.water, budget=budget, known=draft.known)
+    return None if sailed is None else _measured(draft.area, draft.water, room, sailed, budget.spent_s, draft.known)
 
 
-def _measured(area: SeaArea, water: LegWater, room: PlanRoom, sailed: SailedTrial, spent_s: float) -> Draft:
+def _measured(
+    area: SeaArea, water: LegWater, room: PlanRoom, sailed: SailedTrial, spent_s: float, known: KnownLegs
+) -> Draft:
     """A draft and what it makes good."""
     ends = [0, *(leg.last for leg in sailed.legs)]
     left_m = room.space.goal_distance.to_goal(sailed.trajectory.pose[ends, :2])
@@ -238,6 +247,7 @@ def _measured(area: SeaArea, water: LegWater, room: PlanRoom, sailed: SailedTria
         transit_mps=speed,
         made_good_m=-np.diff(left_m),
         late_s=np.zeros(len(sailed.legs)),
+        known=known,
     )
 
 
@@ -265,9 +275,14 @@ def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> floa
 
 
 def _plan(
-    problem: PlanProblem, sailed: SailedTrial, *, verification: Verification, risk: RiskEstimate, bound_s: float
+    problem: PlanProblem,
+    sailed: SailedTrial,
+    *,
+    verification: Verification,
+    bound_s: float,
+    risk: RiskEstimate | None = None,
 ) -> Plan:
-    """The plan with its bound and its efficiencies."""
+    """The plan with its bound and its efficiencies; a draft without risk."""
     placed, realised = realised_efficiencies(problem.vessel, problem.design, problem.environment, sailed)
     return Plan(
         area=problem.area,
@@ -275,12 +290,13 @@ def _plan(
         trajectory=sailed.trajectory,
         legs=sailed.legs,
         reposition_bound_s=bound_s,
-        leave_water_probability=risk.left,
-        leave_water_by_leg=tuple(leg.left for leg in risk.legs),
+        leave_water_probability=None if risk is None else risk.left,
+        leave_water_by_leg=() if risk is None else tuple(leg.left for leg in risk.legs),
         design_efficiency_placed=placed,
         design_efficiency_realised=realised,
         verification=verification,
         risk=risk,
         lattice=sailed.lattice,
         standing=sailed.standing,
+        draft=risk is None,
     )

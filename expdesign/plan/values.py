@@ -12,6 +12,7 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
 PlannerName = Literal["beam", "lattice"]
+DRAFT = "a DRAFT: the nominal ship keeps to allowed water, no trials were drawn, and nobody may sail it"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +31,7 @@ class PlanSettings:
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
         planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.
         lattice_spacing_m: distance between the cells of the lattice planner, or None for one that suits the ship.
+        draft: whether one placing of the runs and the check of the nominal track are enough; no key of a file.
     """
 
     clearance_m: float = 20.0
@@ -40,6 +42,7 @@ class PlanSettings:
     turning_radius_m: float | None = None
     planner: PlannerName = "beam"
     lattice_spacing_m: float | None = None
+    draft: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,6 +115,7 @@ class SailedTrial:
         legs: in time order, without gaps.
         lattice: proof of the lattice planner, or None for other planners.
         standing: (m,) commands before the first, which the actuators deliver as the trial begins; None for zeros.
+        placements: of the runs, where the search put them; they begin there up to what a leg may miss its end by.
     """
 
     commands: Commands
@@ -119,6 +123,7 @@ class SailedTrial:
     legs: tuple[Leg, ...]
     lattice: LatticeProof | None = None
     standing: Array | None = None
+    placements: tuple[Placement, ...] = ()
 
     @property
     def states(self) -> Array:
@@ -277,6 +282,7 @@ class Plan:
         lattice: proof of the lattice planner, or None for other planners.
         standing: (m,) commands before the first, which the actuators deliver as the plan begins; None for a plan that
             begins at rest with all of them zero.
+        draft: whether no trials were drawn as only a draft was asked for, which nobody may sail.
     """
 
     area: SeaArea
@@ -292,17 +298,20 @@ class Plan:
     risk: RiskEstimate | None = None
     lattice: LatticeProof | None = None
     standing: Array | None = None
+    draft: bool = False
 
     @property
     def verified(self) -> bool:
-        """Whether the independent check passed and no more drawn trials were aborted than may be."""
-        return self.verification.passed and not (self.risk and self.risk.note)
+        """Whether the independent check passed and no more drawn trials were aborted than may be; a draft never is."""
+        return self.verification.passed and not self.draft and not (self.risk and self.risk.note)
 
     @property
     def verdict(self) -> str:
         """The outcome of check and drawn trials in a few words."""
         if not self.verification.passed:
             return f"not verified: {'; '.join(self.verification.problems)}"
+        if self.draft:
+            return DRAFT
         if self.risk is None or self.verified:
             return "verified"
         return (

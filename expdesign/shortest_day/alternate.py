@@ -6,7 +6,7 @@ prices says so. The prices decide only what is tried next.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,6 +17,7 @@ from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, plan_trial
 from expdesign.plan.values import Plan
+from expdesign.processes import in_order
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
@@ -40,7 +41,8 @@ def shortest_day(
     """The shortest day found that reaches an accuracy, planned and verified.
 
     Args:
-        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used.
+        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used. Where it
+            asks for a draft, the first day is the answer, whatever it reaches.
         accuracy: to be reached by the whole track, legs included.
         added: runs that the day may have although the durations exclude them.
         most_s: longest day allowed [s].
@@ -52,6 +54,8 @@ def shortest_day(
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
     days, last, planning = search.rounds(search.untried, progress)
+    if problem.settings.draft:
+        return search.draft(days, last, planning)
     days += search.pruned(days)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
@@ -59,10 +63,11 @@ def shortest_day(
         raise NoAnswer(search.too_long(days, most_s))
     with suppress(NoAnswer):  # limits on runs may allow no more than days near those drafted have
         last = search.cheapest(days)
+    curve = search.curve(days, allowed)
     found = search.planned(allowed, days, last, planning, good=lambda _, margin: margin >= 0)
     if found is None:
         raise NoPlan(search.falls_short(days))
-    return replace(found, curve=search.curve(days, found.design.repeats))
+    return replace(found, curve=curve(found.design.repeats))
 
 
 def fullest_day(
@@ -88,6 +93,8 @@ def fullest_day(
     """
     search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
     days, last, planning = search.rounds(partial(search.filling, day_s), progress)
+    if problem.settings.draft:
+        return replace(search.draft(days, last, planning), most_s=day_s)
     allowed = sorted((day for day in days if day.day_s <= day_s), key=lambda day: -day.margin)
     if not allowed:
         least_s = min(day.day_s for day in days)
@@ -95,10 +102,11 @@ def fullest_day(
             f"design.day_s is {day_s:g}: the shortest of {len(days)} days found, with runs in it, takes "
             f"{least_s:.0f} s; a larger day_s, or shorter manoeuvres, would do"
         )
+    curve = search.curve(days, allowed)
     found = search.planned(allowed, days, last, planning, good=lambda plan, _: plan.commands.duration_s <= day_s)
     if found is None:
         raise NoPlan(f"no day within design.day_s = {day_s:g} was planned as it was drafted; a larger day_s would do")
-    return replace(found, most_s=day_s, curve=search.curve(days, found.design.repeats))
+    return replace(found, most_s=day_s, curve=curve(found.design.repeats))
 
 
 def check_way_fits(problem: PlanProblem, day_s: float) -> None:
@@ -144,7 +152,8 @@ class _Search:
             NoPlan: no day was found at all.
         """
         prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
-        *rounds, last = in_phases(progress, *np.ones(TUNING.rounds + 1))
+        count = 1 if self.problem.settings.draft else TUNING.rounds
+        *rounds, last = in_phases(progress, *np.ones(count + 1))
         refused, left = NoPlan("no day was planned"), iter(rounds)
         told: Progress | None = next(left)
         while told is not None:
@@ -254,6 +263,12 @@ class _Search:
         ]
         return replace(prices, level=promised_at_zero(promised, [day.margin for day in days]))
 
+    def draft(self, days: Sequence[DraftedDay], last: Choice, progress: Progress) -> ShortestDay:
+        """The only day, whatever it reaches."""
+        found = self.planned(days, days, last, progress, good=lambda *_: True)
+        assert found is not None  # a refusal is raised
+        return found
+
     def planned(
         self,
         best: Sequence[DraftedDay],
@@ -314,17 +329,28 @@ class _Search:
             f"{': ' if lacks else ''}{lacks}{'; ' + noise if best.margin > -np.inf else ''}"
         )
 
-    def curve(self, days: Sequence[DraftedDay], repeats: Sequence[int]) -> Array:
-        """(k, 2) day [s] and information of the cheapest choices by the prices learnt, as the day with these runs is.
+    def curve(self, days: Sequence[DraftedDay], best: Sequence[DraftedDay]) -> Callable[[Sequence[int]], Array]:
+        """A function of the runs of a day: (k, 2) day [s] and information of the cheapest choices, as that day is.
 
-        What that day takes and tells beside its prices, all are taken to.
+        They cost by the prices learnt; what that day takes and tells beside these, all are taken to. For the best day
+        this is begun now, where there are other processes.
         """
-        prices, day = self.prices(days), next(day for day in days if day.repeats == tuple(repeats))
-        offer, runs = self.offer(prices), np.array(repeats, dtype=float)
-        level = self.accuracy.margin(offer.information(runs)) - day.margin
-        costs_s = shares_costs_s(self.accuracy, offer, (level + np.log(TUNING.curve_shares)).tolist())
-        points = np.column_stack([day.day_s - offer.total_s(runs) + costs_s, TUNING.curve_shares])
-        return np.asarray(points[np.isfinite(points[:, 0])])
+        offer = self.offer(self.prices(days))
+
+        def costs_s(day: DraftedDay) -> Iterator[Array]:
+            level = self.accuracy.margin(offer.information(np.array(day.repeats, dtype=float))) - day.margin
+            levels = (level + np.log(TUNING.curve_shares)).tolist()
+            return in_order(shares_costs_s, (self.accuracy, offer), ((levels,),))
+
+        begun = {day.repeats: costs_s(day) for day in best[:1]}
+
+        def curve(repeats: Sequence[int]) -> Array:
+            day = next(day for day in days if day.repeats == tuple(repeats))
+            beside_s = day.day_s - offer.total_s(np.array(day.repeats, dtype=float))
+            points = np.column_stack([beside_s + next(begun.get(day.repeats) or costs_s(day)), TUNING.curve_shares])
+            return np.asarray(points[np.isfinite(points[:, 0])])
+
+        return curve
 
     def late_s(self, days: Sequence[DraftedDay], prices: Prices) -> float:
         """How much longer days are than their prices say, on average [s]."""

@@ -210,17 +210,29 @@ class _Cuts:
         return self._moved(runs, self.inner, self.level - TUNING.choice_gap)
 
     def _moved(self, runs: Array, inner: Array, level: float) -> Array:
-        """The first runs that reach a level, from given ones to inner ones that do."""
-        low, high = 0.0, 1.0
-        if self.accuracy.margin(self.offer.information(runs)) >= level:
+        """The first runs that reach a level, from given ones to inner ones that do, on a grid of the way between.
+
+        The margin is concave, so it rises where it is below the level. Its excess is interpolated between both ends of
+        what is left, by the Illinois rule; where it is infinite, what is left is halved.
+        """
+
+        def excess(part: int) -> float:
+            return self.accuracy.margin(self.offer.information(runs + part / most * (inner - runs))) - level
+
+        most = 2**TUNING.halvings
+        low, high, below = 0, most, excess(0)
+        if below >= 0:
             return runs
-        for _ in range(TUNING.halvings):
-            middle = (low + high) / 2
-            if self.accuracy.margin(self.offer.information(runs + middle * (inner - runs))) >= level:
-                high = middle
+        above, last = excess(most), 0
+        while high - low > 1:
+            share = below / (below - above) if np.isfinite(below) and above > 0 else 0.5
+            middle = min(max(low + round(share * (high - low)), low + 1), high - 1)
+            if (found := excess(middle)) >= 0:
+                high, above, below = middle, found, below / (2 if last > 0 else 1)
             else:
-                low = middle
-        return np.asarray(runs + high * (inner - runs))
+                low, below, above = middle, found, above / (2 if last < 0 else 1)
+            last = 1 if found >= 0 else -1
+        return np.asarray(runs + high / most * (inner - runs))
 
     @property
     def rows(self) -> tuple[Array, Array]:

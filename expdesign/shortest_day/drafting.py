@@ -13,7 +13,6 @@ import numpy as np
 
 from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NotInformative
-from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, redrafted, with_lateness
 from expdesign.plan.values import Placement, SailedTrial
@@ -41,10 +40,13 @@ class Drafting:
         """The day with these runs; the water and the transitions of the day before are not worked out again.
 
         Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
-        are taken to be as late as the days before, second for second.
+        are taken to be as late as the days before, second for second. Where a draft is all that is asked for, no trials
+        are drawn.
         """
         like = days[-1].draft if days else None
         day = self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))
+        if self.problem.settings.draft:
+            return day
         if day.margin >= 0 or not days:
             return self._late(day)
         share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0
@@ -52,9 +54,9 @@ class Drafting:
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
         """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""
-        known, begun = KnownLegs(), day
+        begun = day
         while True:
-            drafts = (self._redrafted(day.draft, rest, known) for rest in _with_one_fewer(day, self.accuracy))
+            drafts = (self._redrafted(day.draft, rest) for rest in _with_one_fewer(day, self.accuracy))
             shorter = (other for other in drafts if other and other.margin >= 0 and other.day_s < day.day_s)
             found = next(shorter, None)
             if found is None:
@@ -90,28 +92,27 @@ class Drafting:
         """The day with what drawn trials of it take longer."""
         return replace(day, draft=with_lateness(self._of(day.repeats), day.draft))
 
-    def _redrafted(self, draft: Draft, placements: Sequence[Placement], known: KnownLegs) -> DraftedDay | None:
+    def _redrafted(self, draft: Draft, placements: Sequence[Placement]) -> DraftedDay | None:
         """The day of a draft with runs at given places alone; None where they are too few, or a leg is not found."""
         names = [item.primitive for item in placements]
         repeats = [names.count(name) for name in self.problem.design.problem.names]
         if (repeats < fewest_runs(self.problem)).any():
             return None
-        other = redrafted(self._of(repeats), draft, placements, known)
+        other = redrafted(self._of(repeats), draft, placements)
         return None if other is None else self._judged(repeats, other)
 
 
 def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:
     """The runs of the day but one, for each that might be left out; those first that save most for what they tell."""
     draft, told, lost = day.draft, with_legs(day), lost_s(day.draft)
-    legs, poses = draft.sailed.legs, draft.sailed.trajectory.pose
-    are_runs = np.array([leg.kind == "primitive" for leg in legs])
+    are_runs = np.array([leg.kind == "primitive" for leg in draft.sailed.legs])
     runs = np.flatnonzero(are_runs).tolist()
     if len(runs) < 2:
         return []
     saved_s = (lost + np.convolve(np.where(are_runs, 0.0, lost), [0.5, 0.0, 0.5], "same"))[runs]
     spare = day.margin - accuracy.margin(day.whole)
     margins = np.array([accuracy.margin(day.whole - told[place]) + spare for place in runs])
-    placed = [Placement(primitive=legs[place].name, pose=poses[legs[place].first]) for place in runs]
+    placed = list(draft.sailed.placements)
     worth = saved_s / np.maximum(day.margin - margins, TUNING.choice_gap)
     order = [row for row in np.argsort(-worth).tolist() if margins[row] > -TUNING.foreseen and saved_s[row] > 0]
     return [placed[:row] + placed[row + 1 :] for row in order[: TUNING.left_out]]

@@ -28,6 +28,7 @@ from expdesign.growing import (
     refined,
     searched_spaces,
 )
+from expdesign.memory import recalled
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.progress import Progress, silent
@@ -70,7 +71,7 @@ def manoeuvres_worth_adding(
     limits = _limits(problem, settings, transit_mps)
     measure, seed = _measure(problem, limits), settings.seed or 0
     spaces = _spaces(problem, settings, limits)
-    archives, rng = pool_of(spaces, measure, pool=settings.pool, seed=seed), np.random.default_rng(seed)
+    archives, rng = recalled(pool_of, spaces, measure, settings.pool, seed), np.random.default_rng(seed)
     given, specs = len(offer.cost_s), list[PrimitiveSpec]()
     level = float(np.log(TUNING.growth_share))
     if day_s is not None:

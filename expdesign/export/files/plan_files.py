@@ -6,6 +6,7 @@ ground.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
 
 
 def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environment, clearance_m: float) -> str:
-    """The plan, leg by leg, with the results of the independent check, as plan.json.
+    """The plan, leg by leg, with the results of the independent check, as plan.json; that of a draft says so.
 
     Args:
         plan: verified.
@@ -45,10 +46,11 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
     Raises:
         NoPlan: the plan is not verified.
     """
-    require_verified(plan)
+    require_verified(replace(plan, draft=False))
     check, frame = plan.verification, plan.area.frame
     return strict_json(
         {
+            **({"draft": True} if plan.draft else {}),
             "scenario": scenario,
             "vessel": {"name": vessel.name, "length_m": vessel.length_m, "beam_m": vessel.beam_m},
             "sample_time_s": plan.commands.sample_time_s,

@@ -6,6 +6,7 @@ Colours: M. Okabe and K. Ito, Color Universal Design (2008), told apart by colou
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -62,6 +63,21 @@ def report_style() -> Iterator[None]:
         # text stays text in the page, so the reader's fonts draw what matplotlib's font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
+
+
+def marked(figure: str, mark: str) -> Markup:
+    """An SVG element with a word across it."""
+    found = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', figure)
+    if found is None:  # what could not be drawn
+        return Markup(figure)
+    width, height = map(float, found.groups())
+    size, angle = 0.9 * min(width, height) / len(mark) * 2, -math.degrees(math.atan2(height, width))
+    word = (
+        f'<text class="mark-across" x="{width / 2:g}" y="{height / 2:g}" font-size="{size:.0f}" text-anchor="middle" '
+        f'dominant-baseline="middle" fill="{VERMILION}" fill-opacity="0.35" '
+        f'transform="rotate({angle:.1f} {width / 2:g} {height / 2:g})">{escape(mark)}</text>'
+    )
+    return Markup(f"{figure.removesuffix('</svg>')}{word}</svg>")
 
 
 def drawn(figures: Sequence[Callable[[], Drawn]]) -> list[Drawn]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign.export import words
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import drawn
+from expdesign.export.pages.figures import drawn, marked
 from expdesign.export.report import criteria, tables
 from expdesign.export.report.checks import checks, conditions
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -156,6 +156,8 @@ def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
         for number, item in enumerate(content.information)
     ]
     results: list[str] = drawn([*figures.values(), *primitives])
+    if content.plan.draft:
+        results = [marked(figure, "DRAFT") for figure in results]
     named = dict(zip(figures, results, strict=False))
     return {"uncertainty": "", "pareto": "", **named, "primitives": results[len(figures) :]}
 

@@ -249,6 +249,11 @@ def minutes_sentence(day: ShortestDay) -> str:
 def found_sentence(day: ShortestDay) -> str:
     """What the day is the best of, and its information."""
     tried = words.counted(len(day.tried), "day")
+    if day.plan.draft:
+        return (
+            "It is a DRAFT, the first day that the search tries; others may be shorter or tell more. Its track, legs "
+            f"included, holds {words.percent(day.information)} of the information asked for."
+        )
     if day.most_s is not None:
         return (
             f"It has the most information of {tried} planned to take at most {words.duration(day.most_s)}: its track, "

@@ -92,6 +92,7 @@ class PlanFile(_Entry):
     clearance_required_m: float = Field(ge=0)
     fence: _Fence | None = None
     verified: bool
+    draft: bool = False
     drawn_trials: _DrawnTrials | None = None
 
     @property

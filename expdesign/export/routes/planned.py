@@ -74,10 +74,12 @@ def planned_track(
 
 
 def require_verified(plan: Plan) -> None:
-    """A plan that failed a check never becomes a file that somebody could sail; one often aborted does, and says so.
+    """A draft, or a plan that failed a check, never becomes a file that somebody could sail; one often aborted does.
 
     Raises:
         NoPlan: naming the failed checks.
     """
+    if plan.draft:
+        raise NoPlan(f"the plan is {plan.verdict}; expected one made without --draft")
     if not plan.verification.passed:
         raise NoPlan(f"the plan is not verified and is not written: {'; '.join(plan.verification.problems)}")

@@ -47,6 +47,8 @@ def read_plan(path: Path) -> PlannedTrack:
         FileError: a file is missing or garbled, the files contradict each other, or the plan failed its checks.
     """
     file = _parse(path)
+    if file.draft:
+        raise FileError(path, "draft", "is true: nobody may sail a draft, plan again without --draft before using it")
     if not file.passed:
         raise FileError(path, "verified", "is false: the plan failed its checks, plan again before using it")
     frame = LocalFrame(file.frame.origin.lat_deg, file.frame.origin.lon_deg)

@@ -14,7 +14,7 @@ from expdesign.workflows.steps.day import compared_criteria, day_files, day_summ
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
-from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+from expdesign.workflows.steps.trial_files import built_route, check_no_trial, report_content, trial_files
 from expdesign.workflows.steps.workers import workers
 
 
@@ -23,6 +23,7 @@ def run(
     out: Path | None,
     *,
     vessel: Path | None = None,
+    draft: bool = False,
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -31,19 +32,30 @@ def run(
 ) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
 
+    A draft is the first day or plan that the whole job tries, without drawn trials and bound on the day. It is written
+    into `out` or runs/<scenario>-draft, without anything that could be sailed.
+
     Args:
         scenario: the scenario file.
         out: folder.
         vessel: a vessel file in place of the one that the scenario names.
+        draft: whether a draft is enough.
         seed: of everything drawn.
         jobs: processes; 0 for one per core. The results do not depend on it.
         scheduler: address of a Dask scheduler whose workers share the work instead.
         cache: read what is remembered, and remember what is computed. The results do not depend on it.
         progress: of the command.
+
+    Raises:
+        InputError: a draft would stand beside files of a trial that may be sailed.
     """
     case = loaded(scenario, progress, vessel=vessel)
+    if draft:
+        case = replace(case, plan=replace(case.plan, draft=True))
+        out = out or Path("runs") / f"{case.name}-draft"
+        check_no_trial(out)
     check_plannable(case)
-    words = command_text("run", [scenario], {"--vessel": vessel, "--seed": seed})
+    words = command_text("run", [scenario], {"--vessel": vessel, "--draft": draft, "--seed": seed})
     with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
         return _run(case, out, seed, progress)
 
@@ -56,7 +68,7 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 0.83))
     writing = within(progress, 0.83, 1.0)
     writing("writing routes, run cards and report", 0.0)
-    route = built_route(case, day.plan)
+    route = None if day.plan.draft else built_route(case, day.plan)
     content = report_content(case, day.information, day.design, day.plan, seed)
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -26,13 +28,15 @@ from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.day import planned_day
+from expdesign.workflows.steps.day import planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_summary
 from expdesign.workflows.steps.workers import load_plans, workers
 
 WHOLE_RUNS = "repeats"
+SEARCHED = 0.1
+"""Share of the work that is done once for all cases, where trials are planned."""
 WORKED = 0.95
 """Share of the work that the cases are."""
 WORK = (0.5, 0.5, 10.0, 0.5)
@@ -54,6 +58,8 @@ def whatif(
     """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
 
     Every file is read before anything is computed. A variant without an answer is listed as such beside the others.
+    Before trials are planned, manoeuvres are searched for that shorten the scenario's day: variants that leave that
+    search as it is take over what it found, others the candidates simulated in it.
 
     Args:
         scenario: the scenario file.
@@ -62,7 +68,8 @@ def whatif(
         with_plan: plan the trials, too.
         jobs: processes; 0 for one per core.
         scheduler: address of a Dask scheduler whose workers carry the work instead.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
+        cache: read what is remembered, and remember what is computed. Without it the cases share what they compute all
+            the same, in a folder of their own. The results do not depend on it.
         seed: of everything drawn.
         progress: of the cases.
     """
@@ -76,16 +83,21 @@ def whatif(
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
-    memory, done = user_memory() if cache else None, {}
+    done: dict[str, Case] = {}
+    searched = SEARCHED if with_plan and base.design.accuracy else 0.0
     with (
-        remembering(memory),
+        TemporaryDirectory(prefix="expdesign-") as folder,
+        remembering((user_memory() if cache else None) or Memory(Path(folder))) as memory,
         workers(jobs, scheduler=scheduler, load=load_plans),
-        reported_together(within(progress, 0.0, WORKED), len(cases)) as together,
     ):
-        tasks = [(*case, reporter) for case, reporter in zip(cases, together.reporters, strict=True)]
-        for found in as_finished(_case, (with_plan, seed, memory), tasks):
-            done[found.name] = found
-            together.finished(names.index(found.name), f"{found.name} is done")
+        if searched:
+            with suppress(NoAnswer):  # the case itself says so
+                _search(base, seed, within(progress, 0.0, searched))
+        with reported_together(within(progress, searched, WORKED), len(cases)) as together:
+            tasks = [(*case, reporter) for case, reporter in zip(cases, together.reporters, strict=True)]
+            for found in as_finished(_case, (with_plan, seed, memory), tasks):
+                done[found.name] = found
+                together.finished(names.index(found.name), f"{found.name} is done")
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
         planned=with_plan,
@@ -98,6 +110,14 @@ def whatif(
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+def _search(case: Scenario, seed: int, progress: Progress) -> None:
+    """Search for manoeuvres that shorten the day, to be remembered for all cases."""
+    scoring, sharing, searching = in_phases(progress, *WORK[:2], WORK[2] / 4)
+    information, _ = ready(case, seed=seed, progress=scoring)
+    design = designed(case, information, seed=seed, progress=sharing)
+    search_additions(case, information, design, seed=seed, progress=searching)
 
 
 def _case(

@@ -90,20 +90,48 @@ def planned_day(
     if asked is None:
         plan = planned(case, information, design, seed=seed, progress=progress)
         return Day(information=information, design=design, plan=plan)
-    from expdesign.shortest_day import check_way_fits, stated_accuracy
+    from expdesign.shortest_day import check_way_fits
 
-    runs = tuple(item.primitive for item in information)
-    accuracy = stated_accuracy(asked, design, case.vessel, runs, case.environment)
+    accuracy = _accuracy(case, information, design)
     if reference is not None:
-        accuracy = replace(accuracy, level=stated_accuracy(asked, reference, case.vessel, runs, case.environment).level)
+        accuracy = replace(accuracy, level=_accuracy(case, information, reference).level)
     case = replace(case, plan=with_leg_speed(case))
     problem = plan_problem(case, information, design, seed=seed)
     check_start(problem, ship_on_legs(problem))
     if asked.day_s is not None:
         check_way_fits(problem, asked.day_s)
-    if asked.starts == 1:
+    if asked.starts == 1 or case.plan.draft:
         return _searched(case, information, design, accuracy, stated, seed, 0, progress)
     return _shortest_of(asked.starts, (case, information, design, accuracy, stated, seed), progress)
+
+
+def search_additions(
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    design: DurationDesign,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> None:
+    """Search for the manoeuvres that `planned_day` adds, so that they are remembered for it and for like scenarios.
+
+    Nothing is done where no accuracy is asked for.
+
+    Raises:
+        InputError, NoAnswer: as of `planned_day`.
+    """
+    if case.design.accuracy is not None:
+        accuracy, case = _accuracy(case, information, design), replace(case, plan=with_leg_speed(case))
+        _added(case, plan_problem(case, information, design, seed=seed), accuracy, (seed, 0), progress)
+
+
+def _accuracy(case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign) -> Accuracy:
+    """The accuracy that a scenario asks for, with durations by which it is stated."""
+    from expdesign.shortest_day import stated_accuracy
+
+    asked, runs = case.design.accuracy, tuple(item.primitive for item in information)
+    assert asked is not None  # there is an accuracy
+    return stated_accuracy(asked, design, case.vessel, runs, case.environment)
 
 
 def _shortest_of(
@@ -161,8 +189,7 @@ def _searched(
     asked = case.design.accuracy
     assert asked is not None  # there is an accuracy
     searching, planning = in_phases(progress, *WORK)
-    problem = plan_problem(case, information, design, seed=seed)
-    added = _added(case, problem, accuracy, (seed, start), searching)
+    added = _added(case, plan_problem(case, information, design, seed=seed), accuracy, (seed, start), searching)
     if added:
         case = _with_additions(case, added)
         information = scored(case)
@@ -175,7 +202,8 @@ def _searched(
         else partial(fullest_day, day_s=asked.day_s, added=names)
     )
     found = recalled(search, problem, accuracy, progress=planning)
-    found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
+    if not case.plan.draft:
+        found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
 
@@ -197,7 +225,8 @@ def _added(
 ) -> tuple[PrimitiveSpec, ...]:
     """Manoeuvres that would shorten the day; none where the scenario wants none, or the vessel can do none.
 
-    The first start takes the seed itself, the others seeds drawn from it.
+    The first start takes the seed itself, the others seeds drawn from it. Only the speed and the turns of legs matter
+    of the plan's settings, so that scenarios with others share what is remembered, and so do drafts.
     """
     from expdesign.shortest_day import manoeuvres_worth_adding
 
@@ -207,6 +236,9 @@ def _added(
     seed, start = seed_start
     seed = seed if settings.seed is None else settings.seed
     settings = replace(settings, seed=int(np.random.default_rng([seed, start]).integers(2**31)) if start else seed)
+    plan = case.plan
+    legs = PlanSettings(transit_speed_mps=plan.transit_speed_mps, turning_radius_m=plan.turning_radius_m)
+    problem = replace(problem, settings=legs, seed=0)
     try:
         day_s = case.design.accuracy.day_s
         return recalled(manoeuvres_worth_adding, problem, accuracy, settings, day_s, progress=progress)
@@ -228,6 +260,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
     if found is None:
         return {}
     content = {
+        **({"draft": True} if found.plan.draft else {}),
         "day_s": found.plan.commands.duration_s,
         "day_median_s": finite(found.plan.day.median_s),
         "day_95_s": finite(found.plan.day.most_s),

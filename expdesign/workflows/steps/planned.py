@@ -92,18 +92,17 @@ def check_plannable(case: Scenario) -> None:
 
 
 def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
-    """The plan, its track and its commands."""
-    return {
+    """The plan, its track and its commands; of a draft, which cannot be sailed, the plan alone."""
+    files: dict[str, str | bytes] = {
         "plan.json": plan_json(
             plan,
             scenario=case.name,
             vessel=case.vessel,
             environment=case.environment,
             clearance_m=case.plan.clearance_m,
-        ),
-        "track.csv": track_csv(plan),
-        "commands.csv": commands_csv(plan),
+        )
     }
+    return files if plan.draft else {**files, "track.csv": track_csv(plan), "commands.csv": commands_csv(plan)}
 
 
 def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
@@ -123,6 +122,7 @@ def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
     """Key numbers of a plan, units in the names."""
     remarks = trial_remarks(case, plan)
     return {
+        **({"draft": True} if plan.draft else {}),
         "verified": plan.verified,
         **({} if plan.verified else {"verdict": plan.verdict}),
         "informative_s": plan.seconds("primitive"),

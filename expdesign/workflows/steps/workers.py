@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 
@@ -9,10 +10,15 @@ from expdesign.errors import InputError
 from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors
 
+FEW_CYCLES = 20_000
+"""New objects after which cycles of garbage are looked for: work with arrays leaves few, and a look takes 0.1 s."""
+
 
 def load_plans() -> None:
     """Import what plans need."""
     import expdesign.plan.solve  # noqa: F401
+
+    gc.set_threshold(FEW_CYCLES)
 
 
 def load_planner() -> None:
@@ -47,5 +53,10 @@ def workers(
         raise InputError(f"--jobs is {jobs}, expected a whole number of 0 or more")
     memory = nullcontext() if cache is None else remembering(user_memory() if cache else None)
     place = on_cluster(scheduler) if scheduler is not None else local_processes(jobs or processors(), load=load)
-    with memory, place:
-        yield
+    before = gc.get_threshold()
+    gc.set_threshold(FEW_CYCLES)
+    try:
+        with memory, place:
+            yield
+    finally:
+        gc.set_threshold(*before)
