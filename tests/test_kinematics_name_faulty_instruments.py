@@ -185,11 +185,11 @@ def test_inputs_of_the_field_are_told_by_name(name: str) -> None:
 
 
 @pytest.mark.outside
-def test_the_velocities_of_every_pond_run_come_late_by_the_same_time() -> None:
+def test_the_positions_of_every_pond_run_come_early_by_the_same_time() -> None:
     delays = []
     for batch in outside_record("esso-osaka-3m", ("random", "turn_1", "zigzag")).batches:
         found = {finding.name: finding for finding in log_against_positions([batch], length_m=3.0)}
-        delays.append(found["velocity_delay_s"].value)
+        delays.append(-found["position_delay_s"].value)
     assert np.ptp(delays) < 0.1
     assert np.median(delays) == pytest.approx(0.96, abs=0.01)
 
