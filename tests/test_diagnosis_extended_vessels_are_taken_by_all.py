@@ -46,6 +46,7 @@ EFFECTS = {
     "heading_bias": {"heading_bias": 0.03},
     "lever_arm": {"lever:forward": 4.0},
     "sensor_delay": {"late:r": 1.0},
+    "log_scale": {"log": -0.05},
     "gyro_scale": {"gyro": 0.05},
     "shallow_water": {"shallow:damping": 0.8, "shallow:inertia": 0.4},
     "roll_coupling": {"roll:sway": 0.1, "roll:yaw": 0.01, "roll:period": 8.0, "roll:damping": 0.08},

@@ -96,7 +96,7 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
     place = "position" if pose_only else "velocity"
     effects = {
         "heading_bias": 0.04, "lever:forward": 2.0, "lever:starboard": -1.0, "late:psi": 0.5, "current:north": 0.2,
-        "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"gyro": -0.05, "late:r": 0.7}),
+        "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"gyro": -0.05, "log": 0.1, "late:r": 0.7}),
     }  # fmt: skip
     driven = SHIP.model.inputs[0]
     effects |= {f"{kind}:{driven}": value for kind, value in {"offset": 0.03, "lag": 2.0, "delay": 1.0}.items()}
@@ -108,7 +108,7 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
         "heading_bias": sensors.heading_bias_rad if pose_only else sensors.velocity_angle_rad,
         "lever:forward": getattr(sensors, place).forward_m, "lever:starboard": getattr(sensors, place).starboard_m,
         "late:psi": sensors.heading.delay_s, "late:position": sensors.position.delay_s,
-        "late:r": sensors.yaw_rate.delay_s, "gyro": sensors.yaw_rate_scale,
+        "late:r": sensors.yaw_rate.delay_s, "gyro": sensors.yaw_rate_scale, "log": sensors.velocity_scale,
         "current:north": ship.environment.current_to[0], "current:east": ship.environment.current_to[1],
         f"offset:{driven}": response.offset, f"lag:{driven}": response.lag_s,
         f"delay:{driven}": response.delay_s,

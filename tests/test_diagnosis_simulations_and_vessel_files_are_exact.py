@@ -100,7 +100,7 @@ def test_shorter_windows_hold_the_same_data():
     assert np.allclose(*errors, atol=1e-9)
 
 
-SENSED = {"lag:n": 2.0, "gyro": 0.04, "heading_bias": 0.02, "lever:forward": 1.0, "current:north": 0.1}
+SENSED = {"lag:n": 2.0, "gyro": 0.04, "log": -0.03, "heading_bias": 0.02, "lever:forward": 1.0, "current:north": 0.1}
 
 
 TOGETHER = (

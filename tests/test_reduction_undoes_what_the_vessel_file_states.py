@@ -41,6 +41,7 @@ FAULTS = {
     "place of the log": ship(velocity=Mounting(forward_m=6.0, starboard_m=2.0)),
     "axes of the log": ship(velocity_angle_rad=0.05),
     "scale and bias": ship(yaw_rate_scale=1.1, heading_bias_rad=0.1),
+    "scale of the log": ship(velocity_scale=0.9, velocity_angle_rad=0.05, velocity=Mounting(forward_m=6.0)),
     "late log": ship(velocity=Mounting(delay_s=2.0)),
     "late gyro": ship(yaw_rate=Mounting(delay_s=1.0), velocity=Mounting(forward_m=6.0)),
     "wind": ship(wind=replace(TIMED, forward_m=8.0, starboard_m=-1.0), heading=Mounting(delay_s=1.0)),

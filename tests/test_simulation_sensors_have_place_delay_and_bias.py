@@ -66,7 +66,9 @@ def test_an_anemometer_off_the_centre_feels_the_turn():
 
 
 def test_bias_and_scale_are_what_they_say():
-    told = seen(Sensors(heading_bias_rad=0.1, yaw_rate_scale=0.9), TURN)
+    told = seen(Sensors(heading_bias_rad=0.1, velocity_scale=1.2, yaw_rate_scale=0.9), TURN)
+    right = seen(Sensors(), TURN)
+    np.testing.assert_allclose([told["u_mps"], told["v_mps"]], [1.2 * right["u_mps"], 1.2 * right["v_mps"]])
     np.testing.assert_allclose(wrap_angle(told["heading_rad"] - TURN.pose[:-1, 2]), 0.1)
     np.testing.assert_allclose(told["r_radps"], 0.9 * R)
 

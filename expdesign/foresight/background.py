@@ -24,6 +24,7 @@ UNSEEN = {
     "actuator_scale": "the ship has no rudder, or the scale is stated",
     "wind": "the model has no equation that air acts in",
     "current": "no heading is measured",
+    "log_scale": "surge and sway are not measured by a log, or positions beside them tell its scale without a model",
     "gyro_scale": "no yaw rate is measured",
     "heading_bias": "surge and sway are not both measured",
     "lever_arm": "sway and yaw are not both measured",

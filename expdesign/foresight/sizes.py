@@ -29,7 +29,7 @@ OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoo
 """Of the standard trials, whose change matters."""
 WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))
 ZIGZAGS = (math.radians(10.0), math.radians(20.0))
-SENSORS = ("heading_bias", "lever", "gyro", "late")
+SENSORS = ("heading_bias", "lever", "log", "gyro", "late")
 """Kinds of effects that change no motion."""
 WEATHER = ("current", "wind")
 """Kinds of effects that standard trials, in calm water, do not have."""
@@ -255,6 +255,7 @@ def default_sizes(length_m: float, speed_mps: float) -> dict[str, float]:
         "delay": 0.1 * time_s,
         "heading_bias": math.radians(2.0),
         "lever": 0.1 * length_m,
+        "log": 0.05,
         "gyro": 0.05,
         "late": 0.05 * time_s,
         "shallow": 0.5,

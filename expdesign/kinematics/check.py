@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression import model_for
 from expdesign.kinematics.held import Held, held, knots_held
@@ -28,8 +29,18 @@ SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velociti
            "wind": "winds"}  # fmt: skip
 
 
+SCALES = {"yaw_rate_scale": (2,), "velocity_scale": (0, 1), "surge_scale": (0,), "sway_scale": (1,)}
+"""Findings that are undone -> columns of the velocity that are divided by them."""
+LATE = "velocity_delay_s"
+"""A finding that is undone where it is positive: then one instrument is late by two others."""
+OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m")[1:]
+"""Findings of the same comparison, which one that stands may imitate."""
+
+
 def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
     """The record with held and interpolated signals read in time, and its doubts: what does not agree.
+
+    A scale and a delay that two other instruments show in all files together are undone.
 
     Args:
         record: as measured.
@@ -39,9 +50,42 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     in_time = [_in_time(batch, vessel.sensors, smoothed=smoothed) for batch in record.batches]
     record = replace(record, batches=tuple(batch for batch, _ in in_time))
     held_notes = _shared([(batch.name, note) for batch, notes in in_time for note in notes])
-    faults = tuple(_findings(record, vessel, smoothed=smoothed))
+    files = list(dict.fromkeys(map(_file, record.batches)))
+    everywhere = ", ".join(files[:1]) + (f" and {len(files) - 1} more" if len(files) > 1 else "")
+    found = _findings(record, vessel, smoothed=smoothed)
+    faults = [f"{everywhere}: {item.text}{_what_is_done(item)}" for item in found]
+    record = replace(record, batches=tuple(_undone(batch, found, smoothed=smoothed) for batch in record.batches))
+    stands = {item.name for item in found if not _what_is_done(item)}
+    stands |= {*OF_LOG} if stands & {*OF_LOG} else set()
+    for file in files * (len(files) > 1):
+        own = replace(record, batches=tuple(batch for batch in record.batches if _file(batch) == file))
+        alone = _findings(own, vessel, smoothed=smoothed)
+        faults += [f"{file}: {item.text}" for item in alone if item.name not in stands]
     doubts = (*held_notes, *faults)
-    return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=faults)
+    return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=tuple(faults))
+
+
+def _what_is_done(item: Finding) -> str:
+    """A sentence on what is undone of a finding; "" for nothing."""
+    if item.name in SCALES:
+        return " Here it is divided by that."
+    return " Here they are moved to their own time." if item.name == LATE and item.value > 0 else ""
+
+
+def _undone(batch: Batch, found: Sequence[Finding], *, smoothed: bool) -> Batch:
+    """A batch whose measured velocities are divided by the scales that were found, and at their own times."""
+    factors, late = np.ones(3), 0.0
+    for item in found:
+        for column in SCALES.get(item.name, ()):
+            factors[column] *= 1.0 if OUTPUTS[column] in batch.derived else item.value
+        late += max(item.value, 0.0) if item.name == LATE else 0.0
+    batch = batch if (factors == 1.0).all() else replace(batch, velocity=batch.velocity / factors)
+    if not late:
+        return batch
+    (read,) = at_reference_point(
+        Record(batches=(batch,)), Sensors(velocity=Mounting(delay_s=late)), smoothed=smoothed
+    ).batches
+    return read
 
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:
@@ -124,23 +168,14 @@ def _how_held(name: str, how: Held, sample_time_s: float) -> str:
     )
 
 
-def _findings(record: Record, vessel: Vessel, *, smoothed: bool) -> list[str]:
-    """A note for everything that instruments, or inputs and motion, disagree about: in all files, or in one of them."""
+def _findings(record: Record, vessel: Vessel, *, smoothed: bool) -> list[Finding]:
+    """What instruments, or inputs and motion, disagree about in all batches together."""
     try:
         seen = at_reference_point(record, vessel.sensors, smoothed=smoothed)
         model = model_for(vessel.model, seen)
     except InputError:  # told by whoever needs them
         return []
-    seen = with_delivered_inputs(seen, model)
-    together = list(_disagreements(seen.batches, vessel, model))
-    files = list(dict.fromkeys(_file(batch) for batch in seen.batches))
-    notes = [(", ".join(files[:1]) + (f" and {len(files) - 1} more" if len(files) > 1 else ""), together)]
-    if len(files) > 1:
-        told = {finding.name for finding in together}
-        for file in files:
-            own = _disagreements([batch for batch in seen.batches if _file(batch) == file], vessel, model)
-            notes.append((file, [finding for finding in own if finding.name not in told]))
-    return [f"{where}: {finding.text}" for where, findings in notes for finding in findings]
+    return list(_disagreements(with_delivered_inputs(seen, model).batches, vessel, model))
 
 
 def _file(batch: Batch) -> str:

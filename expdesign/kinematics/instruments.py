@@ -2,9 +2,10 @@
 
 All compare what two instruments say of the same motion over windows of about a ship length:
 
-    gyro        integral of r               scale * change of heading + bias * time + delay * change of r
-    log         integral of R (u, v)        scale R(angle) (change of position - change of R arm) + drift * time
-    course      way to the side             - distance * change of heading + ...
+    gyro        integral of r       scale * change of heading + bias * time + delay * change of r
+    log         change of position  integral of R(angle) (u / scale, v / scale) + change of R arm + drift * time
+                                    + delay of positions * change of R (u, v) + delay of log * integral of R d(u, v)
+    course      way to the side     - distance * change of heading + ...
 
 R turns by the measured heading. A distance of zero in the last means that the ship never drifts in her turns: the
 "heading" is her course over ground.
@@ -12,7 +13,7 @@ R turns by the measured heading. A distance of zero in the last means that the s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,59 +75,167 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
 
 
 def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Iterator[Finding]:
-    """Scale and axes of the measured velocities, the place of the positions, and a steady difference of both."""
+    """Scale, axes and clock of the measured velocities, place and clock of the positions, and a steady difference."""
     own = [batch for batch in batches if batch.pose is not None and not {"u", "v"} & set(batch.derived)]
-    found = relation(stretches(own, [_moving(batch) for batch in own], length_m=length_m))
+    found = _log(own, length_m=length_m)
     if found is None:
         return
     speed = _rms(np.concatenate([np.hypot(*batch.velocity[:, :2].T) for batch in own]))
-    if found.differs(1.0, by=TUNING.scale_matters):
-        scale, std = found.size, found.size_std
-        yield Finding(
-            name="velocity_scale", value=scale, std=std, rest=found.rest,
-            text=f"u_mps and v_mps are {with_std(scale, std)} times the speed that the positions give: the scale of a "
-            "log?",
-        )  # fmt: skip
-    angle, std = float(np.angle(found.ratio)), found.std[1] / abs(found.ratio)
+    yield from _log_scale(found)
+    angle, std = -float(np.angle(found.ahead.ratio)), found.ahead.std[1] / abs(found.ahead.ratio)
     if abs(angle) > max(TUNING.certain * std, TUNING.turn_matters_rad):
         yield Finding(
-            name="heading_bias_rad", value=angle, std=std, rest=found.rest,
+            name="heading_bias_rad", value=angle, std=std, rest=found.ahead.rest,
             text=f"the heading is {with_std(angle / DEGREE, std / DEGREE)} degrees more than positions and velocities "
             f"say: add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
         )  # fmt: skip
-    drift, std = complex(found.others[0]), float(np.hypot(*found.others_std[0]))
-    if abs(drift) > max(TUNING.certain * std, TUNING.way_matters * speed):
-        toward = float(np.degrees(np.angle(-drift)) % 360.0)
+    drift, spread = found.of("drift")
+    if abs(drift) > max(TUNING.certain * float(np.hypot(*spread)), TUNING.way_matters * speed):
+        toward = float(np.degrees(np.angle(drift)) % 360.0)
         yield Finding(
-            name="current_mps", value=abs(drift), std=std, rest=found.rest,
-            text=f"the positions move at {with_std(abs(drift), std)} m/s towards {toward:.0f} degrees beyond u_mps and "
-            "v_mps: are these through the water, and not over ground?",
+            name="current_mps", value=abs(drift), std=float(np.hypot(*spread)), rest=found.ahead.rest,
+            text=f"the positions move at {with_std(abs(drift), float(np.hypot(*spread)))} m/s towards {toward:.0f} "
+            "degrees beyond u_mps and v_mps: are these through the water, and not over ground?",
         )  # fmt: skip
-    yield from _place_or_delay(own, found, speed, length_m=length_m)
+    yield from _clocks(found)
+    yield from _place(found, own[0].sample_time_s, speed, length_m=length_m)
 
 
-def _place_or_delay(batches: Sequence[Batch], found: Relation, speed: float, *, length_m: float) -> Iterator[Finding]:
-    """Where the positions are measured, or how late the velocities come; at one speed these are the same."""
-    arm, spread = -complex(found.others[1] / found.ratio), found.others_std[1] / abs(found.ratio)
-    both = relation(stretches(batches, [_moving_late(batch) for batch in batches], length_m=length_m))
-    if both is not None:
-        delay, std = -float((both.others[2] / both.ratio).real), float(both.others_std[2, 0] / abs(both.ratio))
-        if abs(delay) > max(TUNING.certain * std, TUNING.delay_matters * batches[0].sample_time_s):
-            arm, spread = -complex(both.others[1] / both.ratio), both.others_std[1] / abs(both.ratio)
-            later, sooner = ("u_mps and v_mps", "the positions")[:: 1 if delay > 0 else -1]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Log:
+    """How positions follow the way that a log tells.
+
+    Attributes:
+        ahead: positions on the way ahead, or on all way where that to the side has the same scale.
+        names: of the other regressors, in order: "drift", "arm", and of "side", "positions", "log" those that differ
+            for certain.
+        sample_s: time between samples.
+        late_s: by which the velocities were late, and were moved before.
+    """
+
+    ahead: Relation
+    names: tuple[str, ...]
+    sample_s: float
+    late_s: float = 0.0
+
+    def of(self, name: str) -> tuple[complex, Array]:
+        """Coefficient of a regressor, and the standard errors of its parts."""
+        place = self.names.index(name)
+        return complex(self.ahead.others[place]), self.ahead.others_std[place]
+
+    def delay_std(self, name: str) -> float:
+        """Standard error of a delay [s], with what sampling leaves open."""
+        return float(np.hypot(self.of(name)[1][0], TUNING.delay_std * self.sample_s))
+
+
+def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
+    """The relation with a scale of sway and with clocks of their own, as far as the data show these; None without any.
+
+    Regressors that are not certain are left out one by one, the least certain first: at one speed and little turn a
+    place, two clocks and a scale of sway look alike. The relation is linear in the delay of a log; what it finds is
+    undone, and the rest found anew.
+    """
+    late_s = 0.0
+
+    def related(names: Sequence[str]) -> _Log | None:
+        x = "ahead" if "side" in names else "way"
+        running = [_columns(batch, late_s) for batch in batches]
+        wide = [np.column_stack([rows[name] for name in ("position", x, *names)]) for rows in running]
+        found = relation(stretches(batches, wide, length_m=length_m), told=TUNING.told_way)
+        return (
+            None
+            if found is None
+            else _Log(ahead=found, names=tuple(names), sample_s=batches[0].sample_time_s, late_s=late_s)
+        )
+
+    optional = ("side", "positions", "log")
+    found = _certain(related, optional) if batches else None
+    for _ in range(TUNING.delay_rounds):
+        if found is None or "log" not in found.names:
+            break
+        late_s += found.of("log")[0].real
+        found = _certain(related, tuple(name for name in found.names if name in optional))
+    return found
+
+
+def _certain(related: Callable[[Sequence[str]], _Log | None], optional: Sequence[str]) -> _Log | None:
+    """The relation with those of the optional regressors that are certain; a delay that was found before is."""
+    names = ["drift", "arm", *optional]
+    while True:
+        found = related(names)
+        sizes = {} if found is None else {name: _certainty(found, name) for name in names[2:]}
+        doubtful = {name: size for name, size in sizes.items() if size < 1.0}
+        if len(names) == 2 or (found is not None and not doubtful):
+            return found
+        names.remove(min(doubtful, key=doubtful.__getitem__) if doubtful else names[-1])
+
+
+def _certainty(found: _Log, name: str) -> float:
+    """Size of a coefficient of its own, in those that are told."""
+    value, spread = found.of(name)
+    if name == "side":
+        apart = abs(value - found.ahead.ratio)
+        return float(apart / max(TUNING.certain * np.hypot(spread[0], found.ahead.std[0]), TUNING.scale_matters))
+    delay_s = abs(value.real + found.late_s * (name == "log"))
+    return float(delay_s / max(TUNING.certain * found.delay_std(name), TUNING.delay_matters * found.sample_s))
+
+
+def _log_scale(found: _Log) -> Iterator[Finding]:
+    """The scale of a log, or those of its two axes."""
+    whole = found.ahead
+    scale, std = 1.0 / whole.size, whole.size_std / whole.size**2
+    if "side" not in found.names:
+        if whole.differs(1.0, by=TUNING.scale_matters):
             yield Finding(
-                name="velocity_delay_s", value=delay, std=std, rest=both.rest,
-                text=f"{later} come {with_std(abs(delay), std)} s later than {sooner}.",
+                name="velocity_scale", value=scale, std=std, rest=whole.rest,
+                text=f"u_mps and v_mps are {with_std(scale, std)} times the speed that the positions give: the scale "
+                f"of a log? Where the positions are right, multiply sensors.velocity_scale by {scale:.4g}.",
             )  # fmt: skip
-    little = TUNING.place_matters * length_m + TUNING.delay_matters * batches[0].sample_time_s * speed
+        return
+    side, spread = found.of("side")
+    axes = (("surge", "u_mps", scale, std), ("sway", "v_mps", 1.0 / side.real, spread[0] / side.real**2))
+    for axis, column, value, error in axes:
+        error = float(np.hypot(error, TUNING.scale_std))
+        if abs(value - 1.0) > max(TUNING.certain * error, TUNING.scale_matters):
+            yield Finding(
+                name=f"{axis}_scale", value=value, std=error, rest=whole.rest,
+                text=f"{column} is {with_std(value, error)} times the {axis} speed that the positions give: the scale "
+                "of one axis of a log?",
+            )  # fmt: skip
+
+
+def _clocks(found: _Log) -> Iterator[Finding]:
+    """How late the velocities come, and the positions."""
+    if "log" in found.names:
+        late_s, std = found.late_s + found.of("log")[0].real, found.delay_std("log")
+        late = "later" if late_s > 0 else "sooner"
+        yield Finding(
+            name="velocity_delay_s", value=late_s, std=std, rest=found.ahead.rest,
+            text=f"u_mps and v_mps come {with_std(abs(late_s), std)} s {late} than heading and positions.",
+        )  # fmt: skip
+    if "positions" in found.names:
+        early_s, std = found.of("positions")[0].real, found.delay_std("positions")
+        later, sooner = ("heading, u_mps and v_mps", "the positions")[:: 1 if early_s > 0 else -1]
+        yield Finding(
+            name="position_delay_s", value=-early_s, std=std, rest=found.ahead.rest,
+            text=f"{later} come {with_std(abs(early_s), std)} s later than {sooner}.",
+        )  # fmt: skip
+
+
+def _place(found: _Log, sample_time_s: float, speed: float, *, length_m: float) -> Iterator[Finding]:
+    """Where the positions are measured; at one speed a late clock is the same."""
+    arm, spread = found.of("arm")
+    late = {"log", "positions"} & set(found.names)
+    little = TUNING.place_matters * length_m + (0.0 if late else TUNING.delay_matters * sample_time_s * speed)
     if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), little):
         ahead, beside = ("forward" if arm.real >= 0 else "aft"), ("starboard" if arm.imag >= 0 else "port")
-        late = "u_mps and v_mps come" if arm.real > 0 else "the positions come"
+        clock = "u_mps and v_mps come" if arm.real > 0 else "the positions come"
         yield Finding(
-            name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.rest,
+            name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.ahead.rest,
             text=f"the positions are those of a place {with_std(abs(arm.real), spread[0])} m {ahead} and "
             f"{with_std(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
-            + (f", or {late} {abs(arm.real) / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) else "."),
+            + (f", or {clock} {abs(arm.real) / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) and not late
+               else "."),
         )  # fmt: skip
 
 
@@ -165,18 +274,25 @@ def _turning(batch: Batch) -> Array:
     return np.column_stack([integral(r, batch), batch.pose[:, 2], batch.time_s, r])
 
 
-def _moving(batch: Batch) -> Array:
-    """(k, 4) those of `log_against_positions`."""
+def _columns(batch: Batch, late_s: float) -> dict[str, Array]:
+    """Running values (k,) of `log_against_positions`, north + i east; velocities are moved by what they are late."""
     assert batch.pose is not None
     bow = np.exp(1j * batch.pose[:, 2])
-    through = integral(bow * (batch.velocity[:, 0] + 1j * batch.velocity[:, 1]), batch)
-    return np.column_stack([through, batch.pose[:, 0] + 1j * batch.pose[:, 1], batch.time_s, bow])
-
-
-def _moving_late(batch: Batch) -> Array:
-    """(k, 5) the same, and the velocity."""
-    rows = _moving(batch)
-    return np.column_stack([rows, rows[:, 3] * (batch.velocity[:, 0] + 1j * batch.velocity[:, 1])])
+    speed = batch.velocity[:, 0] + 1j * batch.velocity[:, 1]
+    if late_s:
+        own = batch.time_s + late_s
+        speed = np.interp(own, batch.time_s, speed)
+    ahead, side = (integral(bow * part, batch) for part in (speed.real, 1j * speed.imag))
+    return {
+        "position": batch.pose[:, 0] + 1j * batch.pose[:, 1],
+        "ahead": ahead,
+        "side": side,
+        "way": ahead + side,
+        "drift": batch.time_s,
+        "arm": bow,
+        "positions": bow * speed,
+        "log": np.cumsum(np.append(0.0, (bow[1:] + bow[:-1]) / 2.0 * np.diff(speed))),
+    }
 
 
 def _drifting(batch: Batch) -> Array:

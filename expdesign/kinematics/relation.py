@@ -53,8 +53,8 @@ class Relation:
 
     @property
     def size_std(self) -> float:
-        """Standard error of the size, with half the distance of both regressions."""
-        return float(np.hypot(self.std[0], (self.inverse - abs(self.ratio)) / 2.0))
+        """Standard error of the size, with half the distance of both regressions, and what no instrument is free of."""
+        return float(np.hypot(np.hypot(self.std[0], (self.inverse - abs(self.ratio)) / 2.0), TUNING.scale_std))
 
     def differs(self, value: float, *, by: float) -> bool:
         """Whether the size is certainly another than this, and by as much, whichever of x and y is noisy."""
@@ -64,16 +64,21 @@ class Relation:
         return certain and apart[0] * apart[1] > 0 and min(map(abs, apart)) > by
 
 
-def relation(stretches: Sequence[Array]) -> Relation | None:
-    """The relation over all stretches, arrays (k, 2 + n) of y, x and z in windows; None where they tell too little."""
+def relation(stretches: Sequence[Array], *, told: float = TUNING.told) -> Relation | None:
+    """The relation over all stretches; None where they tell too little.
+
+    Args:
+        stretches: arrays (k, 2 + n) of y, x and z in windows.
+        told: least share of the squares of x that z must leave.
+    """
     moments = np.array([rows.conj().T @ rows for rows in stretches if len(rows)])
     if len(moments) < TUNING.fewest_blocks:
         return None
     whole, count = moments.sum(axis=0), sum(map(len, stretches))
-    found = _solved(whole)
+    found = _solved(whole, told)
     if found is None:
         return None
-    left_out = [_solved(whole - part) for part in moments]
+    left_out = [_solved(whole - part, told) for part in moments]
     if any(other is None for other in left_out):
         return None
     drawn = np.array([other[0] for other in left_out if other is not None])
@@ -92,7 +97,7 @@ def relation(stretches: Sequence[Array]) -> Relation | None:
     )
 
 
-def _solved(moments: Array) -> tuple[Array, Array, float] | None:
+def _solved(moments: Array, told: float) -> tuple[Array, Array, float] | None:
     """(1 + n,) a and b, the moments (2, 2) of y and x less what z explains, and the share of x that is left."""
     scale = np.sqrt(np.maximum(np.real(np.diag(moments)), 0.0))
     if not scale[:2].all():
@@ -103,7 +108,7 @@ def _solved(moments: Array) -> tuple[Array, Array, float] | None:
     nuisance = np.linalg.pinv(m[2:, 2:], rcond=1e-9, hermitian=True)
     partial = m[:2, :2] - m[:2, 2:] @ nuisance @ m[2:, :2]
     own = float(np.real(partial[1, 1]))
-    if not own > TUNING.told:
+    if not own > told:
         return None
     a = partial[1, 0] / partial[1, 1]
     values = np.zeros(len(scale) - 1, dtype=complex)

@@ -33,13 +33,18 @@ class Tuning:
         blocks: stretches that the record is cut into, each left out in turn for the standard errors.
         fewest_blocks: with which a comparison is made.
         certain: standard errors from what would be right at which a finding is told.
+        scale_std: standard error of a scale, at least: readings of several samples, rounding and filters in instruments
+            change scales by about as much.
         scale_matters: change of a scale that is told.
         turn_matters_rad: misalignment that is told [rad].
         rate_matters: bias of a rate, as a share of its root mean square, that is told.
         place_matters: distance of an instrument, in ship lengths, that is told.
         delay_matters: of one instrument after another, in samples, that is told; Euler's map alone gives a half.
+        delay_std: standard error of a delay, at least, in samples.
+        delay_rounds: in which the delay of a log is found.
         way_matters: steady difference of velocities, as a share of the speed, that is told.
-        told: least share of a regressor that the others do not explain.
+        told, told_way: least share of a regressor that the others do not explain; that of a way, which is measured
+            better than most.
         on_course: share of the expected distance of the place that does not drift in turns below which a heading is one
             of the track.
         drifts: that distance of ships, at least, from which the drift is expected.
@@ -75,13 +80,17 @@ class Tuning:
     blocks: int = 20
     fewest_blocks: int = 8
     certain: float = 6.0
+    scale_std: float = 0.001
     scale_matters: float = 0.02
     turn_matters_rad: float = 0.0175
     rate_matters: float = 0.1
     place_matters: float = 0.05
-    delay_matters: float = 0.75
+    delay_matters: float = 0.6
+    delay_std: float = 0.05
+    delay_rounds: int = 2
     way_matters: float = 0.05
     told: float = 0.02
+    told_way: float = 0.002
     on_course: float = 0.5
     drifts: float = 0.2
     on_track: float = 0.5

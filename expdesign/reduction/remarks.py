@@ -26,6 +26,8 @@ def remarks(stated: Stated) -> Iterator[str]:
         yield f"{STATED}{sensors.heading_bias_rad:.4g} rad is taken off the headings."
     if "velocity" in signals and sensors.velocity_angle_rad:
         yield from _along_axes(stated)
+    if "velocity" in signals and sensors.velocity_scale != 1.0:
+        yield f"{STATED}surge and sway speed are divided by {sensors.velocity_scale:.4g}."
     if "yaw_rate" in signals and sensors.yaw_rate_scale != 1.0:
         yield f"{STATED}the yaw rate is divided by {sensors.yaw_rate_scale:.4g}."
     if "wind" in signals and (shrunk := shrinkage(sensors)) < 1.0:

@@ -102,6 +102,7 @@ def _velocity(stated: Stated, pose: Array | None) -> tuple[Array, Array]:
     if "r" in batch.derived:
         r, r_read = derived[:, 2:], np.ones(len(batch), dtype=bool)
     uv, uv_read = stated.in_time("velocity", batch.velocity[:, :2])
+    uv = uv / sensors.velocity_scale
     if measured(uv[:, 0]) and measured(uv[:, 1]):
         uv = turned(uv, np.full(len(uv), sensors.velocity_angle_rad))
     uv = _at_centre(uv, sensors.velocity, r[:, 0])

@@ -37,7 +37,8 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
     """Measurements of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
-        u = u - r starboard     v = v + r forward, along axes turned from the ship's by an angle     r = scale r
+        u = scale (u - r starboard)     v = scale (v + r forward), along axes turned from the ship's by an angle
+        r = scale r, by a scale of its own
         (u_q, v_q) likewise for the place of the wind sensor
 
     all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
@@ -82,6 +83,8 @@ def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
     u, v = _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
+    if sensors.velocity_scale != 1.0:
+        u, v = sensors.velocity_scale * u, sensors.velocity_scale * v
     if not sensors.velocity_angle_rad:
         return u, v
     c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)

@@ -37,6 +37,7 @@ class Mounting:
 FAULTS = (
     "heading_bias_rad",
     "velocity_angle_rad",
+    "velocity_scale",
     "yaw_rate_scale",
     *(f"{name}_{axis}_m" for name in ("position", "velocity", "wind") for axis in ("forward", "starboard")),
     *(f"{name}_delay_s" for name in SENSORS),
@@ -62,6 +63,7 @@ class Sensors:
         roll_rad, roll_rate_radps, acceleration_mps2: of roll, its rate, and of sway and lateral acceleration.
         heading_bias_rad: measured heading less true heading.
         velocity_angle_rad: from the bow to the velocity sensor's own forward axis, clockwise; it measures along that.
+        velocity_scale: measured surge and sway over true ones.
         yaw_rate_scale: measured yaw rate over true yaw rate.
         wind_sensor: "cartesian" measures the components of the relative wind, "vane" its speed and angle.
         position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured.
@@ -78,6 +80,7 @@ class Sensors:
     acceleration_mps2: float = 0.0
     heading_bias_rad: float = 0.0
     velocity_angle_rad: float = 0.0
+    velocity_scale: float = 1.0
     yaw_rate_scale: float = 1.0
     wind_sensor: str = "cartesian"
     position: Mounting = CENTRAL
@@ -94,8 +97,9 @@ class Sensors:
         for name in ("heading_bias_rad", "velocity_angle_rad"):
             if not math.isfinite(getattr(self, name)):
                 raise InputError(f"sensors.{name} is {getattr(self, name):g}, expected a finite angle")
-        if not 0 < self.yaw_rate_scale < math.inf:
-            raise InputError(f"sensors.yaw_rate_scale is {self.yaw_rate_scale:g}, expected more than 0")
+        for name in ("velocity_scale", "yaw_rate_scale"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InputError(f"sensors.{name} is {getattr(self, name):g}, expected more than 0")
         if self.wind_sensor not in WIND_SENSORS:
             raise UnknownName("wind sensor", self.wind_sensor, known=WIND_SENSORS)
 

@@ -20,7 +20,7 @@ from expdesign.diagnosis.causes.hull import (
     ROLL_COUPLING,
     UNLISTED_TERM,
 )
-from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, SENSOR_DELAY
+from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, LOG_SCALE, SENSOR_DELAY
 from expdesign.diagnosis.causes.words import rounded
 
 CAUSES: tuple[Cause, ...] = (
@@ -40,6 +40,7 @@ CAUSES: tuple[Cause, ...] = (
     HEADING_BIAS,
     LEVER_ARM,
     SENSOR_DELAY,
+    LOG_SCALE,
     GYRO_SCALE,
     SHALLOW_WATER,
     ROLL_COUPLING,

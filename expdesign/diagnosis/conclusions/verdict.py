@@ -33,6 +33,7 @@ MISSING_EFFECTS = {
     "heading_bias": "the misalignment of a sensor",
     "lever_arm": "the distance of a sensor from amidships",
     "sensor_delay": "the delay of a sensor",
+    "log_scale": "the scale of the log",
     "gyro_scale": "the scale of the rate gyro",
     "shallow_water": "shallow water",
     "roll_coupling": "an oscillation like roll",

@@ -15,6 +15,11 @@ def has_heading(record: Record) -> bool:
     return all(batch.pose is not None and np.isfinite(batch.pose[:, 2]).all() for batch in record.batches)
 
 
+def has_position(record: Record) -> bool:
+    """Whether any batch has measured positions."""
+    return any(batch.pose is not None and np.isfinite(batch.pose[:, :2]).any() for batch in record.batches)
+
+
 def has_depth(batch: Batch) -> bool:
     """Whether any depth is measured."""
     return batch.depth_m is not None and bool(np.isfinite(batch.depth_m).any())

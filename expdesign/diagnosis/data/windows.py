@@ -17,7 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.diagnosis.data.measured_channels import air_velocity, derived_outputs, has_depth, has_heading
+from expdesign.diagnosis.data.measured_channels import (
+    air_velocity,
+    derived_outputs,
+    has_depth,
+    has_heading,
+    has_position,
+)
 from expdesign.diagnosis.data.sampled_batch import SampledBatch
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.errors import InputError
@@ -49,6 +55,7 @@ class Windows:
         names: of the batches, those of one file "NAME, batch NUMBER".
         starts: (batches,) where each begins on the clock of `time_s`; empty where nothing depends on it.
         rows_per_step: samples of the data in an integrator step, where several are averaged.
+        has_position: whether any batch has positions.
         white_noise: fits take what is left for white noise. In windows too short to tell slow noise or a random current
             from a steady force, either would take the place of any slow effect.
     """
@@ -69,6 +76,7 @@ class Windows:
     derived: tuple[str, ...]
     names: tuple[str, ...]
     rows_per_step: int = 1
+    has_position: bool = False
     white_noise: bool = False
     starts: tuple[float, ...] = ()
 
@@ -240,6 +248,7 @@ def cut_windows(
         steps_per_sample=between,
         batch_inputs=tuple(part.inputs for part in parts),
         has_heading=has_heading(record),
+        has_position=has_position(record),
         has_wind=all(air_velocity(batch) is not None for batch in record.batches),
         has_depth=all(has_depth(batch) for batch in record.batches),
         derived=derived,

@@ -245,7 +245,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
             before, ratio = ship.get(key), TUNING.largest_ratio
             least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
             value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
-        elif kind in ("inertia", "gain", "gyro", "scale"):
+        elif kind in ("inertia", "gain", "gyro", "log", "scale"):
             value = max(value, TUNING.smallest_factor_change)
         result[key] = value
     return result

@@ -26,7 +26,7 @@ class Tuning:
         most_knots: of the random current in a window.
         tile: edge of blocks of matrix products; for up to 64 x 64 x 64 multiplications OpenBLAS uses one thread.
         largest_sensitivity: beyond it the model counts as unstable.
-        smallest_factor_change: factors of inertia, thrust and gyro stay above one plus this.
+        smallest_factor_change: factors of inertia, thrust, log and gyro stay above one plus this.
         largest_ratio: times and widths change by this factor in a step, at most.
         beyond_std_level: of the test whether parameters are within their stated standard deviations.
         least_correlation_eigenvalue: of stated parameters; smaller ones count as rounded.

@@ -12,7 +12,8 @@ Effects, by key:
     small by this share shallow:damping, shallow:inertia          growth per unit of draught over depth roll:sway,
     roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping are of the mode (`vessel.roll`)
     change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it heading_bias [rad],
-    lever:forward/starboard [m], gyro (share), late:u/v/r/psi/position [s]   (sensors)
+    lever:forward/starboard [m], log, gyro (shares by which u and v, and r, show too much),
+    late:u/v/r/psi/position [s]   (sensors)
 
 Measured sway is v + u sin(heading_bias). For velocities from the pose, a positive bias is a compass that shows too
 little; for measured ones, a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position

@@ -26,7 +26,7 @@ from expdesign.diagnosis.motion.sensors import sensor_outputs, simpson_mean
 from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.values import Array
 
-INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "gyro", "late"}
+INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "log", "gyro", "late"}
 """Kinds of effects that change neither exogenous signals nor sensors, and those that change sensors alone."""
 
 
@@ -175,7 +175,7 @@ def _shown(motion: Motion, moved: Array) -> Array:
     """
     windows, count = motion.windows, moved.shape[-1]
     result = channels_apart(count, motion.predicted.shape[:2])
-    if any(key.startswith(("heading", "lever", "gyro", "late")) for key in motion.ship.effects):
+    if any(key.startswith(("heading", "lever", "log", "gyro", "late")) for key in motion.ship.effects):
         size = 1e-4
         still = sensor_outputs(motion.ship, motion.states, windows)
         for index in range(count):

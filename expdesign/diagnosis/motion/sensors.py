@@ -29,6 +29,8 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
         else:
             u, v = simpson_mean_of_track(u, v, headings, finer)
     u, v = _rotated(u, v, ship.get("heading_bias"))
+    if not from_position:
+        u, v = (1 + ship.get("log")) * u, (1 + ship.get("log")) * v
     if from_position and ship.get("late:psi"):
         u, v = _rotated(u, v, r * ship.get("late:psi"))
     channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": simpson_mean(r, finer)}
@@ -50,7 +52,7 @@ def ship_velocities(ship: ExtendedModel, predicted: Array) -> Array:
     """(w, 3) velocities of the ship for sensor outputs (w, 3), without delays."""
     u, v, r = predicted.T
     r = r / (1 + ship.get("gyro"))
-    u, v = _rotated(u, v, -ship.get("heading_bias"))
+    u, v = _rotated(u / (1 + ship.get("log")), v / (1 + ship.get("log")), -ship.get("heading_bias"))
     return np.stack([u + ship.get("lever:starboard") * r, v - ship.get("lever:forward") * r, r], axis=-1)
 
 

@@ -77,6 +77,7 @@ def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
     velocity_s = 0.0 if from_pose else sensors.velocity.delay_s
     return {
         "heading_bias": -(sensors.heading_bias_rad if from_pose else sensors.velocity_angle_rad),
+        "log": 0.0 if from_pose else sensors.velocity_scale - 1.0,
         "gyro": 0.0 if "r" in derived else sensors.yaw_rate_scale - 1.0,
         "lever:forward": place.forward_m,
         "lever:starboard": place.starboard_m,

@@ -51,8 +51,8 @@ PATTERNS = {
     "current": ("{}_mps", 0.0, "m/s"), "wind": ("{}_mps", 0.0, "m/s"), "offset": ("angle_offset_{}_rad", 0.0, "rad"),
     "lag": ("lag_{}_s", 0.0, "s"), "delay": ("delay_{}_s", 0.0, "s"), "lever": ("{}_m", 0.0, "m"),
     "late": ("{}_delay_s", 0.0, "s"), "shallow": ("{}_growth", 0.0, ""), "term": ("{}", 0.0, ""),
-    "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "inertia": ("inertia_factor_{}", 1.0, ""),
-    "change": ("{}_factor", 1.0, ""), "scale": ("angle_factor_{}", 1.0, ""),
+    "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "log": ("factor", 1.0, ""),
+    "inertia": ("inertia_factor_{}", 1.0, ""), "change": ("{}_factor", 1.0, ""), "scale": ("angle_factor_{}", 1.0, ""),
 }  # fmt: skip
 """Kind of effect -> name in results with {} for the rest of its key, value without the effect, unit."""
 

@@ -71,5 +71,6 @@ def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> t
         return (f"{late[rest]}_delay_s",)
     if kind == "lever":
         return (f"{place}_{rest}_m",)
-    names = {"heading_bias": "heading_bias_rad" if from_pose else "velocity_angle_rad", "gyro": "yaw_rate_scale"}
+    names = {"heading_bias": "heading_bias_rad" if from_pose else "velocity_angle_rad", "log": "velocity_scale",
+             "gyro": "yaw_rate_scale"}  # fmt: skip
     return (names[kind],) if kind in names else ()

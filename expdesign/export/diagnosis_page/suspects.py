@@ -26,7 +26,7 @@ RATES = {
 }
 FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "scale", "shallow")
 """Kinds of effects that are forces."""
-SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "gyro": "r", "lever": "r"}
+SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "log": "u", "gyro": "r", "lever": "r"}
 """Effect, or kind of effect, of a sensor -> the velocity that it depends on."""
 
 

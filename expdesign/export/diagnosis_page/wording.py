@@ -20,6 +20,7 @@ TITLES = {
     "lever_arm": "Sensor position",
     "actuator_scale": "Scale of the rudder angle",
     "sensor_delay": "Sensor delay",
+    "log_scale": "Scale error of the log",
     "gyro_scale": "Scale error of the rate gyro",
     "shallow_water": "Shallow water",
     "roll_coupling": "Roll, or a similar oscillation",

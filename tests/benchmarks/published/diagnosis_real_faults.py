@@ -1,17 +1,26 @@
-"""Faults injected into measured trials, or into the model that was fitted to them, and the names they ought to get."""
+"""Faults injected into measured trials, or into the model that was fitted to others, and what shows and names them.
+
+Beside the diagnosis stand two tests that know what to look for, and say whether the records show a fault at all:
+
+    kinematics   what instruments disagree about over windows, regressed on what the fault adds to it
+    oracle       the true cause alone, fitted to all runs but one by simulations of 30 s, simulates that run better
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
-from expdesign.diagnosis import Finding
+from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.model.term_library import term_library
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.result_names import public_name
 from expdesign.signals import Batch, Record
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
@@ -19,10 +28,15 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel
 
 AHEAD_S = 30.0
 OFFSET_RAD, BIAS_RAD, GAIN, DELAY_S, CURRENT_MPS = np.radians(2.0), np.radians(3.0), 0.9, 1.0, 0.07
+SCALE, ARM_M, LATE_S, RATE_RADPS = 0.95, 0.7, 0.7, 0.07
 CERTAIN = 5.0
-"""Parameters that are so many standard deviations from zero may be taken out or turned round."""
+"""Parameters that are so many standard deviations from zero may be taken out."""
 LEAST_COST = 0.1
-"""Relative growth of some error 30 s ahead by which a term that is taken out or turned round must show."""
+"""Relative growth of some error 30 s ahead by which a term that is taken out must show."""
+SEEN = 0.01
+"""p-value of an oracle that sees."""
+STD = 2.5
+"""Standard errors within which a size is right."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,34 +45,31 @@ class Fault:
 
     Attributes:
         name: in the table.
-        inject: of a model fitted to a record, and that record, with a generator of random numbers: the model in use and
-            its data, and what is right about the first finding; None where the trial has no such fault.
+        batch: what it does to a batch as recorded.
+        model: what it does to the model in use, by the record that is judged; None where there is no such fault.
+        causes: names of the catalogue that are right.
+        effects: of the extended model, with their true values; what an oracle fits.
+        record: pattern of what the record's own faults say of it, with size and standard error, and the true size.
+        needs: kind of actuator that there must be.
     """
 
     name: str
-    inject: Callable[[Vessel, Record, np.random.Generator], tuple[Vessel, Record, Callable[[Finding], bool]] | None]
+    batch: Callable[[Batch, np.random.Generator], Batch] | None = None
+    model: Callable[[Vessel, Record], tuple[Vessel, str, float] | None] | None = None
+    causes: tuple[str, ...] = ()
+    effects: tuple[tuple[str, float], ...] = ()
+    record: tuple[str, float] | None = None
+    needs: str = ""
 
 
-def in_record(
-    change: Callable[[Batch, np.random.Generator], Batch], cause: str, keys: str = ""
-) -> Callable[[Vessel, Record, np.random.Generator], tuple[Vessel, Record, Callable[[Finding], bool]]]:
-    """A fault of the data that is named rightly by a cause, whose effects begin so."""
+def _rudder(change: Callable[[Array], Array]) -> Callable[[Batch, np.random.Generator], Batch]:
+    def changed(batch: Batch, _rng: np.random.Generator) -> Batch:
+        inputs = np.array(batch.inputs)
+        columns = [at for at, name in enumerate(batch.input_names) if name.startswith(("rudder", "a"))]
+        inputs[:, columns] = change(inputs[:, columns])
+        return replace(batch, inputs=inputs)
 
-    def inject(
-        vessel: Vessel, record: Record, rng: np.random.Generator
-    ) -> tuple[Vessel, Record, Callable[[Finding], bool]]:
-        seed = int(rng.integers(2**31))
-        batches = tuple(change(batch, np.random.default_rng(seed)) for batch in record.batches)
-        return vessel, Record(batches=batches), lambda item: item.cause == cause and item.keys[0].startswith(keys)
-
-    return inject
-
-
-def _rudder(batch: Batch, change: Callable[[Array], Array]) -> Batch:
-    inputs = np.array(batch.inputs)
-    column = batch.input_names.index("rudder1")
-    inputs[:, column] = change(inputs[:, column])
-    return replace(batch, inputs=inputs)
+    return changed
 
 
 def _early(batch: Batch, _rng: np.random.Generator) -> Batch:
@@ -83,8 +94,7 @@ def _misaligned(batch: Batch, _rng: np.random.Generator) -> Batch:
 def _drifting(batch: Batch, rng: np.random.Generator) -> Batch:
     """The same motion through the water in a current, towards any side."""
     assert batch.pose is not None
-    toward = float(rng.uniform(0, 2 * np.pi))
-    north, east = CURRENT_MPS * np.cos(toward), CURRENT_MPS * np.sin(toward)
+    north, east = current_of(rng)
     u_c, v_c = to_body((north, east), batch.pose[:, 2], NUMPY)
     time = np.arange(len(batch)) * batch.sample_time_s
     return replace(
@@ -94,54 +104,70 @@ def _drifting(batch: Batch, rng: np.random.Generator) -> Batch:
     )
 
 
-def error_ahead(vessel: Vessel, record: Record) -> Array:
-    """(3,) root mean square error of u, v, r predicted 30 s ahead, anew every 30 s, over all samples."""
-    ship = extended_model(vessel, record)
-    windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
-    return np.asarray(np.sqrt(np.nanmean(simulate_from_measured(ship, windows).error[..., :3] ** 2, axis=(0, 1))))
+def current_of(rng: np.random.Generator) -> tuple[float, float]:
+    """To north and east [m/s]."""
+    toward = float(rng.uniform(0, 2 * np.pi))
+    return CURRENT_MPS * np.cos(toward), CURRENT_MPS * np.sin(toward)
 
 
-def _turned_round(
-    vessel: Vessel, record: Record, _rng: np.random.Generator
-) -> tuple[Vessel, Record, Callable[[Finding], bool]] | None:
-    """The sign of the well-determined parameter that costs least, of those that cost enough."""
-    changed = {name: _with_sign_turned(vessel.model, name) for name in _certain(vessel.model)}
-    name = _smallest(vessel, record, changed)
-    if name is None:
-        return None
-    return replace(vessel, model=changed[name]), record, lambda item: f"theta:{name}" in item.keys
+def _scaled(*factors: float) -> Callable[[Batch, np.random.Generator], Batch]:
+    return lambda batch, _rng: replace(batch, velocity=batch.velocity * np.array(factors))
 
 
-def _taken_out(
-    vessel: Vessel, record: Record, _rng: np.random.Generator
-) -> tuple[Vessel, Record, Callable[[Finding], bool]] | None:
-    """A term of the library likewise; terms of the air are named as wind."""
-    changed = {name: _without(vessel.model, name) for name in _certain(vessel.model)}
-    known = {
-        name: model
-        for name, model in changed.items()
-        if any(_same_term(vessel.model, name, other) for other in term_library(model))
-    }
-    name = _smallest(vessel, record, known)
-    if name is None:
-        return None
-    found = next(other for other in term_library(known[name]) if _same_term(vessel.model, name, other))
-    return replace(vessel, model=known[name]), record, lambda item: f"term:{found}" in item.keys
+def _log_forward(batch: Batch, _rng: np.random.Generator) -> Batch:
+    """A log forward of amidships."""
+    return replace(batch, velocity=batch.velocity + ARM_M * batch.velocity[:, 2:] * np.array([0.0, 1.0, 0.0]))
 
 
-def _same_term(model: VesselModel, name: str, other: str) -> bool:
-    """Whether a library term that the model without one of its terms may get is that one: the only one it gains."""
-    return other in term_library(_without(model, name)) and other not in term_library(model)
+def _forward(batch: Batch, rng: np.random.Generator) -> Batch:
+    """Log and antenna forward of amidships."""
+    assert batch.pose is not None
+    heading = batch.pose[:, 2]
+    arm = ARM_M * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=-1)
+    return replace(_log_forward(batch, rng), pose=batch.pose + arm)
 
 
-def _certain(model: VesselModel) -> list[str]:
+def _late(batch: Batch, _rng: np.random.Generator) -> Batch:
+    """Velocities ahead and to starboard as they were a while ago."""
+    time = np.arange(len(batch)) * batch.sample_time_s
+    velocity = np.array(batch.velocity)
+    for column in range(2):
+        velocity[:, column] = np.interp(time - LATE_S, time, velocity[:, column])
+    return replace(batch, velocity=velocity)
+
+
+def _slower(vessel: Vessel, record: Record) -> tuple[Vessel, str, float] | None:
+    """A rate of the rudder that is a quarter of its own: recorded angles are then taken for commands."""
+    actuators = tuple(
+        replace(one, responses=tuple(replace(own, rate=RATE_RADPS) for own in one.responses))
+        if one.kind == "rudder" else one
+        for one in vessel.model.actuators
+    )  # fmt: skip
+    return replace(vessel, model=replace(vessel.model, actuators=actuators)), "slew:rudder", np.nan
+
+
+def _taken_out(vessel: Vessel, record: Record) -> tuple[Vessel, str, float] | None:
+    """The well-determined term of the library that costs least, of those that cost enough; not those of the air."""
+    model = vessel.model
     rows = zip(model.names, model.parameters.tolist(), model.parameter_std.tolist(), strict=True)
-    return [name for name, value, std in rows if abs(value) > CERTAIN * std]
+    certain = [name for name, value, std in rows if abs(value) > CERTAIN * std]
+    known = {name: found for name in certain if (found := _library_name(model, name))}
+    whole = error_ahead(vessel, record)
+    costs = {
+        name: float((error_ahead(replace(vessel, model=_without(model, name)), record) / whole).max()) - 1.0
+        for name in known
+    }
+    name = min((name for name, cost in costs.items() if cost >= LEAST_COST), key=costs.__getitem__, default=None)
+    if name is None:
+        return None
+    size = float(model.parameters[model.names.index(name)])
+    return replace(vessel, model=_without(model, name)), f"term:{known[name]}", size
 
 
-def _with_sign_turned(model: VesselModel, name: str) -> VesselModel:
-    sign = np.where(np.array(model.names) == name, -1.0, 1.0)
-    return replace(model, parameters=sign * model.parameters)
+def _library_name(model: VesselModel, name: str) -> str | None:
+    """The only library term that the model gains when one of its own is taken out."""
+    gained = [*set(term_library(_without(model, name))) - set(term_library(model))]
+    return gained[0] if len(gained) == 1 else None
 
 
 def _without(model: VesselModel, name: str) -> VesselModel:
@@ -154,31 +180,167 @@ def _without(model: VesselModel, name: str) -> VesselModel:
     )
 
 
-def _smallest(vessel: Vessel, record: Record, changed: dict[str, VesselModel]) -> str | None:
-    """The change that costs least, of those that cost enough."""
-    whole = error_ahead(vessel, record)
-    costs = {
-        name: float((error_ahead(replace(vessel, model=model), record) / whole).max()) - 1.0
-        for name, model in changed.items()
-    }
-    return min((name for name, cost in costs.items() if cost >= LEAST_COST), key=lambda name: costs[name], default=None)
+def error_ahead(vessel: Vessel, record: Record) -> Array:
+    """(3,) root mean square error of u, v, r predicted 30 s ahead, anew every 30 s, over all samples."""
+    ship = extended_model(vessel, record)
+    windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
+    return np.asarray(np.sqrt(np.nanmean(simulate_from_measured(ship, windows).error[..., :3] ** 2, axis=(0, 1))))
 
 
+def oracle(vessel: Vessel, record: Record, effects: Sequence[tuple[str, float]]) -> float:
+    """p-value that the true cause alone, fitted to all runs but one, simulates the stretches of that one no better."""
+    ship = extended_model(vessel, record)
+    windows = cut_windows(ship.model, record, longest_s=AHEAD_S)
+    scale = np.sqrt(np.nanvar(windows.measured[..., :3], axis=(0, 1)))
+    keys = [key for key, _ in effects]
+    size = np.array([abs(value) if np.isfinite(value) and value else 1.0 for _, value in effects])
+
+    def errors(values: Array, held: Array) -> Array:
+        changed = ship.with_effects({key: ship.get(key) + x for key, x in zip(keys, values * size, strict=True)})
+        error = simulate_from_measured(changed, windows.selected(held)).error[..., :3] / scale
+        return np.asarray(np.nan_to_num(error))
+
+    lost, left = [], []
+    for batch in np.unique(windows.batch):
+        held = windows.batch == batch
+        if held.all():
+            return 1.0
+        found = scipy.optimize.least_squares(
+            lambda values, held=held: errors(values, ~held).ravel(), np.full(len(keys), 0.3), diff_step=0.05,
+            max_nfev=15,
+        )  # fmt: skip
+        lost.append((errors(np.zeros(len(keys)), held) ** 2).mean(axis=(1, 2)))
+        left.append((errors(found.x, held) ** 2).mean(axis=(1, 2)))
+    before, after = (np.concatenate(one) for one in (lost, left))
+    if before.sum() <= after.sum() or not (before - after).any():
+        return 1.0
+    return float(scipy.stats.wilcoxon(np.log(before + 1e-12) - np.log(after + 1e-12), alternative="greater").pvalue)
+
+
+def kinematics_see(clean: Record, faulty: Record) -> bool:
+    """Whether instruments disagree as the fault makes them, by their noise and by all else that they disagree about."""
+    own, changed = (np.concatenate([_disagreement(batch) for batch in record.batches]) for record in (clean, faulty))
+    for sign, seen in zip((changed - own).T, changed.T, strict=True):
+        if np.abs(sign).max() > 1e-6:
+            found = scipy.stats.linregress(sign, seen)
+            if found.slope > 0 and found.pvalue < SEEN:
+                return True
+    return False
+
+
+def _disagreement(batch: Batch) -> Array:
+    """(n, 3) of positions with the integral of velocities, and of headings with that of the yaw rate, over 10 s."""
+    way, pose, *_ = _changes(batch)
+    rest = pose - way
+    return np.stack([rest[:, 0].real, rest[:, 0].imag, rest[:, 1].real], axis=-1)
+
+
+def of_instruments(record: Record) -> dict[str, float]:
+    """What instruments of a record disagree about already: effect -> value, by least squares over windows of 10 s."""
+    way, pose, bow, moving = (np.concatenate(parts) for parts in zip(*map(_changes, record.batches), strict=True))
+    columns = np.stack([pose[:, 0], bow, moving], axis=-1)
+    scale, arm, late = np.linalg.lstsq(columns, way[:, 0], rcond=None)[0].real
+    gyro = float((pose[:, 1].real @ way[:, 1].real) / (pose[:, 1].real @ pose[:, 1].real))
+    return {"gyro": gyro - 1.0, "log": float(scale) - 1.0, "lever:forward": float(-arm), "late:u": float(-late)}
+
+
+def _changes(batch: Batch) -> tuple[Array, Array, Array, Array]:
+    """Changes over windows: (n, 2) way and turn by velocities and by the pose; (n,) of the bow and of the velocity."""
+    assert batch.pose is not None
+    heading, dt = batch.pose[:, 2], batch.sample_time_s
+    bow = np.exp(1j * heading)
+    moving = bow * (batch.velocity[:, 0] + 1j * batch.velocity[:, 1])
+    rates = np.stack([moving, batch.velocity[:, 2] + 0j], axis=-1)
+    way = np.concatenate([np.zeros((1, 2)), np.cumsum((rates[1:] + rates[:-1]) / 2 * dt, axis=0)])
+    pose = np.stack([batch.pose[:, 0] + 1j * batch.pose[:, 1], heading + 0j], axis=-1)
+    every = slice(None, None, round(10.0 / dt))
+    return tuple(np.diff(values[every], axis=0) for values in (way, pose, bow, moving))
+
+
+def answer(
+    fault: Fault, found: Diagnosis, effects: Sequence[tuple[str, float]], own: dict[str, float]
+) -> tuple[str, float | None]:
+    """How a fault is named, and the largest distance of its size from the truth, in stated standard errors.
+
+    What instruments disagreed about before counts as part of the truth.
+
+    By the "record" itself, "first", as "equivalent" to the first, "among" others, or "" where it is not named. The
+    distance is None where no size is stated, or none is known.
+    """
+    pattern = fault.record[0] if fault.record else "(?!)"
+    texts = [one.groups() for text in getattr(found.record, "faults", ()) if (one := re.search(pattern, text))]
+    if fault.record and texts:
+        value, std = (float(number) for number in texts[0])
+        before = own[effects[0][0]]
+        true = fault.record[1] * (1.0 + before) if fault.record[1] == SCALE else fault.record[1] + before
+        return "record", abs(value - true) / std
+    right = {*fault.causes} | {f"missing_{key}" for key, _ in effects if key.startswith("term:")}
+    causes = [item.cause for item in found.findings]
+    item = next((item for item in found.findings if item.cause in right), None)
+    if item is None:
+        return ("equivalent" if causes and {*found.findings[0].not_distinguishable_from} & right else ""), None
+    true = dict(effects)
+    off = [
+        abs(value - true[key]) / std
+        for key, (value, std) in estimates(item, found).items()
+        if np.isfinite(true.get(key, np.nan))
+    ]
+    return ("first" if causes[0] in right else "among"), max(off, default=None)
+
+
+def estimates(item: Finding, found: Diagnosis) -> dict[str, tuple[float, float]]:
+    """Effect -> value and standard error, from the numbers of the results."""
+    ship = extended_model(found.vessel, found.record)
+    rows = {}
+    for key, one in zip(item.keys, item.estimates, strict=True):
+        _, factor, offset, _ = public_name(key, ship)
+        rows[key] = ((one.value - offset) / factor, one.std / abs(factor))
+    return rows
+
+
+PLUS = "(-?[0-9.]+) \N{PLUS-MINUS SIGN} ([0-9.]+)"
 FAULTS = (
-    Fault(name="untouched", inject=lambda vessel, record, _rng: (vessel, record, lambda _item: False)),
+    Fault(name="untouched"),
     Fault(
-        name="rudder gain 0.9",
-        inject=in_record(lambda batch, _rng: _rudder(batch, lambda angle: GAIN * angle), "actuator_scale"),
+        name="rudder gain 0.9", batch=_rudder(lambda angle: GAIN * angle), causes=("actuator_scale",),
+        effects=(("scale:rudder", 1 / GAIN - 1),), needs="rudder",
     ),
     Fault(
-        name="rudder offset 2 deg",
-        inject=in_record(
-            lambda batch, _rng: _rudder(batch, lambda angle: angle + OFFSET_RAD), "thruster_asymmetry", "offset:"
-        ),
+        name="rudder offset 2 deg", batch=_rudder(lambda angle: angle + OFFSET_RAD), causes=("thruster_asymmetry",),
+        effects=(("offset:ANGLE", -OFFSET_RAD),),
     ),
-    Fault(name="heading bias 3 deg", inject=in_record(_misaligned, "heading_bias")),
-    Fault(name="delay 1 s", inject=in_record(_early, "actuator_delay")),
-    Fault(name="current 0.07 m/s", inject=in_record(_drifting, "current")),
-    Fault(name="sign turned", inject=_turned_round),
-    Fault(name="term taken out", inject=_taken_out),
-)
+    Fault(
+        name="heading bias 3 deg", batch=_misaligned, causes=("heading_bias",),
+        effects=(("heading_bias", -BIAS_RAD),),
+    ),
+    Fault(name="orders early 1 s", batch=_early, causes=("actuator_delay",), effects=(("delay:all", DELAY_S),)),
+    Fault(
+        name="gyro 0.95", batch=_scaled(1, 1, SCALE), causes=("gyro_scale",), effects=(("gyro", SCALE - 1),),
+        record=(f"r_radps is {PLUS} times", SCALE),
+    ),
+    Fault(
+        name="log 0.95", batch=_scaled(SCALE, SCALE, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
+        record=(f"u_mps and v_mps are {PLUS} times", SCALE),
+    ),
+    Fault(
+        name="log ahead 0.95", batch=_scaled(SCALE, 1, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
+        record=(f"u_mps is {PLUS} times", SCALE),
+    ),
+    Fault(
+        name="current 0.07 m/s", batch=_drifting, causes=("current",),
+        effects=(("current:north", np.nan), ("current:east", np.nan)),
+    ),
+    Fault(
+        name="log 0.7 m forward", batch=_log_forward, causes=("lever_arm",), effects=(("lever:forward", ARM_M),),
+        record=(f"place {PLUS} m (?:forward|aft)", ARM_M),
+    ),
+    Fault(
+        name="all 0.7 m forward", batch=_forward, causes=("lever_arm",), effects=(("lever:forward", ARM_M),),
+    ),
+    Fault(
+        name="u, v late 0.7 s", batch=_late, causes=("sensor_delay",), effects=(("late:u", LATE_S), ("late:v", LATE_S)),
+        record=(f"u_mps and v_mps come {PLUS} s later", LATE_S),
+    ),
+    Fault(name="term taken out", model=_taken_out),
+    Fault(name="rate of the rudder", model=_slower, causes=("actuator_slew",), needs="rudder"),
+)  # fmt: skip
