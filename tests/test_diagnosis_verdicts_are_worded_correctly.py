@@ -77,8 +77,8 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert text.startswith("No cause of the remaining error is certain. The fit is 60 % in surge")
     assert "the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) improves nothing for certain" in text
     assert remarks("runs", None, (delay, wind), (), ()) == (
-        "Not certain, by their gains on runs held out: the dead time of the actuators (+0.5 points of fit, -0.6 to "
-        "1.2).",
+        "Not certain, by their gains on data held out: the dead time of the actuators (+0.5 points of fit, -0.6 to "
+        "1.2) on runs.",
     )
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)

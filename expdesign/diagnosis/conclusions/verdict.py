@@ -163,8 +163,8 @@ def verdict(
         sentences = [what, sure, "Use the extended vessel file, which has them"]
     elif unexplained is not None:
         what = "The simulation explains little of these data and no cause is certain"
-        best = f"; the best candidate is {_lead(unexplained.leads[0])} on {unit} held out" if unexplained.leads else ""
-        sentences = [what, _capital(_fits(unexplained)) + best, MORE_DATA]
+        lead = [f"; the best candidate is {_lead(one)} on {unexplained.unit} held out" for one in unexplained.leads]
+        sentences = [what, "".join([_capital(_fits(unexplained)), *lead[:1]]), MORE_DATA]
     elif signs:
         better = [f"; {_lead(lead)} improves nothing for certain on {unit} held out" for lead in signs if lead.gain > 0]
         sure = "".join([_accuracy(before), *better[:1]])
@@ -240,11 +240,11 @@ def remarks(
             if np.isfinite(share)
         ]
         found.append(f"A slowly varying force that nobody measured would take {listed(shares)}." if shares else "")
-    others = [*signs, *(() if unexplained is None else unexplained.leads)]
-    leads = {lead.cause: lead for lead in others if lead.gain > 0.0}
+    of_remainder = [] if unexplained is None else [(lead, unexplained.unit) for lead in unexplained.leads]
+    leads = {lead.cause: f"{_lead(lead)} on {of}" for lead, of in [*((sign, unit) for sign in signs), *of_remainder]
+             if lead.gain > 0.0}  # fmt: skip
     if leads:
-        named = listed([_lead(lead) for lead in leads.values()])
-        found.append(f"Not certain, by their gains on {unit} held out: {named}.")
+        found.append(f"Not certain, by their gains on data held out: {listed([*leads.values()])}.")
     return tuple(text for text in found if text)
 
 
@@ -277,7 +277,9 @@ def _fits_in_words(outputs: Sequence[str], fits: Array) -> str:
 def _lead(lead: Lead) -> str:
     """An uncertain candidate with its gain."""
     low, high = lead.gain_interval
-    return f"{missing_effect(lead.cause, lead.parameters)} ({lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f})"
+    but = "; but whole runs are simulated worse with it, or too few show it" if low > 0.0 else ""
+    gain = f"{lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f}{but}"
+    return f"{missing_effect(lead.cause, lead.parameters)} ({gain})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
