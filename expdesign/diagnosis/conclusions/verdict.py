@@ -208,7 +208,7 @@ def _advice(findings: Sequence[Finding]) -> str:
     causes = [item.cause for item in findings]
     if causes[0] in SENSORS:
         return "Correct the instruments; the extended vessel file describes them as they were"
-    if causes[0] in WEATHER:
+    if causes[0] in WEATHER and (findings[0].keys or causes)[0].startswith(WEATHER):  # and not what measured wind does
         return "Use the extended vessel file for data in the same weather"
     if causes[0] == "change_point":
         return "Diagnose the data before and after the change separately"
