@@ -308,4 +308,6 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f}".replace("-0", "0")
+    """Whole, but what is no zero is not called one."""
+    whole = f"{100 * share:.0f}"
+    return whole if whole not in ("0", "-0") else f"{100 * share:.1g}"
