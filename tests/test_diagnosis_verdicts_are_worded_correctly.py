@@ -67,6 +67,8 @@ def test_a_gain_is_told_by_the_output_that_improves_most_of_those_that_surely_do
     """Not by the surest one, which may gain little, nor by a larger gain that may be none."""
     shares = ((0.7, -0.1, 0.9), (0.4, 0.1, 0.6), (0.2, 0.18, 0.22))
     assert "cuts the sway error by 40 % (10 to 60 %)" in verdict([finding("current", error_reductions=shares)], BEFORE)
+    little = ((0.7, 0.004, 0.9), (0.0, -0.1, 0.1), (0.0, -0.1, 0.1))  # which is not "from 0 %"
+    assert "by 70 % (0.4 to 90 %)" in verdict([finding("current", error_reductions=little)], BEFORE)
     none = finding("current", error_reductions=((0.004, 0.001, 0.01),) * 3)
     assert "reduces no error for certain" in verdict([none], BEFORE)
 
@@ -78,8 +80,8 @@ def test_a_verdict_without_findings_states_the_accuracy():
     assert text.startswith("No cause of the remaining error is certain. The fit is 60 % in surge")
     assert "the dead time of the actuators (+0.5 points of fit, -0.6 to 1.2) improves nothing for certain" in text
     assert remarks("runs", None, (delay, wind), (), ()) == (
-        "Not certain, by their gains on runs held out: the dead time of the actuators (+0.5 points of fit, -0.6 to "
-        "1.2).",
+        "Not certain, by their gains on data held out: the dead time of the actuators (+0.5 points of fit, -0.6 to "
+        "1.2) on runs.",
     )
     lost = Accuracy(**{**vars(BEFORE), "fit": np.array([-66608676.0, 50.0, 10.0])})
     assert "diverges from the ship" in verdict([], lost)

@@ -190,6 +190,7 @@ def _unexplained(chosen: Selected, after: Accuracy, windows: Windows, seed: int)
         fit=after.fit,
         force_share=unmeasured_force_share(chosen.kept.last.linear, after.outputs),
         leads=tuple(sorted((lead for lead in leads if lead.gain > 0), key=lambda lead: -lead.gain)),
+        unit=unit_name(windows, in_stretches=chosen.compared is not None or chosen.held[0].in_stretches),
     )
 
 

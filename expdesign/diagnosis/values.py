@@ -105,13 +105,14 @@ class Unexplained:
     Attributes:
         fit: (n,) of the simulation [%].
         force_share: (n,) share of its error that an unmeasured, slowly varying force would take away.
-        leads: the best candidates, by gain.
+        leads: the best candidates, by gain; unit: what their gains are measured on.
     """
 
     outputs: tuple[str, ...]
     fit: Array
     force_share: Array
     leads: tuple[Lead, ...]
+    unit: str = "runs"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

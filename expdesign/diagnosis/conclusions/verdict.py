@@ -164,8 +164,8 @@ def verdict(
         sentences = [what, sure, "Use the extended vessel file, which has them"]
     elif unexplained is not None:
         what = "The simulation explains little of these data and no cause is certain"
-        best = f"; the best candidate is {_lead(unexplained.leads[0])} on {unit} held out" if unexplained.leads else ""
-        sentences = [what, _capital(_fits(unexplained)) + best, MORE_DATA]
+        lead = [f"; the best candidate is {_lead(one)} on {unexplained.unit} held out" for one in unexplained.leads]
+        sentences = [what, "".join([_capital(_fits(unexplained)), *lead[:1]]), MORE_DATA]
     elif signs:
         better = [f"; {_lead(lead)} improves nothing for certain on {unit} held out" for lead in signs if lead.gain > 0]
         sure = "".join([_accuracy(before), *better[:1]])
@@ -209,7 +209,7 @@ def _advice(findings: Sequence[Finding]) -> str:
     causes = [item.cause for item in findings]
     if causes[0] in SENSORS:
         return "Correct the instruments; the extended vessel file describes them as they were"
-    if causes[0] in WEATHER:
+    if causes[0] in WEATHER and (findings[0].keys or causes)[0].startswith(WEATHER):  # and not what measured wind does
         return "Use the extended vessel file for data in the same weather"
     if causes[0] == "change_point":
         return "Diagnose the data before and after the change separately"
@@ -241,11 +241,11 @@ def remarks(
             if np.isfinite(share)
         ]
         found.append(f"A slowly varying force that nobody measured would take {listed(shares)}." if shares else "")
-    others = [*signs, *(() if unexplained is None else unexplained.leads)]
-    leads = {lead.cause: lead for lead in others if lead.gain > 0.0}
+    of_remainder = [] if unexplained is None else [(lead, unexplained.unit) for lead in unexplained.leads]
+    leads = {lead.cause: f"{_lead(lead)} on {of}" for lead, of in [*((sign, unit) for sign in signs), *of_remainder]
+             if lead.gain > 0.0}  # fmt: skip
     if leads:
-        named = listed([_lead(lead) for lead in leads.values()])
-        found.append(f"Not certain, by their gains on {unit} held out: {named}.")
+        found.append(f"Not certain, by their gains on data held out: {listed([*leads.values()])}.")
     return tuple(text for text in found if text)
 
 
@@ -278,7 +278,9 @@ def _fits_in_words(outputs: Sequence[str], fits: Array) -> str:
 def _lead(lead: Lead) -> str:
     """An uncertain candidate with its gain."""
     low, high = lead.gain_interval
-    return f"{missing_effect(lead.cause, lead.parameters)} ({lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f})"
+    but = "; but whole runs are simulated worse with it, or too few show it" if low > 0.0 else ""
+    gain = f"{lead.gain:+.1f} points of fit, {low:.1f} to {high:.1f}{but}"
+    return f"{missing_effect(lead.cause, lead.parameters)} ({gain})"
 
 
 def _benefits(findings: Sequence[Finding], unit: str) -> str:
@@ -307,4 +309,6 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f}".replace("-0", "0")
+    """Whole, but what is no zero is not called one."""
+    whole = f"{100 * share:.0f}"
+    return whole if whole not in ("0", "-0") else f"{100 * share:.1g}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
+from expdesign.estimation.regression import Polynomial, lift, symbol
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel import Operators, Term, VesselModel, stem
@@ -19,8 +21,8 @@ AIR_SIGNALS = frozenset({"u_q", "v_q"})
 """Velocity through the air."""
 LINEAR = 2.0 + 1e-9
 """Growth of a linear term from one speed to its double."""
-MOST_PRODUCTS = 500
-"""In a regressor written as a sum; those of ship models have a few."""
+MOST_SUMS = 12
+"""In a regressor that is written as a sum of products; those of ship models have a few."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,64 +163,19 @@ def _term_kinds(model: VesselModel) -> tuple[TermKind, ...]:
     )
 
 
-_Factors = tuple[tuple[str, ...], tuple[str, ...]]
-"""Of a product: those that inputs alone make, and others."""
+def _text(whole: Polynomial) -> str:
+    """In the language of expressions."""
+    rows = [names if size == 1.0 and names else (repr(size), *names) for names, size in whole.terms.items()]
+    return " + ".join("*".join(names) for names in rows) or "0"
 
 
-@dataclass(frozen=True)
-class _Polynomial:
-    """A regressor as a sum of products with coefficients."""
-
-    products: Mapping[_Factors, float]
-
-    def __add__(self, other: _Polynomial | float) -> _Polynomial:
-        found = dict(self.products)
-        for key, number in self._like(other).products.items():
-            found[key] = found.get(key, 0.0) + number
-        return _Polynomial(found)
-
-    def __mul__(self, other: _Polynomial | float) -> _Polynomial:
-        found: dict[_Factors, float] = {}
-        factors = self._like(other).products
-        if len(self.products) * len(factors) > MOST_PRODUCTS:
-            raise OverflowError
-        for (own, rest), number in self.products.items():
-            for (more, others), size in factors.items():
-                key = tuple(sorted((*own, *more))), tuple(sorted((*rest, *others)))
-                found[key] = found.get(key, 0.0) + number * size
-        return _Polynomial(found)
-
-    def __neg__(self) -> _Polynomial:
-        return self * -1.0
-
-    def __sub__(self, other: _Polynomial | float) -> _Polynomial:
-        return self + -self._like(other)
-
-    def __rsub__(self, other: float) -> _Polynomial:
-        return -self + other
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __str__(self) -> str:
-        rows = [(own + rest, size) for (own, rest), size in self.products.items()]
-        return " + ".join("*".join(names if size == 1.0 and names else (repr(size), *names)) for names, size in rows)
-
-    def factor(self, text: str) -> _Polynomial:
-        """A factor that reads what this reads."""
-        alone = not any(rest for _, rest in self.products)
-        return _Polynomial({((text,), ()) if alone else ((), (text,)): 1.0})
-
-    def _like(self, other: _Polynomial | float) -> _Polynomial:
-        return other if isinstance(other, _Polynomial) else _Polynomial({((), ()): other})
+def _called(name: str) -> Callable[[Polynomial | float], Polynomial | float]:
+    return lambda x: symbol(f"{name}({_text(x)})") if isinstance(x, Polynomial) else float(getattr(np, name)(x))
 
 
-def _factor(name: str) -> Callable[[_Polynomial | float], _Polynomial | float]:
-    return lambda x: x.factor(f"{name}({x})") if isinstance(x, _Polynomial) else float(getattr(np, name)(x))
-
-
-PRODUCTS = Operators(*map(_factor, FUNCTIONS))
-MEAN = "mean_"
-"""Before the name of what inputs alone make, the hexadecimal digits of its expression."""
+CALLED = Operators(*map(_called, FUNCTIONS))
+WORDS = {"*": "_by_", "(": "_of_", "+": "_plus_", "-": "_minus_", ".": "_point_"}
+"""What stands for marks of an expression in the name of a signal."""
 
 
 def driving_signals(model: VesselModel) -> tuple[str, ...]:
@@ -230,25 +187,33 @@ def with_input_products(expression: Expression, inputs: tuple[str, ...]) -> Expr
     """The same with every product of inputs as one signal, whose mean over an integrator step is the mean to take.
 
     Inputs may change within a step, and the mean of n |n| is not that of the mean n. Products with the motion are left,
-    because motion hardly changes within a step, and so are expressions of more than `MOST_PRODUCTS`.
+    because motion hardly changes within a step, and so are expressions of more than `MOST_SUMS`.
     """
-    return _with_input_products(expression.text, expression.signals, inputs)
+    return _with_input_products(expression.text, expression.signals, inputs)[0]
 
 
 @lru_cache(maxsize=512)
-def _with_input_products(text: str, signals: tuple[str, ...], inputs: tuple[str, ...]) -> Expression:
+def _with_input_products(
+    text: str, signals: tuple[str, ...], inputs: tuple[str, ...]
+) -> tuple[Expression, Mapping[str, str]]:
+    """The expression with these signals, and what each of them is: "mean_abs_of_n1_by_n1", abs(n1)*n1."""
     expression = parse_expression(text, signals=signals)
-    table = {n: _Polynomial({((n,), ()) if n in inputs else ((), (n,)): 1.0}) for n in signals}
-    try:
-        whole = expression.evaluate(table, PRODUCTS) if {*inputs} & {*signals} else 0.0
-    except OverflowError:
-        return expression
-    plain = {(), *((name,) for name in inputs)}
-    if not isinstance(whole, _Polynomial) or plain.issuperset(own for own, _ in whole.products):
-        return expression
-    names = {own: (f"{MEAN}{'*'.join(own).encode().hex()}",) for own, _ in whole.products if own not in plain}
-    parts: dict[_Factors, float] = {(names.get(own, own), rest): size for (own, rest), size in whole.products.items()}
-    return parse_expression(str(_Polynomial(parts)), signals=(*signals, *(name for (name,) in names.values())))
+    if not {*inputs} & {*signals} or len(re.findall("[+-]", text)) > MOST_SUMS:
+        return expression, {}
+    whole = lift(expression.evaluate({name: symbol(name) for name in signals}, CALLED))
+    products, parts = dict[str, str](), dict[tuple[str, ...], float]()
+    for factors, size in whole.terms.items():
+        own = [one for one in factors if {*re.findall(r"[A-Za-z_]\w*", one)} <= {*inputs, *FUNCTIONS}]
+        product, rest = "*".join(own), [one for one in factors if one not in own]
+        if own and product not in inputs:
+            name = "mean_" + re.sub(r"\W", lambda mark: WORDS.get(mark[0], ""), product)
+            products[name], rest = product, [*rest, name]
+        else:
+            rest += own
+        parts[tuple(rest)] = size
+    if not products:
+        return expression, {}
+    return parse_expression(_text(Polynomial(parts)), signals=(*signals, *products)), products
 
 
 @lru_cache(maxsize=64)
@@ -257,9 +222,8 @@ def input_products(model: VesselModel, library: tuple[Term, ...]) -> Mapping[str
     inputs = driving_signals(model)
     known = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *inputs)))
     texts = [*(term.expression for term in (*model.terms, *library)), ahead_force_text(model)]
-    read = [name for text in texts for name in with_input_products(_parsed(text, known), inputs).signals]
-    names = [name for name in dict.fromkeys(read) if name.startswith(MEAN)]
-    return {name: _parsed(bytes.fromhex(name.removeprefix(MEAN)).decode(), inputs) for name in names}
+    read = [_with_input_products(text, _parsed(text, known).signals, inputs)[1] for text in texts]
+    return {name: _parsed(text, inputs) for products in read for name, text in products.items()}
 
 
 def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
