@@ -261,7 +261,7 @@ def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypa
     assert made == [0.8]
     assert ("with plan.confidence = 0.8 drawn trials accept the plan" in text) == helps
     assert "not tried" not in text
-    assert helps or "no single change of those tried helps (plan.confidence = 0.8" in text
+    assert helps or re.search(r"no single change of those tried helps \(.*plan\.confidence = 0\.8", text)
 
 
 def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkeypatch, story):
@@ -287,7 +287,7 @@ def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_befor
     monkeypatch.setattr(trials, "accepted", lambda other, water, sailed: sailed == "the refused plan")
     advised(case, too_risky(case, plans), lambda activity, share: told.append(activity))
     assert 1 <= len(said) <= max(1, PLAN.replans + 1 - plans)
-    assert "plan.confidence = 0.8" in said[0]
+    assert "std_mps = 0.7" in said[0]
     assert len(set(said)) == len(said)
 
 

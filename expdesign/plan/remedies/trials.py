@@ -37,7 +37,7 @@ def for_sailing(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[s
 
 
 def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
-    """A lower confidence, a better forecast, or a design without the worst run, that drawn trials accept.
+    """A better forecast, a lower confidence, or a design without the worst run, that drawn trials accept.
 
     Each is planned anew before it is named, as it changes the room of runs. A forecast with which the refused plan is
     too risky as well is not: its runs had more room. All plans together are no more than a trial that is planned may
@@ -52,7 +52,7 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
     more = "the planner has tried more room" if len(refused.tried) > 1 else ""
     forecasts = (_hopeful(change, refused, tell) for change in _forecasts(problem))
     lower = () if refused.confidence is None else (of_setting(problem, "confidence", refused.confidence),)
-    tries = chain(lower, islice(forecasts, 1), exclusions(problem, names) if names else (), forecasts)
+    tries = chain(islice(forecasts, 1), lower, exclusions(problem, names) if names else (), forecasts)
     most = max(1, PLAN.replans + 1 - max(1, len(refused.tried)))
     yield from first_that_passes(tries, passes, ACCEPTED, more, tell=tell, most=most)
 
