@@ -26,6 +26,7 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised, trials
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.tuning import PLAN
 from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
@@ -241,6 +242,53 @@ def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch,
     known = in_current(story, 0.0)
     text = str(advised(known, NoPlan("too risky", what="risk", which="goal")))
     assert text == "too risky; no remedy could be checked"
+
+
+def too_risky(case: PlanProblem, plans: int) -> NoPlan:
+    """A refusal after so many plans, of which the first would have met a lower confidence."""
+    error = NoPlan("too risky", what="risk", which="deceleration")
+    error.confidence, error.tried = 0.8, ("a plan",) * plans
+    error.plan = leg_water(case, ship_on_legs(case)), "the refused plan"
+    return error
+
+
+@pytest.mark.parametrize("helps", [True, False])
+def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypatch, story, helps):
+    case, made = in_current(story, 1.4), []
+    monkeypatch.setattr(trials, "first_sailed", lambda other: made.append(other.settings.confidence) or ((), ()))
+    monkeypatch.setattr(trials, "accepted", lambda other, *_: helps and other.settings.confidence == 0.8)
+    text = str(advised(case, too_risky(case, 3)))
+    assert made == [0.8]
+    assert ("with plan.confidence = 0.8 drawn trials accept the plan" in text) == helps
+    assert "not tried" not in text
+    assert helps or re.search(r"no single change of those tried helps \(.*plan\.confidence = 0\.8", text)
+
+
+def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkeypatch, story):
+    case, made, judged = in_current(story, 1.4), [], []
+
+    def accepts(other, water, sailed):
+        if sailed == "the refused plan":
+            judged.append((other.environment.current_std_mps, water.environment is other.environment))
+        return False
+
+    monkeypatch.setattr(trials, "first_sailed", lambda other: made.append(other) or ((), ()))
+    monkeypatch.setattr(trials, "accepted", accepts)
+    text = str(advised(case, too_risky(case, 1)))
+    assert judged == [(0.7, True)]
+    assert [other.environment.current_std_mps for other in made] == [1.4] * len(made)
+    assert "environment.current_to.std_mps = 0.7 (a better forecast)" in text
+
+
+@pytest.mark.parametrize("plans", [1, 2, 3])
+def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_before(monkeypatch, story, plans):
+    case, told, said = in_current(story, 1.4), [], []
+    monkeypatch.setattr(trials, "first_sailed", lambda other: said.append(told[-1]) or ((), ()))
+    monkeypatch.setattr(trials, "accepted", lambda other, water, sailed: sailed == "the refused plan")
+    advised(case, too_risky(case, plans), lambda activity, share: told.append(activity))
+    assert 1 <= len(said) <= max(1, PLAN.replans + 1 - plans)
+    assert "std_mps = 0.7" in said[0]
+    assert len(set(said)) == len(said)
 
 
 def test_a_thousand_runs_can_be_planned_for_at_the_usual_confidence():

@@ -41,14 +41,18 @@ def test_other_runs_and_their_legs_stay_as_they_are():
         goal=np.array([400.0, 200.0, 0.0]),
     )
     draft = draft_trial(problem)
-    pose, legs, known = draft.sailed.trajectory.pose, draft.sailed.legs, {}
-    places = [Placement(primitive="go", pose=pose[leg.first]) for leg in legs if leg.kind == "primitive"]
-    both = redrafted(problem, draft, places, known)
-    one = replace(problem, design=SimpleNamespace(problem=problem.design.problem, repeats=(1,)))
-    alone = redrafted(one, draft, places[:1], known)
+    places = draft.sailed.placements
+    begins = [draft.sailed.trajectory.pose[leg.first] for leg in draft.sailed.legs if leg.kind == "primitive"]
+    np.testing.assert_allclose(begins, [placed.pose for placed in places], atol=0.03)
+    assert len(draft.known) == 3
+    both = redrafted(problem, draft, places)
     assert both is not None
+    assert len(draft.known) == 3  # nothing is sought where all stays
+    assert np.array_equal(both.sailed.commands.values, draft.sailed.commands.values)
+    one = replace(problem, design=SimpleNamespace(problem=problem.design.problem, repeats=(1,)))
+    alone = redrafted(one, draft, places[:1])
     assert alone is not None
-    assert len(known) == 3 + 1  # the leg past the second run is the only one sought
+    assert len(draft.known) == 3 + 1  # the leg past the second run is the only one sought
     kept = both.sailed.legs[1].last
     assert np.array_equal(alone.sailed.commands.values[:kept], both.sailed.commands.values[:kept])
     assert [leg.kind for leg in alone.sailed.legs] == ["reposition", "primitive", "reposition"]
@@ -63,8 +67,8 @@ def day_of(runs: list[str]) -> DraftedDay:
     ends = np.cumsum([0, *lengths]).tolist()
     legs = tuple(Leg(kind=k, name=n, first=a, last=b) for (k, n), a, b in zip(kinds, ends, ends[1:], strict=False))
     told = np.array([TOLD[name] if kind == "primitive" else 0.2 for kind, name in kinds])
-    track = SimpleNamespace(pose=np.zeros((ends[-1] + 1, 3)))
-    sailed = SimpleNamespace(legs=legs, legs_s=np.array(lengths, dtype=float), day_s=float(ends[-1]), trajectory=track)
+    places = tuple(Placement(primitive=name, pose=np.zeros(3)) for name in runs)
+    sailed = SimpleNamespace(legs=legs, legs_s=np.array(lengths, dtype=float), day_s=float(ends[-1]), placements=places)
     draft = SimpleNamespace(sailed=sailed, made_good_m=np.zeros(len(legs)), transit_mps=1.0, late_s=np.zeros(len(legs)))
     repeats = tuple(runs.count(name) for name in NAMES)
     return DraftedDay(
@@ -79,7 +83,7 @@ def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required,
     design = of_runs(1, 2, 1)
     design.problem.constraints.required = frozenset(required)
     drafting = Drafting(problem=SimpleNamespace(design=design), accuracy=accuracy)
-    monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places, known: places)
+    monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places: places)
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
     monkeypatch.setattr(Drafting, "_late", lambda self, day: day)

@@ -78,10 +78,8 @@ def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: 
     if lower is not None and _accepts(problem, first, made[0], lower):
         error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
         return error
-    error.what, error.which = "risk", last.worst
-    if lower is not None:
-        words = "which the first plan would meet, but with which runs would get less room"
-        error.remedies = (f"not tried: plan.confidence = {lower:g}, {words}",)
+    error.what, error.which, error.confidence = "risk", last.worst, lower
+    error.plan = first.water, made[0].sailed
     return error
 
 

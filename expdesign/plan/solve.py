@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -72,8 +71,8 @@ def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: 
     try:
         return _in_water(problem, reported, _planned) if drafted is None else _checked(problem, drafted, reported)
     except NoPlan as error:
-        progress("looking for what would help", math.nan)
-        raise advised(replace(problem, area=error.within or (drafted or problem).area), error) from None
+        within = replace(problem, area=error.within or (drafted or problem).area)
+        raise advised(within, error, progress) from None
 
 
 def _in_water(

@@ -42,6 +42,10 @@ REST_OPEN = {PLACES: True, SAILED: True, VERIFIED: True, ACCEPTED: False}
 """What a remedy was checked to do, and whether more of a plan was left unchecked."""
 
 
+Tell = Callable[[str], None]
+"""Is called with what is tried next."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Change:
     """A change of one key.
@@ -56,7 +60,13 @@ class Change:
 
 
 def first_that_passes(
-    changes: Iterable[Change], passes: Callable[[PlanProblem], bool], says: str, untried: str = "", *, most: int = 0
+    changes: Iterable[Change],
+    passes: Callable[[PlanProblem], bool],
+    says: str,
+    untried: str = "",
+    *,
+    tell: Tell,
+    most: int = 0,
 ) -> Iterator[str]:
     """The first change with which a test passes; what was tried, where none of them does.
 
@@ -65,6 +75,8 @@ def first_that_passes(
     """
     tried, left = [], most or PLAN.most_searches
     for change in changes:
+        if change.problem is not None:
+            tell(change.words)
         if change.problem is not None and passes(change.problem):
             yield f"with {change.words} {says}; {REST}" if REST_OPEN[says] else f"with {change.words} {says}"
             return

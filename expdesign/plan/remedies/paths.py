@@ -15,12 +15,13 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies.changes import NONE, REST, largest, rounded_up, with_settings
+from expdesign.plan.remedies.changes import NONE, REST, Tell, largest, rounded_up, with_settings
 from expdesign.plan.tuning import PLAN
 
 
-def for_parted(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_parted(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """The place nearest to the goal that a path leads to."""
+    tell("another place for the goal")
     water = leg_water(problem, ship_on_legs(problem))
     vessel, start, goal = problem.vessel, problem.start, shapely.Point(problem.goal[1], problem.goal[0])
     roomy = water.area.safe_water(max(water.leg_margin_m, water.clearance_m + np.hypot(*vessel.hull_b.T).max()) + 1.0)
@@ -38,8 +39,9 @@ def for_parted(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     yield NONE.format("other places for the goal")
 
 
-def for_passage(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_passage(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """The largest clearance with which a path leads through."""
+    tell("less plan.clearance_m")
     water = leg_water(problem, ship_on_legs(problem))
 
     def passes(clearance_m: float) -> bool:
@@ -52,8 +54,9 @@ def for_passage(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
         yield f"with plan.clearance_m = {clearance_m:g} a path leads through; {REST}"
 
 
-def for_berth(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_berth(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """Another heading, less clearance, or tighter turns at the start or the goal."""
+    tell(f"another {refused.which}.heading_deg, less plan.clearance_m, tighter turns")
     backwards = refused.which == "goal"
     pose = problem.goal if backwards else problem.start
     water = leg_water(problem, ship_on_legs(problem))
@@ -83,8 +86,9 @@ def for_berth(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
     yield NONE.format(f"{refused.which}.heading_deg, plan.clearance_m down to 0, plan.turning_radius_m")
 
 
-def for_settings(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_settings(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """Speeds and radii that the ship is capable of."""
+    tell("other speeds and radii")
     key = "transit_speed_mps" if refused.what == "speed" else "turning_radius_m"
     for value in (None, *(_speeds(problem) if refused.what == "speed" else ())):
         other = with_settings(problem, **{key: value})

@@ -21,6 +21,7 @@ from expdesign.plan.remedies.changes import (
     PLACES,
     UNTRIED,
     Change,
+    Tell,
     exclusions,
     finds_places,
     first_that_passes,
@@ -33,14 +34,14 @@ from expdesign.plan.tuning import PLAN
 from expdesign.values import Array
 
 
-def for_room(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_room(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """A clearance or a confidence with which the runs find places, or the runs to leave out."""
     water = leg_water(problem, ship_on_legs(problem))
     space = run_space(problem, water)
     lacking = without_place(space)
     changes = chain(_clearances(problem, water, space, lacking), _confidences(problem, space, lacking))
     tries = chain(changes, exclusions(problem, lacking or {refused.which}))
-    yield from first_that_passes(tries, finds_places, PLACES, UNTRIED)
+    yield from first_that_passes(tries, finds_places, PLACES, UNTRIED, tell=tell)
 
 
 def _clearances(problem: PlanProblem, water: LegWater, space: RunSpace, lacking: set[str]) -> Iterator[Change]:
@@ -83,14 +84,15 @@ def _only(space: RunSpace, problem: PlanProblem, off_m: Sequence[Array], names: 
     return replace(space, footprints=runs, leg_margin_m=margin_m)
 
 
-def for_lattice(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_lattice(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """The other planner, if it finds places for the runs."""
-    yield from first_that_passes([Change(words="plan.planner = 'beam'", problem=problem)], finds_places, PLACES)
+    beam = Change(words="plan.planner = 'beam'", problem=problem)
+    yield from first_that_passes([beam], finds_places, PLACES, tell=tell)
 
 
-def for_confidence(problem: PlanProblem, refused: NoPlan) -> Iterator[str]:
+def for_confidence(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """The largest confidence of those tried at which the room of runs can be estimated, and every run has a place."""
     lower = [value for value in PLAN.lower_confidences if value < problem.settings.confidence]
     changes = (of_setting(problem, "confidence", value) for value in lower)
     without = exclusions(problem, {refused.which}) if refused.what == "unstable" else ()
-    yield from first_that_passes(chain(changes, without), finds_places, PLACES, most=len(lower) + 1)
+    yield from first_that_passes(chain(changes, without), finds_places, PLACES, tell=tell, most=len(lower) + 1)
