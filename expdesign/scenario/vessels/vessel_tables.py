@@ -229,9 +229,7 @@ class SensorsTable(Table):
     velocity_angle_rad: HalfTurn = Field(
         default=0.0, description="the angle from the bow to the velocity sensor's forward axis [rad], clockwise"
     )
-    velocity_scale: Positive = Field(
-        default=1.0, description="the measured surge and sway speed over the true ones"
-    )
+    velocity_scale: Positive = Field(default=1.0, description="the measured surge and sway speed over the true ones")
     yaw_rate_scale: Positive = Field(default=1.0, description="the measured yaw rate over the true one")
     wind_sensor: Literal["cartesian", "vane"] = Field(
         default="cartesian",
