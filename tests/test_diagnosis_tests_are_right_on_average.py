@@ -24,6 +24,7 @@ from expdesign.diagnosis.fit.fit import (
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.motion.window_length import stable_windows
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests
@@ -31,6 +32,9 @@ from expdesign.diagnosis.select.selection import Step, redundant_step
 from expdesign.diagnosis.select.selection_round import open_candidates
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.scenario import load_vessel
+from expdesign.workflows.steps.measured import measured
+from sample_files import outside
 
 
 @pytest.fixture(scope="module")
@@ -300,3 +304,15 @@ def test_uncertain_parameters_beyond_their_bounds_are_still_tested_as_causes():
     assert base.ship.get("theta:X_kappa") < -2 * 0.00025  # beyond two of its standard deviations
     (found,) = score_tests(base, own)
     assert found.p_value < 1e-6
+
+
+@pytest.mark.outside
+def test_noise_begun_anew_at_the_likeliest_parameters_is_no_likelier():
+    """On measured records: noise from the way to the parameters holds what these explain since."""
+    ship = load_vessel(outside("field/crash/vessel.toml"))
+    record = measured([outside(f"field/crash/zz_20_10_{side}.csv") for side in "ps"], ship)
+    model = extended_model(ship, record)
+    windows = stable_windows(model, record)
+    base = fit_nuisance(model, windows, initial_states(windows))
+    anew = fit(base.ship, windows, (), starts=base.starts, options=FitOptions(steps=1))
+    assert base.deviance < anew.deviance + 10.0

@@ -133,6 +133,8 @@ def test_what_two_instruments_show_of_a_third_is_undone(tmp_path: Path, ship: Ve
         (as_read,) = load_records(
             write_log(tmp_path / "log.csv", spoiled, NAMES), vessel_inputs=ship.model.inputs
         ).batches
+        (watched,) = measured([tmp_path / "log.csv"], ship, undo=False).batches  # its change would be an alarm
+        assert np.array_equal(watched.velocity, as_read.velocity, equal_nan=True)
         blocks = len(mended) // 10  # means over 4 s, as white noise of the log is not the question
         left, lost = (
             (one.velocity[: 10 * blocks] - own.velocity[: 10 * blocks]).reshape(blocks, 10, 3).mean(axis=1)

@@ -37,15 +37,16 @@ OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", 
 """Findings of the same comparison, which one that stands may imitate."""
 
 
-def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record:
+def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: bool = True) -> Record:
     """The record with held and interpolated signals read in time, and its doubts: what does not agree.
 
-    A scale and a delay that two other instruments show in all files together are undone.
+    A scale or a delay that two other instruments show in all files together is undone.
 
     Args:
         record: as measured.
         vessel: what its file states of actuators and sensors, which is taken into account.
         smoothed: whether velocities from the pose are smoothed, rather than central differences.
+        undo: whether faults that are certain are undone; not where a change of them is watched for.
     """
     in_time = [_in_time(batch, vessel.sensors, smoothed=smoothed) for batch in record.batches]
     record = replace(record, batches=tuple(batch for batch, _ in in_time))
@@ -53,9 +54,11 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False) -> Record
     files = list(dict.fromkeys(map(_file, record.batches)))
     everywhere = ", ".join(files[:1]) + (f" and {len(files) - 1} more" if len(files) > 1 else "")
     found = _findings(record, vessel, smoothed=smoothed)
-    faults = [f"{everywhere}: {item.text}{_what_is_done(item)}" for item in found]
-    record = replace(record, batches=tuple(_undone(batch, found, smoothed=smoothed) for batch in record.batches))
-    stands = {item.name for item in found if not _what_is_done(item)}
+    done = {item.name: _what_is_done(item) if undo else "" for item in found}
+    faults = [f"{everywhere}: {item.text}{done[item.name]}" for item in found]
+    known = [item for item in found if done[item.name]]
+    record = replace(record, batches=tuple(_undone(batch, known, smoothed=smoothed) for batch in record.batches))
+    stands = {name for name, text in done.items() if not text}
     stands |= {*OF_LOG} if stands & {*OF_LOG} else set()
     for file in files * (len(files) > 1):
         own = replace(record, batches=tuple(batch for batch in record.batches if _file(batch) == file))

@@ -98,6 +98,9 @@ def fit_candidate(
 ) -> FittedCandidate | None:
     """Fit a candidate together with the findings so far; None if that fails.
 
+    A random current of the noise that was estimated without a steady one holds most of it, and as long as it stays the
+    steady one gains little: the noise is estimated from white noise on, too.
+
     Args:
         base: the fit without it.
         windows: data.
@@ -108,8 +111,11 @@ def fit_candidate(
     try:
         nearby = base.ship.with_effects(point.effects), base.starts
         ship, starts = start_nearer(base, windows, point) if far else nearby
-        options = continuing(base, steps=steps)
-        found = fit(ship, windows, joint_keys(base, point.keys), starts=starts, options=options)
+        keys, options = joint_keys(base, point.keys), continuing(base, steps=steps)
+        found = fit(ship, windows, keys, starts=starts, options=options)
+        if base.noise.current_std_mps and any(key.startswith("current:") for key in point.keys):
+            anew = fit(ship, windows, keys, starts=starts, options=FitOptions(steps=steps, warm_start=base))
+            found = min(found, anew, key=lambda item: item.deviance)
         gain = log_likelihood_gain(base, found)
     except (FloatingPointError, np.linalg.LinAlgError):
         return None

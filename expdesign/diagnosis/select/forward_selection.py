@@ -187,12 +187,16 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     """The model in use at the likeliest values of its uncertain parameters, with the noise estimated there.
 
     Far from there the remainder overestimates the noise, and any cause that lets the fit continue seems significant.
+    Noise that was estimated on the way holds some of what the parameters explain since, as a random current or slow
+    noise that hides causes; so it is estimated from white noise on, too, and the likelier one kept.
     """
     found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=TUNING.nuisance_steps))
     if not found.keys:
         return found
     options = FitOptions(noise=found.noise, steps=TUNING.nuisance_steps, warm_start=found)
-    return fit(found.ship, windows, (), starts=found.starts, options=options)
+    found = fit(found.ship, windows, (), starts=found.starts, options=options)
+    anew = FitOptions(steps=TUNING.nuisance_steps, warm_start=found)
+    return min(found, fit(found.ship, windows, (), starts=found.starts, options=anew), key=lambda item: item.deviance)
 
 
 def _is_block(chosen: FittedCandidate) -> bool:

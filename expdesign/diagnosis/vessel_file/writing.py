@@ -118,5 +118,5 @@ def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:
         position = replace(sensors.position, **lever, delay_s=late("late:position"))
         return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
     velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
-    axes = {"velocity_angle_rad": 0.0 - get("heading_bias"), "velocity_scale": 1.0 + get("log")}
-    return replace(sensors, **axes, velocity=velocity)
+    angle_rad, scale = 0.0 - get("heading_bias"), 1.0 + get("log")
+    return replace(sensors, velocity_angle_rad=angle_rad, velocity_scale=scale, velocity=velocity)

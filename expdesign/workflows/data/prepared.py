@@ -105,7 +105,7 @@ def prepared(asked: Asked, text: str, time_s: Array, changes: tuple[Change, ...]
         return None
     try:
         with as_file(text) as path:
-            record = measured([path], asked.vessel, velocity=asked.velocity)
+            record = measured([path], asked.vessel, velocity=asked.velocity, undo=False)
             record = in_stated_time(record, asked.vessel.sensors)
     except FileError as error:
         return Unread(error.key, error.problem)

@@ -33,10 +33,11 @@ def data_files(data: Sequence[Path]) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
+def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", undo: bool = True) -> Record:
     """Measured data of a vessel: its own actuators' signals, or generalised forces where the first file has those.
 
-    A model in discrete form holds for one sample time, which the data must have; in continuous form any will do.
+    A model in discrete form holds for one sample time, which the data must have; in continuous form any will do. Faults
+    of instruments that are certain are told, and undone if asked for.
     """
     inputs, header = vessel.model.inputs, _header(data[0])
     if not {column_name(name) for name in inputs} <= header and set(FORCE_SIGNALS) <= header:
@@ -51,7 +52,7 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") ->
         actuators=vessel.model.actuators,
     )
     record = with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
-    return checked(record, vessel, smoothed=velocity == "smoothed")
+    return checked(record, vessel, smoothed=velocity == "smoothed", undo=undo)
 
 
 def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
