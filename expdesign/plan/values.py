@@ -12,6 +12,7 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
 PlannerName = Literal["beam", "lattice"]
+PathsName = Literal["ompl", "visibility"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +31,7 @@ class PlanSettings:
         turning_radius_m: of repositioning legs, or None for what the vessel model allows.
         planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.
         lattice_spacing_m: distance between the cells of the lattice planner, or None for one that suits the ship.
+        paths: what finds the paths of legs that bend, of ships that turn on the spot: OMPL, or the visibility graph.
     """
 
     clearance_m: float = 20.0
@@ -40,6 +42,7 @@ class PlanSettings:
     turning_radius_m: float | None = None
     planner: PlannerName = "beam"
     lattice_spacing_m: float | None = None
+    paths: PathsName = "ompl"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,12 +70,16 @@ class Leg:
         name: of the primitive, or what the repositioning leads to.
         first: index of its first command; the trajectory sample of the same index is its start state.
         last: index of the trajectory sample at its end, which is the next leg's first.
+        path: where the path of a repositioning leg comes from, as `expdesign.plan.legs.LegPath`; "" where unknown.
+        searches: of OMPL for that path.
     """
 
     kind: str
     name: str
     first: int
     last: int
+    path: str = ""
+    searches: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ from shapely.ops import nearest_points
 from expdesign.conventions import to_n_frame
 from expdesign.errors import FileError, NoPlan
 from expdesign.plan.control import capability
-from expdesign.plan.values import PlannerName, PlanSettings, UnderWay
+from expdesign.plan.values import PathsName, PlannerName, PlanSettings, UnderWay
 from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import design_settings
 from expdesign.scenario.design_tables import DesignTable
@@ -116,6 +116,11 @@ class PlanTable(Table):
         default=PlanSettings.lattice_spacing_m,
         description="the distance between cells of the lattice planner [m]; when not given, a little more than the "
         "turning radius, more in large waters and less where that is too coarse",
+    )
+    paths: PathsName = Field(
+        default=PlanSettings.paths,
+        description="what finds the paths of repositioning legs that bend, of ships that turn on the spot: 'ompl' by "
+        "sampling, or 'visibility' by the graph of the shore's corners; legs that need not bend are straight",
     )
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,9 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import CHART, ClearanceField, Corners, VisibilityGraph, polyline_length, visibility_graph_of
 from expdesign.plan.control import Capability
+from expdesign.plan.legs._ompl import PLANE, search_plane
 from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.values import PathsName, PlanSettings
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Trajectory
@@ -58,6 +60,39 @@ class LegTask:
         return self.start_inputs[None] if self.before is None else self.before
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegPath:
+    """The path of a leg.
+
+    Attributes:
+        points: (k, 2) north/east, or (k, 3) with courses.
+        source: what found it, in words for plan.json: "straight", "visibility graph", "ompl BITstar in R2", ...
+    """
+
+    points: Array
+    source: str
+
+    @property
+    def length_m(self) -> float:
+        """Length [m]."""
+        return polyline_length(self.points[:, :2])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundLeg:
+    """A leg, and what found its path.
+
+    Attributes:
+        commands: (k, m); the last azimuths without angle limits may differ from the task's by whole turns.
+        source: as `LegPath`.
+        searches: of OMPL for it, where they are counted.
+    """
+
+    commands: Array
+    source: str
+    searches: int = 0
+
+
 @dataclass(frozen=True, kw_only=True)
 class LegWater:
     """Vessel, weather and water that all legs of a plan share.
@@ -68,6 +103,7 @@ class LegWater:
         clearance_m: least distance of the hull from anything forbidden.
         field: the same water on a grid.
         corners: that paths may bend at, as `Tuning.corners` of charts.
+        paths: what finds paths that bend, as `PlanSettings.paths`.
     """
 
     vessel: Vessel
@@ -77,6 +113,7 @@ class LegWater:
     clearance_m: float
     field: ClearanceField
     corners: Corners = CHART.corners
+    paths: PathsName = PlanSettings.paths
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
@@ -88,7 +125,7 @@ class LegWater:
     def __setstate__(self, state: dict[str, object]) -> None:
         """Prepare the shapes again, which is lost between processes."""
         self.__dict__.update(state)
-        for name in ("safe", "_open"):
+        for name in ("safe", "_open", "_centre_waters"):
             if name in state:
                 shapely.prepare(state[name])
 
@@ -99,11 +136,18 @@ class LegWater:
         return (self.clearance_m + float(swing_m)) * ROUND
 
     @cached_property
-    def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
+    def _centre_waters(self) -> tuple[shapely.MultiPolygon, ...]:
         """For the centre lines of hulls that point along their path, from wide to narrow margins."""
-        spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
-        waters = [self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares]
-        return tuple(visibility_graph_of(water, tolerance_m, self.corners) for water in waters)
+        spares = self.ship.path_spares_m(self.vessel)
+        waters = tuple(self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares)
+        shapely.prepare(waters)
+        return waters
+
+    @cached_property
+    def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
+        """Of these waters, from wide to narrow margins."""
+        tolerance_m = self.vessel.length_m / 60
+        return tuple(visibility_graph_of(water, tolerance_m, self.corners) for water in self._centre_waters)
 
     @property
     def narrowest_graph(self) -> VisibilityGraph:
@@ -120,16 +164,63 @@ class LegWater:
         """Clearance that the centre lines of legs need."""
         return self.clearance_m + self.ship.path_spares_m(self.vessel)[-1]
 
-    def candidate_paths(self, start: Array, end: Array) -> list[Array]:
-        """Paths (k, 2) between two points, shortest first; of similar lengths the one farther from the shore first.
+    def joins(self, start: Array, end: Array) -> bool:
+        """Whether a path leads from one point (2,) to another."""
+        return self._straight(start, end) or any(
+            graph.shortest(start, end) is not None for graph in self.visibility_graphs
+        )
 
-        Only the straight line where a hull may go straight; none where the points are not connected.
+    def candidate_paths(self, start: Array, end: Array, task: LegTask) -> Iterator[LegPath]:
+        """Paths between two points (2,), shortest first; of similar lengths the one farther from the shore first.
+
+        Only the straight line where a hull may go straight; none where the points are not connected. Else the shortest
+        paths of the visibility graphs tell the order and bound the length; with `paths` "ompl" they are searched for.
         """
-        straight = np.stack([start, end])
-        if shapely.contains_properly(self._open, shapely.LineString(straight[:, ::-1])):
-            return [straight]
-        paths = [path for graph in self.visibility_graphs if (path := graph.shortest(start, end)) is not None]
-        return sorted(paths, key=lambda path: np.ceil(polyline_length(path) / (2 * self.vessel.length_m)))
+        if self._straight(start, end):
+            yield LegPath(points=np.stack([start, end]), source="straight")
+            return
+        known: list[tuple[LegPath, shapely.MultiPolygon]] = []
+        for graph, water in zip(self.visibility_graphs, self._centre_waters, strict=True):
+            if (points := graph.shortest(start, end)) is not None:
+                known.append((LegPath(points=points, source="visibility graph"), water))
+        for path, water in sorted(known, key=lambda item: np.ceil(item[0].length_m / (2 * self.vessel.length_m))):
+            yield self._searched(path, water, task) if self.paths == "ompl" else path
+
+    def _searched(self, shortest: LegPath, water: shapely.MultiPolygon, task: LegTask) -> LegPath:
+        """A path by OMPL in some water, or the shortest where none is found that is nearly as short.
+
+        Args:
+            shortest: gives the ends; they are joined to the nearest points of the water by straight lines.
+            water: of the centre lines.
+            task: gives the seed, and counts the work.
+        """
+        start, end = shortest.points[[0, -1]]
+        inside = np.array([_nearest(water, point) for point in (start, end)])
+        most_m = LEGS.plane_detour * shortest.length_m
+
+        def clear(line: Array) -> bool:
+            return bool(shapely.contains_properly(water, shapely.linestrings(line[:, ::-1])))
+
+        for attempt in range(LEGS.plane_tries):
+            path = search_plane(
+                *inside,
+                most_m=LEGS.plane_reach * shortest.length_m,
+                step_m=self.vessel.length_m / 2,
+                clear=clear,
+                seed=task.seed + 7919 * attempt,
+                budget=task.budget,
+            )
+            if path is None or not clear(path):
+                continue
+            points = np.array([start, *path, end])
+            found = LegPath(points=points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-9]], source=PLANE)
+            if found.length_m <= most_m:
+                return found
+        return replace(shortest, source=f"{shortest.source}, as OMPL found no path as short")
+
+    def _straight(self, start: Array, end: Array) -> bool:
+        """Whether a hull may go straight from one point (2,) to another."""
+        return bool(shapely.contains_properly(self._open, shapely.LineString(np.stack([start, end])[:, ::-1])))
 
     @cached_property
     def _open(self) -> shapely.MultiPolygon:
@@ -210,6 +301,15 @@ class LegWater:
         sample_s = self.vessel.sample_time_s
         values = delivered_at_samples(self.vessel.responses, before, sample_time_s=sample_s, standing=before[0])
         return np.asarray(values[-1])
+
+
+def _nearest(water: shapely.MultiPolygon, point: Array) -> Array:
+    """The point (2,) itself inside the water, else one just inside, near it."""
+    here = shapely.Point(point[1], point[0])
+    if shapely.contains_properly(water, here):
+        return point
+    there = shapely.get_coordinates(shapely.shortest_line(shapely.buffer(water, -LEGS.inside_m), here))[0]
+    return np.array([there[1], there[0]])
 
 
 def last_state(track: Trajectory) -> Array:
