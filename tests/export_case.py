@@ -112,7 +112,7 @@ def _commands_and_legs() -> tuple[Commands, tuple[Leg, ...]]:
     def add(kind: str, name: str, values: np.ndarray) -> None:
         first = legs[-1].last if legs else 0
         pieces.append(values)
-        path = {"path": "ompl BITstar in R2", "searches": 2} if kind == "reposition" else {}
+        path = {"path": "straight"} if kind == "reposition" else {}
         legs.append(Leg(kind=kind, name=name, first=first, last=first + len(values), **path))
 
     for number, name in enumerate((*runs(), "rest")):

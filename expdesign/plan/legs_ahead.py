@@ -25,14 +25,13 @@ class LegAhead:
         task: as it was expected.
         commands: (k, m), or None where there is no leg.
         source: what found its path.
-        spent_s, searches: work that it took.
+        spent_s: work that it took.
     """
 
     task: LegTask
     commands: Array | None
     source: str
     spent_s: float
-    searches: int
 
     def fitted(self, task: LegTask, water: LegWater) -> Array | None:
         """The commands for the task as it has become, azimuths shifted by whole turns; None where they miss its end."""
@@ -72,11 +71,10 @@ def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead
 
 
 def _found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
-    leg, budget = planner.leg(task, water), task.budget
+    leg = planner.leg(task, water)
     return LegAhead(
         task=task,
         commands=None if leg is None else leg.commands,
         source="" if leg is None else leg.source,
-        spent_s=budget.spent_s,
-        searches=budget.searches,
+        spent_s=task.budget.spent_s,
     )

@@ -196,7 +196,7 @@ class _Voyage:
         run = water.sail(last_state(track), values, water.remembered(np.concatenate([line.given, leg])))
         if not self.stated.holds(run.pose):
             return f"the run {where} leaves safe water"
-        line.sail("reposition", primitive.name, leg, track, found.source, found.searches)
+        line.sail("reposition", primitive.name, leg, track, found.source)
         line.sail("primitive", primitive.name, values, run)
         return ""
 
@@ -206,7 +206,7 @@ class _Voyage:
         if found is None:
             return False
         track = self.water.sail(self.line.state, found.commands, self.line.given)
-        self.line.sail("reposition", GOAL, found.commands, track, found.source, found.searches)
+        self.line.sail("reposition", GOAL, found.commands, track, found.source)
         return True
 
     def undo_run(self) -> Placement:
@@ -223,14 +223,10 @@ class _Voyage:
         task = self._task(*self._now, end, end_inputs, stretches=0)
         leg = ahead.fitted(task, self.water)
         if leg is None:
-            again = leg_found(self.planner, self.water, task)
-            ahead = replace(again, searches=ahead.searches + again.searches)
-            leg = again.commands
-            self.budget.spent_s += again.spent_s
-        if leg is None:
-            return None
-        values = np.concatenate([self._wait, leg])
-        return FoundLeg(commands=values, source=ahead.source, searches=ahead.searches)
+            ahead = leg_found(self.planner, self.water, task)
+            leg = ahead.commands
+            self.budget.spent_s += ahead.spent_s
+        return FoundLeg(commands=np.concatenate([self._wait, leg]), source=ahead.source) if leg is not None else None
 
     def _task(
         self, start: Array, start_inputs: Array, given: Array, end: Array, end_inputs: Array, *, stretches: int

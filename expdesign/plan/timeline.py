@@ -13,14 +13,13 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedStretch:
-    """A leg with its commands (k, m) and states (k + 1, 6), what found its path, and by how many searches of OMPL."""
+    """A leg with its commands (k, m) and states (k + 1, 6), and what found its path."""
 
     kind: str
     name: str
     commands: Array
     states: Array
     path: str = ""
-    searches: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,12 +56,10 @@ class Timeline:
         """Name of the stretch sailed last, or ""."""
         return self.stretches[-1].name if self.stretches else ""
 
-    def sail(self, kind: str, name: str, commands: Array, track: Trajectory, path: str = "", searches: int = 0) -> None:
+    def sail(self, kind: str, name: str, commands: Array, track: Trajectory, path: str = "") -> None:
         """Add a stretch."""
         states = np.hstack([track.pose, track.velocity])
-        self.stretches.append(
-            SailedStretch(kind=kind, name=name, commands=commands, states=states, path=path, searches=searches)
-        )
+        self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states, path=path))
 
     def undo_run(self) -> Placement:
         """Remove the last run and the leg to it; where the run began."""
@@ -82,7 +79,6 @@ class Timeline:
                 first=end - len(stretch.commands),
                 last=end,
                 path=stretch.path,
-                searches=stretch.searches,
             )
             for stretch, end in zip(self.stretches, ends, strict=True)
         )

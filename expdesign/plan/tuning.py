@@ -51,7 +51,6 @@ class Tuning:
             a plan cannot return in that time; half, and some for speeds that legs begin and end with.
         iteration_s: one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s].
         sample_s: one sample of some hundred drawn ships there [s].
-        motion_s: one motion that a path search checks there [s].
         work: how long phases take beside each other, on average of the examples on two cores: measuring the water,
             trying transitions, placing runs, sailing them, verifying and sailing drawn trials.
     """
@@ -94,7 +93,6 @@ class Tuning:
     bound_reach: float = 0.6
     iteration_s: float = 2e-4
     sample_s: float = 2.5e-3
-    motion_s: float = 3e-5
     work: tuple[float, float, float, float, float] = (1.0, 3.0, 1.0, 2.5, 4.0)
 
 

@@ -71,7 +71,6 @@ class Leg:
         first: index of its first command; the trajectory sample of the same index is its start state.
         last: index of the trajectory sample at its end, which is the next leg's first.
         path: where the path of a repositioning leg comes from, as `expdesign.plan.legs.LegPath`; "" where unknown.
-        searches: of OMPL for that path.
     """
 
     kind: str
@@ -79,7 +78,6 @@ class Leg:
     first: int
     last: int
     path: str = ""
-    searches: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,13 +12,12 @@ class WorkBudget:
 
     Attributes:
         spent_s: so far.
-        searches: of OMPL so far.
         most_s: the budget. Work under way is never stopped; only what comes after it is refused.
     """
 
     def __init__(self, most_s: float = math.inf) -> None:
         """Begin with nothing spent."""
-        self.spent_s, self.most_s, self.searches = 0.0, most_s, 0
+        self.spent_s, self.most_s = 0.0, most_s
 
     @property
     def exhausted(self) -> bool:
@@ -28,11 +27,6 @@ class WorkBudget:
     def optimised(self, iterations: int, samples: int) -> None:
         """Count iterations of the optimiser on a leg of some samples."""
         self.spent_s += PLAN.iteration_s * iterations * samples
-
-    def searched(self, motions: int) -> None:
-        """Count a search of OMPL that checked some motions."""
-        self.searches += 1
-        self.spent_s += PLAN.motion_s * motions
 
     def sailed(self, samples: int) -> None:
         """Count samples of drawn trials."""

@@ -67,7 +67,6 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             },
             **_standing_entry(plan),
             "legs": [_leg_entry(plan, index, leg) for index, leg in enumerate(plan.legs)],
-            "ompl_searches": sum(leg.searches for leg in plan.legs),
             "informative_s": plan.seconds("primitive"),
             "reposition_s": plan.seconds("reposition"),
             "reposition_bound_s": plan.reposition_bound_s,
@@ -172,7 +171,7 @@ def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
         "start": _state(plan, leg.first),
         "end": _state(plan, leg.last),
         "duration_s": sample_seconds(leg.last - leg.first, plan.commands.sample_time_s),
-        **({"path": leg.path, "ompl_searches": leg.searches} if leg.path else {}),
+        **({"path": leg.path} if leg.path else {}),
         **_sailed_entry(plan, index),
     }
 

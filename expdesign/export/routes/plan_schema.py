@@ -66,7 +66,6 @@ class _Leg(_Entry):
     kind: Literal["primitive", "reposition"]
     name: str
     path: str = ""
-    ompl_searches: int = Field(default=0, ge=0)
     start: _State
     end: _State
 

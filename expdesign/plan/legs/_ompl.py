@@ -1,36 +1,106 @@
-"""The only module that uses OMPL: short paths in the plane, and shortest Dubins curves, free and among obstacles.
+"""The only module that uses OMPL: roadmaps of the plane, and shortest Dubins curves, free and among obstacles.
 
 OMPL's (x, y, yaw) are taken as (north, east, heading): both turn from the first axis towards the second.
 
-The state space of ships that turn on the spot is the plane: they point along their path, so a motion is a straight line
-that keeps the clearance of such a hull. In SE(2), with turns on the spot at sampled headings, the same search took
-three times as long and gave paths one per cent longer. BIT* is among the planners whose paths are right in Dubins'
-space, where motions have a direction. A roadmap for many legs would keep the ends of those asked for before, so that a
-leg would depend on their order.
+Ships that turn on the spot point along their path, so their state space is the plane: a motion is a straight line that
+keeps the clearance of such a hull. In SE(2), with turns at sampled headings, a search took three times as long for
+paths one per cent longer. All legs of a plan share a roadmap, which their ends do not become part of: a path depends on
+its ends and the water only, in whichever order and process it is asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+import scipy
+import shapely
 from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
 from expdesign.conventions import whole_turns
+from expdesign.plan.chart import CHART, Corners, Roadmap, opened, shore_corners, simplified
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.work_budget import WorkBudget
 from expdesign.values import Array
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
-PLANE, DUBINS = "ompl BITstar in R2", "ompl BITstar in Dubins"
-"""What found a path, by its state space."""
+PLANE, CURVE, DUBINS = "ompl PRMstar in R2", "ompl Dubins curve", "ompl BITstar in Dubins"
+"""What finds paths, and in which space."""
 
 Holds = Callable[[Array], bool]
 """(k, 3) poses -> whether the hull may sweep from each to the next."""
+
+
+@lru_cache(maxsize=CHART.kept_graphs)
+def roadmap_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners) -> Roadmap:
+    """A roadmap by PRM* of the water that `visibility_graph_of` takes: its corners, and places drawn between them.
+
+    Corners alone are in sight of few others among their neighbours; they are there because short paths bend at them.
+    Places are counted, not seconds, so the roadmap is the same on any machine.
+    """
+    simple = simplified(water, grow=False, tolerance_m=tolerance_m, corners=corners)
+    bends, open_water = shore_corners(simple)[0], opened(simple)
+    if not len(bends):
+        return Roadmap(water=open_water, corners=bends, lengths=scipy.sparse.csr_matrix((0, 0)))
+    information = _plane(open_water)
+    query, planner = ob.ProblemDefinition(information), og.PRMstar(information)
+    for bend in bends:  # PRM has no other door for places of ours than as starts of a query
+        query.addStartState(_place(information, bend))
+    query.setGoalState(_place(information, bends[0]))
+    planner.setProblemDefinition(query)
+    planner.setup()
+    planner.solve(ob.plannerAlwaysTerminatingCondition())
+    tries = iter(range(LEGS.roadmap_tries))
+    most = planner.milestoneCount() + LEGS.roadmap_places
+    enough = ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= most or next(tries, None) is None)
+    planner.growRoadmapPtc(enough)
+    data = ob.PlannerData(information)
+    planner.getPlannerData(data)
+    count = data.numVertices()
+    places = _places([data.getVertex(k).getState() for k in range(count)])
+    tail, head = np.array([(k, other) for k in range(count) for other in data.getEdges(k)], dtype=int).reshape(-1, 2).T
+    away = np.hypot(*(places[tail] - places[head]).T)
+    return Roadmap(
+        water=open_water,
+        corners=places,
+        lengths=scipy.sparse.coo_matrix((away, (tail, head)), shape=(count, count)).tocsr(),
+    )
+
+
+def shortened(path: Array, water: shapely.MultiPolygon) -> Array:
+    """(k, 2) a path of straight lines through a water, pulled taut by OMPL's shortcuts, long ones first."""
+    information = _plane(water)
+    simplifier, taut = og.PathSimplifier(information), og.PathGeometric(information)
+    for point in path:
+        taut.append(_place(information, point))
+    tries, misses = LEGS.shortcut_tries, LEGS.shortcut_misses
+    simplifier.reduceVertices(taut, tries, misses, 1.0)
+    for share in LEGS.shortcuts:
+        simplifier.partialShortcutPath(taut, tries, misses, share)
+    simplifier.reduceVertices(taut, tries, misses, 1.0)
+    return _places(taut.getStates())
+
+
+def _plane(water: shapely.MultiPolygon) -> ob.SpaceInformation:
+    """The plane, with straight lines through a prepared water for motions, and the same samples every time."""
+    ou.RNG.setSeed(1)
+    space = ob.RealVectorStateSpace(2)
+    west, south, east, north = water.bounds
+    space.setBounds(_bounds((south, west), (north, east)))
+    information = ob.SpaceInformation(space)
+
+    def clear(first: ob.State, last: ob.State) -> bool:
+        line = shapely.linestrings(((first[1], first[0]), (last[1], last[0])))
+        return bool(shapely.covers(water, line))
+
+    information.setStateValidityChecker(lambda state: bool(shapely.intersects_xy(water, state[1], state[0])))
+    information.setMotionValidator(_Motions(information, clear))
+    information.setup()
+    return information
 
 
 def dubins_curve(start: Array, end: Array, *, radius_m: float, spacing_m: float) -> Array:
@@ -49,12 +119,13 @@ def search_dubins(
     high: Array,
     holds: Holds,
     seed: int,
-    budget: WorkBudget | None = None,
 ) -> Array | None:
     """(k, 3) poses along a short Dubins path on which the swept hull is clear, or None when none is found.
 
-    Its motions are checked by the hull they sweep, so every path it returns is clear as a whole, up to the spacing of
-    poses.
+    BIT* is counted in iterations, not seconds, so the same seed gives the same path on any machine. It draws another
+    batch of samples whenever no motion is left to try, and each batch costs more than the one before: a search that
+    draws very many has no way on from one of its ends, and is given up. Its motions are checked by the hull they sweep,
+    so every path it returns is clear as a whole, up to the spacing of poses.
 
     Args:
         start, end: (3,) poses.
@@ -63,133 +134,48 @@ def search_dubins(
         low, high: (2,) north/east box to search.
         holds: check of a whole motion; it is also asked about poses outside the box.
         seed: of the sampler.
-        budget: counts the work.
     """
+    ou.RNG.setSeed(seed)
     space = ob.DubinsStateSpace(radius_m)
     space.setBounds(_bounds(low, high))
 
     def clear(first: ob.State, last: ob.State) -> bool:
         return holds(np.array(_curve(space, first, last, spacing_m)))
 
-    ends = _state(space, start), _state(space, end)
-    slices = (LEGS.search_slices, LEGS.search_iterations, LEGS.improving_slices)
-    path = _search(space, ends, clear, seed=seed, slices=slices, budget=budget)
-    if path is None:
+    setup = og.SimpleSetup(space)
+    information = setup.getSpaceInformation()
+    setup.setStateValidityChecker(lambda state: True)  # every pose of a path ends a motion, which is checked
+    information.setMotionValidator(_Motions(information, clear))
+    setup.setStartAndGoalStates(_state(space, start), _state(space, end))
+    planner = og.BITstar(information)
+    setup.setPlanner(planner)
+    # the planner reports a solution only between calls of solve, so it is called in slices and continues where it was
+    solved = 0
+    for _ in range(LEGS.search_slices):
+        setup.solve(ob.PlannerTerminationCondition(_after(LEGS.search_iterations, planner)))
+        solved += bool(setup.haveExactSolutionPath())
+        if solved > LEGS.improving_slices or _batches(planner) > LEGS.search_batches:
+            break
+    if not solved:
         return None
-    parts = [_curve(space, a, b, spacing_m) for a, b in pairwise(path.getStates())]
+    states = setup.getSolutionPath().getStates()
+    parts = [_curve(space, a, b, spacing_m) for a, b in pairwise(states)]
     return _continuous([parts[0][0], *(row for part in parts for row in part[1:])], start[2])
 
 
-def search_plane(
-    start: Array,
-    end: Array,
-    *,
-    most_m: float,
-    step_m: float,
-    clear: Holds,
-    seed: int,
-    budget: WorkBudget | None = None,
-) -> Array | None:
-    """(k, 2) points of a short path between two points (2,), or None when none is found.
-
-    The axes of the search point along and across the line between the ends, so the path turns with the chart.
-
-    Args:
-        start, end: (2,) north/east.
-        most_m: length of paths to look for at most; the box of the ellipse round them is searched.
-        step_m: by which bends are moved to shorten the path.
-        clear: (2, 2) ends of a straight line -> whether it is clear.
-        seed: of the sampler.
-        budget: counts the work.
-    """
-    space = ob.RealVectorStateSpace(2)
-    away_m = float(np.hypot(*(end - start)))
-    ahead = (end - start) / away_m if away_m > 0 else np.array([1.0, 0.0])
-    axes = np.array([ahead, [-ahead[1], ahead[0]]])
-    spare_m, across_m = max(most_m - away_m, 0.0) / 2, np.sqrt(max(most_m**2 - away_m**2, 0.0)) / 2
-    space.setBounds(_bounds(np.array([-spare_m, -across_m]), np.array([away_m + spare_m, across_m])))
-
-    def points(states: Sequence[ob.State]) -> Array:
-        return np.asarray(start + np.array([[state[0], state[1]] for state in states]) @ axes)
-
-    def straight(first: ob.State, last: ob.State) -> bool:
-        return clear(points((first, last)))
-
-    ends = _point(space, np.zeros(2)), _point(space, np.array([away_m, 0.0]))
-    slices = (LEGS.plane_slices, LEGS.plane_iterations, LEGS.plane_slices)
-    path = _search(space, ends, straight, seed=seed, slices=slices, budget=budget, step_m=step_m)
-    return None if path is None else points(path.getStates())
-
-
-def _search(
-    space: ob.StateSpace,
-    ends: tuple[ob.State, ob.State],
-    clear: Callable[[ob.State, ob.State], bool],
-    *,
-    seed: int,
-    slices: tuple[int, int, int],
-    budget: WorkBudget | None,
-    step_m: float = 0.0,
-) -> og.PathGeometric | None:
-    """A path by BIT*, pulled taut, its bends moved by `step_m` if that is not zero; or None.
-
-    BIT* is counted in iterations, not seconds, so the same seed gives the same path on any machine. It draws another
-    batch of samples whenever no motion is left to try, and each batch costs more than the one before: a search that
-    draws very many has no way on from one of its ends, and is given up. The planner reports a solution only between
-    calls of solve, so it is called in slices and continues where it was: so many, of so many iterations, and so many
-    more after the first solution.
-    """
-    ou.RNG.setSeed(seed)
-    setup = og.SimpleSetup(space)
-    information = setup.getSpaceInformation()
-    setup.setStateValidityChecker(lambda state: True)  # every state of a path ends a motion, which is checked
-    motions = _Motions(information, clear)
-    information.setMotionValidator(motions)
-    setup.setStartAndGoalStates(*ends)
-    planner = og.BITstar(information)
-    setup.setPlanner(planner)
-    most, iterations, improving = slices
-    solved = 0
-    for _ in range(most):
-        setup.solve(ob.PlannerTerminationCondition(_after(iterations, planner)))
-        solved += bool(setup.haveExactSolutionPath())
-        if solved > improving or _batches(planner) > LEGS.search_batches:
-            break
-    path = setup.getSolutionPath() if solved else None
-    if path is not None:
-        _shorten(og.PathSimplifier(information), path, step_m)
-    if budget is not None:
-        budget.searched(motions.checked)
-    return path
-
-
-def _shorten(simplifier: og.PathSimplifier, path: og.PathGeometric, step_m: float) -> None:
-    """Pull a path taut: shortcuts, long ones first, bends moved, and bends left out that are not needed."""
-    tries = LEGS.shortcut_tries if step_m else LEGS.curve_tries
-    misses = int(LEGS.shortcut_misses * tries)
-    simplifier.reduceVertices(path, tries, misses, 1.0)
-    for _ in range(LEGS.shortening_rounds):
-        for share in LEGS.shortcuts:
-            simplifier.partialShortcutPath(path, tries, misses, share)
-        if step_m:
-            simplifier.perturbPath(path, step_m, tries, misses)
-        simplifier.reduceVertices(path, tries, misses, LEGS.shortcuts[-2])
-
-
 class _Motions(ob.MotionValidator):  # type: ignore[misc]
-    """Motions that are valid as a whole; OMPL calls this class instead of checking points."""
+    """Motions that are clear as a whole; OMPL calls this class instead of checking points."""
 
     def __init__(self, information: ob.SpaceInformation, clear: Callable[[ob.State, ob.State], bool]) -> None:
         super().__init__(information)
-        self._clear, self.checked = clear, 0
+        self._clear = clear
 
     def checkMotion(self, first: ob.State, last: ob.State, *_: object) -> bool:  # noqa: N802
         """Whether the motion from one state to another is clear."""
-        self.checked += 1
         return self._clear(first, last)
 
 
-def _bounds(low: Array, high: Array) -> ob.RealVectorBounds:
+def _bounds(low: Sequence[float] | Array, high: Sequence[float] | Array) -> ob.RealVectorBounds:
     bounds = ob.RealVectorBounds(2)
     for axis in range(2):
         bounds.setLow(axis, float(low[axis]))
@@ -197,10 +183,15 @@ def _bounds(low: Array, high: Array) -> ob.RealVectorBounds:
     return bounds
 
 
-def _point(space: ob.RealVectorStateSpace, point: Array) -> ob.State:
-    state = space.allocState()
+def _place(information: ob.SpaceInformation, point: Array) -> ob.State:
+    state = information.getStateSpace().allocState()
     state[0], state[1] = map(float, point)
     return state
+
+
+def _places(states: Sequence[ob.State]) -> Array:
+    """(k, 2) of states in the plane."""
+    return np.array([(state[0], state[1]) for state in states])
 
 
 def _curve(

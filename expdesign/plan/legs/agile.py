@@ -53,14 +53,12 @@ class Line:
 
 def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> FoundLeg | None:
     """From one state to the other, or None."""
-    for path in water.candidate_paths(task.start[:2], task.end[:2], task):
+    for path in water.candidate_paths(task.start[:2], task.end[:2]):
         line = _line(water, path.points)
         first_m, last_m = _end_lengths(task, water, ship, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
         brief_m = LEGS.whole_samples * water.vessel.sample_time_s * water.ship.transit_speed_mps
-        whole = short or (
-            len(path.points) == 2 and line.length_m < brief_m
-        )  # loses less time, where it is small enough
+        whole = short or (len(path.points) == 2 and line.length_m < brief_m)  # loses less time, where it is small
         values = _optimised(task, water, ship, line) if whole else None
         if values is None and not short:
             values = _in_parts(task, water, ship, line, first_m, last_m)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.plan.control import Capability
-from expdesign.plan.legs._ompl import DUBINS, dubins_curve, search_dubins
+from expdesign.plan.legs._ompl import CURVE, DUBINS, dubins_curve, search_dubins
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.tuning import LEGS
@@ -39,7 +39,7 @@ def find_path(task: LegTask, water: LegWater) -> LegPath | None:
     radius, spacing = water.ship.turning_radius_m, water.vessel.length_m / 6
     direct = dubins_curve(task.start[:3], task.end[:3], radius_m=radius, spacing_m=spacing)
     if water.holds(direct):
-        return LegPath(points=direct, source="dubins curve")
+        return LegPath(points=direct, source=CURVE)
     if not all(water.holds(end) for end in (direct[:1], direct[-1:])):  # then no path does
         return None
     for attempt, reach in enumerate(LEGS.search_boxes):
@@ -53,7 +53,6 @@ def find_path(task: LegTask, water: LegWater) -> LegPath | None:
             high=np.maximum(task.start, task.end)[:2] + box,
             holds=water.holds,
             seed=task.seed + 7919 * attempt,
-            budget=task.budget,
         )
         if path is not None and water.holds(path):
             return LegPath(points=path, source=DUBINS)

@@ -16,14 +16,9 @@ class Tuning:
             at most.
         search_batches: batches of samples after which it gives up.
         improving_slices: spent on a shorter path after the first solution.
-        plane_slices: of `plane_iterations` iterations each, of a search in the plane.
-        plane_reach: length of paths looked for there at most, in the shortest of the visibility graph.
-        plane_detour: length of paths taken, in the same.
-        plane_tries: searches with other samples until one is found.
-        shortcuts: shares of the path that shortcuts span, tried one after the other; `shortcut_tries` of each at most,
-            `curve_tries` on curves, and no more than the share `shortcut_misses` of them without a gain.
-        shortening_rounds: of these, and of moved bends.
-        inside_m: distance from the shore of points moved into the water.
+        roadmap_places: drawn for a roadmap besides the shores' corners, in `roadmap_tries` tries at most.
+        shortcuts: shares of a path that shortcuts span, tried one after the other, `shortcut_tries` of each at
+            most, and no more after `shortcut_misses` without a gain.
         corridor_hulls: width of corridors to either side at most, in hull lengths.
         memory_time_constants: after which a lagging actuator has forgotten: two parts in a thousand million are left.
         arrival: largest miss of a leg's end state, in hull lengths, and in transit speeds.
@@ -65,17 +60,11 @@ class Tuning:
     search_slices: int = 4
     search_batches: int = 100
     improving_slices: int = 1
-    plane_slices: int = 6
-    plane_iterations: int = 3000
-    plane_reach: float = 1.2
-    plane_detour: float = 1.01
-    plane_tries: int = 3
+    roadmap_places: int = 500
+    roadmap_tries: int = 50_000
     shortcuts: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03)
-    shortcut_tries: int = 1000
-    curve_tries: int = 100
-    shortcut_misses: float = 0.3
-    shortening_rounds: int = 2
-    inside_m: float = 1e-3
+    shortcut_tries: int = 200
+    shortcut_misses: int = 60
     corridor_hulls: float = 3.0
     memory_time_constants: float = 20.0
     arrival: float = 1e-3

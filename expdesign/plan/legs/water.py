@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import shapely
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.chart import CHART, ClearanceField, Corners, VisibilityGraph, polyline_length, visibility_graph_of
+from expdesign.plan.chart import (
+    CHART,
+    ClearanceField,
+    Corners,
+    VisibilityGraph,
+    polyline_length,
+    visibility_graph_of,
+)
 from expdesign.plan.control import Capability
-from expdesign.plan.legs._ompl import PLANE, search_plane
+from expdesign.plan.legs._ompl import PLANE, roadmap_of, shortened
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.values import PathsName, PlanSettings
 from expdesign.plan.work_budget import WorkBudget
@@ -66,7 +73,7 @@ class LegPath:
 
     Attributes:
         points: (k, 2) north/east, or (k, 3) with courses.
-        source: what found it, in words for plan.json: "straight", "visibility graph", "ompl BITstar in R2", ...
+        source: what found it, in words for plan.json: "straight", "visibility graph", "ompl PRMstar in R2", ...
     """
 
     points: Array
@@ -85,12 +92,10 @@ class FoundLeg:
     Attributes:
         commands: (k, m); the last azimuths without angle limits may differ from the task's by whole turns.
         source: as `LegPath`.
-        searches: of OMPL for it, where they are counted.
     """
 
     commands: Array
     source: str
-    searches: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +130,7 @@ class LegWater:
     def __setstate__(self, state: dict[str, object]) -> None:
         """Prepare the shapes again, which is lost between processes."""
         self.__dict__.update(state)
-        for name in ("safe", "_open", "_centre_waters"):
+        for name in ("safe", "_open"):
             if name in state:
                 shapely.prepare(state[name])
 
@@ -136,23 +141,23 @@ class LegWater:
         return (self.clearance_m + float(swing_m)) * ROUND
 
     @cached_property
-    def _centre_waters(self) -> tuple[shapely.MultiPolygon, ...]:
+    def centre_waters(self) -> tuple[shapely.MultiPolygon, ...]:
         """For the centre lines of hulls that point along their path, from wide to narrow margins."""
         spares = self.ship.path_spares_m(self.vessel)
-        waters = tuple(self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares)
-        shapely.prepare(waters)
-        return waters
+        return tuple(self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares)
 
     @cached_property
-    def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
-        """Of these waters, from wide to narrow margins."""
-        tolerance_m = self.vessel.length_m / 60
-        return tuple(visibility_graph_of(water, tolerance_m, self.corners) for water in self._centre_waters)
-
-    @property
     def narrowest_graph(self) -> VisibilityGraph:
         """Of all the water that centre lines may use."""
-        return self.visibility_graphs[-1]
+        return self._graph(self.centre_waters[-1])
+
+    def _graph(self, water: shapely.MultiPolygon) -> VisibilityGraph:
+        return visibility_graph_of(water, self.tolerance_m, self.corners)
+
+    @property
+    def tolerance_m(self) -> float:
+        """By which shores are moved, at first, so that they have fewer corners."""
+        return self.vessel.length_m / 60
 
     @property
     def straight_margin_m(self) -> float:
@@ -167,56 +172,39 @@ class LegWater:
     def joins(self, start: Array, end: Array) -> bool:
         """Whether a path leads from one point (2,) to another."""
         return self._straight(start, end) or any(
-            graph.shortest(start, end) is not None for graph in self.visibility_graphs
+            self._graph(water).shortest(start, end) is not None for water in reversed(self.centre_waters)
         )
 
-    def candidate_paths(self, start: Array, end: Array, task: LegTask) -> Iterator[LegPath]:
+    def candidate_paths(self, start: Array, end: Array) -> Iterator[LegPath]:
         """Paths between two points (2,), shortest first; of similar lengths the one farther from the shore first.
 
-        Only the straight line where a hull may go straight; none where the points are not connected. Else the shortest
-        paths of the visibility graphs tell the order and bound the length; with `paths` "ompl" they are searched for.
+        Only the straight line where a hull may go straight; none where the points are not connected.
         """
         if self._straight(start, end):
             yield LegPath(points=np.stack([start, end]), source="straight")
             return
-        known: list[tuple[LegPath, shapely.MultiPolygon]] = []
-        for graph, water in zip(self.visibility_graphs, self._centre_waters, strict=True):
-            if (points := graph.shortest(start, end)) is not None:
-                known.append((LegPath(points=points, source="visibility graph"), water))
-        for path, water in sorted(known, key=lambda item: np.ceil(item[0].length_m / (2 * self.vessel.length_m))):
-            yield self._searched(path, water, task) if self.paths == "ompl" else path
+        shortest = self.narrowest_graph.shortest(start, end)
+        least = 0.0 if shortest is None else self._rank(polyline_length(shortest))
+        longer: list[LegPath] = []
+        for path in filter(None, (self._path(water, start, end) for water in self.centre_waters)):
+            if self._rank(path.length_m) <= least:  # no other is shorter, so that those need not be found
+                yield path
+            else:
+                longer.append(path)
+        yield from sorted(longer, key=lambda path: self._rank(path.length_m))
 
-    def _searched(self, shortest: LegPath, water: shapely.MultiPolygon, task: LegTask) -> LegPath:
-        """A path by OMPL in some water, or the shortest where none is found that is nearly as short.
+    def _rank(self, length_m: float) -> float:
+        """Equal for paths of similar lengths."""
+        return float(np.ceil(length_m / (2 * self.vessel.length_m)))
 
-        Args:
-            shortest: gives the ends; they are joined to the nearest points of the water by straight lines.
-            water: of the centre lines.
-            task: gives the seed, and counts the work.
-        """
-        start, end = shortest.points[[0, -1]]
-        inside = np.array([_nearest(water, point) for point in (start, end)])
-        most_m = LEGS.plane_detour * shortest.length_m
-
-        def clear(line: Array) -> bool:
-            return bool(shapely.contains_properly(water, shapely.linestrings(line[:, ::-1])))
-
-        for attempt in range(LEGS.plane_tries):
-            path = search_plane(
-                *inside,
-                most_m=LEGS.plane_reach * shortest.length_m,
-                step_m=self.vessel.length_m / 2,
-                clear=clear,
-                seed=task.seed + 7919 * attempt,
-                budget=task.budget,
-            )
-            if path is None or not clear(path):
-                continue
-            points = np.array([start, *path, end])
-            found = LegPath(points=points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-9]], source=PLANE)
-            if found.length_m <= most_m:
-                return found
-        return replace(shortest, source=f"{shortest.source}, as OMPL found no path as short")
+    def _path(self, water: shapely.MultiPolygon, start: Array, end: Array) -> LegPath | None:
+        """A short path through a water; by the visibility graph where the roadmap has none."""
+        if self.paths == "ompl":
+            roadmap = roadmap_of(water, self.tolerance_m, self.corners)
+            if (points := roadmap.shortest(start, end)) is not None:
+                return LegPath(points=shortened(points, roadmap.water), source=PLANE)
+        points = self._graph(water).shortest(start, end)
+        return None if points is None else LegPath(points=points, source="visibility graph")
 
     def _straight(self, start: Array, end: Array) -> bool:
         """Whether a hull may go straight from one point (2,) to another."""
@@ -301,15 +289,6 @@ class LegWater:
         sample_s = self.vessel.sample_time_s
         values = delivered_at_samples(self.vessel.responses, before, sample_time_s=sample_s, standing=before[0])
         return np.asarray(values[-1])
-
-
-def _nearest(water: shapely.MultiPolygon, point: Array) -> Array:
-    """The point (2,) itself inside the water, else one just inside, near it."""
-    here = shapely.Point(point[1], point[0])
-    if shapely.contains_properly(water, here):
-        return point
-    there = shapely.get_coordinates(shapely.shortest_line(shapely.buffer(water, -LEGS.inside_m), here))[0]
-    return np.array([there[1], there[0]])
 
 
 def last_state(track: Trajectory) -> Array:
