@@ -68,11 +68,10 @@ class Roadmap:
         tails, heads = [rows, columns], [columns, rows]
         for k, point in enumerate((start, end)):
             seen = self.sees(point, nodes)
+            seen = seen[seen < n + k]  # the ends see each other once
             tails += [np.full(len(seen), n + k), seen]
             heads += [seen, np.full(len(seen), n + k)]
         tail, head = np.concatenate(tails), np.concatenate(heads)
-        once = np.unique(tail * (n + 2) + head)  # the ends may see each other twice
-        tail, head = once // (n + 2), once % (n + 2)
         data = cost(nodes[head] - nodes[tail]) + 1e-12
         graph = scipy.sparse.coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
         least, before = scipy.sparse.csgraph.dijkstra(graph, indices=n, return_predecessors=True)

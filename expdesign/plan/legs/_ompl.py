@@ -62,7 +62,8 @@ def roadmap_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners
     planner.getPlannerData(data)
     count = data.numVertices()
     places = _places([data.getVertex(k).getState() for k in range(count)])
-    tail, head = np.array([(k, other) for k in range(count) for other in data.getEdges(k)], dtype=int).reshape(-1, 2).T
+    pairs = [(k, other) for k in range(count) for other in data.getEdges(k) if other > k]  # listed in both directions
+    tail, head = np.array(pairs, dtype=int).reshape(-1, 2).T
     away = np.hypot(*(places[tail] - places[head]).T)
     return Roadmap(
         water=open_water,
