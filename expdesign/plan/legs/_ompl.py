@@ -5,7 +5,8 @@ OMPL's (x, y, yaw) are taken as (north, east, heading): both turn from the first
 Ships that turn on the spot point along their path, so their state space is the plane: a motion is a straight line that
 keeps the clearance of such a hull. In SE(2), with turns at sampled headings, a search took three times as long for
 paths one per cent longer. All legs of a plan share a roadmap, which their ends do not become part of: a path depends on
-its ends and the water only, in whichever order and process it is asked for.
+its ends and the water only, in whichever order and process it is asked for. Ships with a radius of turn sail Dubins
+curves, and search with BIT* where the shortest is not clear: roadmaps ignore that motions have a direction.
 """
 
 from __future__ import annotations
@@ -37,18 +38,34 @@ Holds = Callable[[Array], bool]
 
 @lru_cache(maxsize=CHART.kept_graphs)
 def roadmap_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners) -> Roadmap:
-    """A roadmap by PRM* of the water that `visibility_graph_of` takes: its corners, and places drawn between them.
+    """A roadmap by PRM* of the water that `visibility_graph_of` takes.
 
-    Corners alone are in sight of few others among their neighbours; they are there because short paths bend at them.
-    Places are counted, not seconds, so the roadmap is the same on any machine.
+    It grows with n log n of the corners, the graph with their square: with 750 corners it takes 0.45 s and the graph
+    0.13 s, with 4,500 3 s and 10 s. Its paths, pulled taut, are mostly the shortest: between random places of seven
+    charts at most 0.8 % longer.
     """
     simple = simplified(water, grow=False, tolerance_m=tolerance_m, corners=corners)
-    bends, open_water = shore_corners(simple)[0], opened(simple)
+    bends, wet = shore_corners(simple)[0], opened(simple)
     if not len(bends):
-        return Roadmap(water=open_water, corners=bends, lengths=scipy.sparse.csr_matrix((0, 0)))
-    information = _plane(open_water)
+        return Roadmap(water=wet, corners=bends, lengths=scipy.sparse.csr_matrix((0, 0)))
+    data = _roadmap_data(_plane(wet), bends)
+    count = data.numVertices()
+    places = _places([data.getVertex(k).getState() for k in range(count)])
+    pairs = [(k, other) for k in range(count) for other in data.getEdges(k) if other > k]  # listed in both directions
+    tail, head = np.array(pairs, dtype=int).reshape(-1, 2).T
+    away = np.hypot(*(places[tail] - places[head]).T)
+    lengths = scipy.sparse.coo_matrix((away, (tail, head)), shape=(count, count)).tocsr()
+    return Roadmap(water=wet, corners=places, lengths=lengths)
+
+
+def _roadmap_data(information: ob.SpaceInformation, bends: Array) -> ob.PlannerData:
+    """Places that PRM* joined to their neighbours: corners (n, 2), where short paths bend, and some that it draws.
+
+    Neighbours of a corner are mostly on its own shore, so that paths over corners alone were up to 8 % longer than the
+    shortest; over drawn places alone up to 25 %. Places are counted, not seconds: a roadmap is the same on any machine.
+    """
     query, planner = ob.ProblemDefinition(information), og.PRMstar(information)
-    for bend in bends:  # PRM has no other door for places of ours than as starts of a query
+    for bend in bends:  # PRM takes given places only as starts and goals of a query
         query.addStartState(_place(information, bend))
     query.setGoalState(_place(information, bends[0]))
     planner.setProblemDefinition(query)
@@ -60,16 +77,8 @@ def roadmap_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners
     planner.growRoadmapPtc(enough)
     data = ob.PlannerData(information)
     planner.getPlannerData(data)
-    count = data.numVertices()
-    places = _places([data.getVertex(k).getState() for k in range(count)])
-    pairs = [(k, other) for k in range(count) for other in data.getEdges(k) if other > k]  # listed in both directions
-    tail, head = np.array(pairs, dtype=int).reshape(-1, 2).T
-    away = np.hypot(*(places[tail] - places[head]).T)
-    return Roadmap(
-        water=open_water,
-        corners=places,
-        lengths=scipy.sparse.coo_matrix((away, (tail, head)), shape=(count, count)).tocsr(),
-    )
+    data.decoupleFromPlanner()  # whose states would go with it
+    return data
 
 
 def shortened(path: Array, water: shapely.MultiPolygon) -> Array:
