@@ -48,6 +48,8 @@ def test_paths_are_clear_and_hardly_longer_than_the_shortest(seed: int) -> None:
     for path in found:
         assert np.array_equal(path.points[[0, -1]], ENDS)
         assert any(shapely.covers(safe, shapely.LineString(path.points[:, ::-1])) for safe in exact)
+    ranks = [np.ceil(path.length_m / (2 * water.vessel.length_m)) for path in found]
+    assert ranks == sorted(ranks)
     shortest = [path.length_m for path in paths(replace(water, paths="visibility"), ENDS)]
     assert np.allclose([path.length_m for path in found], shortest, rtol=0.01)
 
