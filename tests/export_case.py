@@ -112,7 +112,8 @@ def _commands_and_legs() -> tuple[Commands, tuple[Leg, ...]]:
     def add(kind: str, name: str, values: np.ndarray) -> None:
         first = legs[-1].last if legs else 0
         pieces.append(values)
-        legs.append(Leg(kind=kind, name=name, first=first, last=first + len(values)))
+        path = {"path": "straight"} if kind == "reposition" else {}
+        legs.append(Leg(kind=kind, name=name, first=first, last=first + len(values), **path))
 
     for number, name in enumerate((*runs(), "rest")):
         entry = by_name[name].entry_velocity if name in by_name else np.zeros(3)

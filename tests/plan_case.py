@@ -82,7 +82,8 @@ def leg_water(water: shapely.Geometry, *, clearance_m: float = 20.0) -> LegWater
 
 def find_leg(task: LegTask, water: LegWater) -> np.ndarray | None:
     """Commands of the ship's own local planner."""
-    return local_planner(water).leg(task, water)
+    found = local_planner(water).leg(task, water)
+    return None if found is None else found.commands
 
 
 def space_of(sea: LegWater, run: Primitive, goal: np.ndarray) -> SearchSpace:

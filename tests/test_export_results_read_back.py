@@ -91,6 +91,7 @@ def test_times_in_the_plan_add_up() -> None:
     legs = file["legs"]
     assert [leg["index"] for leg in legs] == list(range(len(legs)))
     assert all(one["end"] == two["start"] for one, two in pairwise(legs))
+    assert all(("path" in leg) == (leg["kind"] == "reposition") for leg in legs)
     for kind, total in (("primitive", "informative_s"), ("reposition", "reposition_s")):
         assert sum(leg["duration_s"] for leg in legs if leg["kind"] == kind) == pytest.approx(file[total])
     assert file["verified"] is True

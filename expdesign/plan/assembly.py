@@ -168,6 +168,7 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
         corners=CHART.corners if finer == 1.0 else CHART.more_corners,
+        paths=problem.settings.paths,
     )
 
 
@@ -191,7 +192,7 @@ def search_space(
     if lacking is not None and narrowest_passage(water.field, *ends)[0] > runs.leg_margin_m:
         raise lacking
     goal_distance = goal_distance or build_goal_distance(water.narrowest_graph, water.field, problem.goal[:2])
-    if goal_distance is None or not water.candidate_paths(*ends):
+    if goal_distance is None or not water.joins(*ends):
         raise _no_path(problem, water.field, runs.leg_margin_m)
     if lacking is not None:
         raise lacking

@@ -24,11 +24,13 @@ class LegAhead:
     Attributes:
         task: as it was expected.
         commands: (k, m), or None where there is no leg.
+        source: what found its path.
         spent_s: work that it took.
     """
 
     task: LegTask
     commands: Array | None
+    source: str
     spent_s: float
 
     def fitted(self, task: LegTask, water: LegWater) -> Array | None:
@@ -74,5 +76,10 @@ def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead
 
 
 def _found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
-    commands = planner.leg(task, water)
-    return LegAhead(task=task, commands=commands, spent_s=task.budget.spent_s)
+    leg = planner.leg(task, water)
+    return LegAhead(
+        task=task,
+        commands=None if leg is None else leg.commands,
+        source="" if leg is None else leg.source,
+        spent_s=task.budget.spent_s,
+    )

@@ -12,7 +12,7 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import PlanRoom, phases_of
-from expdesign.plan.legs import LegTask, LegWater, last_state, nearest_turns
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater, last_state, nearest_turns
 from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead, remember
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
@@ -207,26 +207,29 @@ class _Voyage:
         water, line, primitive = self.water, self.line, self._primitive(placement)
         lat, lon = self.problem.area.frame.to_degrees(placement.pose[:2])
         where = f"{primitive.name!r} near {lat:.5f}, {lon:.5f}"
-        leg = self._leg(self._entry(placement, primitive), primitive.entry_inputs, ahead)
-        if leg is None:
+        found = self._leg(self._entry(placement, primitive), primitive.entry_inputs, ahead)
+        if found is None:
             return f"no leg leads to {where}"
+        leg = found.commands
         track = water.sail(line.state, leg, line.given)
         turned = nearest_turns(self.problem.vessel, primitive.entry_inputs, leg[-1]) - primitive.entry_inputs
         values = primitive.commands.values + turned
         run = water.sail(last_state(track), values, water.remembered(np.concatenate([line.given, leg])))
         if not self.stated.holds(run.pose):
             return f"the run {where} leaves safe water"
-        line.sail("reposition", primitive.name, leg, track)
+        line.sail("reposition", primitive.name, leg, track, found.source)
         line.sail("primitive", primitive.name, values, run)
         self.placed.append(placement)
         return ""
 
     def sail_home(self, ahead: LegAhead) -> bool:
         """Sail the last leg; False where none is found."""
-        leg = self._leg(*self._stop, ahead)
-        if leg is not None:
-            self.line.sail("reposition", GOAL, leg, self.water.sail(self.line.state, leg, self.line.given))
-        return leg is not None
+        found = self._leg(*self._stop, ahead)
+        if found is None:
+            return False
+        track = self.water.sail(self.line.state, found.commands, self.line.given)
+        self.line.sail("reposition", GOAL, found.commands, track, found.source)
+        return True
 
     def undo_run(self) -> Placement:
         """Remove the last run and the leg to it; where the run began."""
@@ -235,8 +238,8 @@ class _Voyage:
         self.placed.pop()
         return self.line.undo_run()
 
-    def _leg(self, end: Array, end_inputs: Array, ahead: LegAhead) -> Array | None:
-        """Commands (k, m) from where the timeline ends, or None: those found ahead, where they arrive from there."""
+    def _leg(self, end: Array, end_inputs: Array, ahead: LegAhead) -> FoundLeg | None:
+        """From where the timeline ends, or None: that found ahead, where it arrives from there."""
         self.budget.spent_s += ahead.spent_s
         remember(self.known, ahead)
         if ahead.commands is None:
@@ -244,10 +247,10 @@ class _Voyage:
         task = self._task(*self._now, end, end_inputs, stretches=0)
         leg = ahead.fitted(task, self.water)
         if leg is None:
-            found = leg_found(self.planner, self.water, task)
-            leg = found.commands
-            self.budget.spent_s += found.spent_s
-        return np.concatenate([self._wait, leg]) if leg is not None else None
+            ahead = leg_found(self.planner, self.water, task)
+            leg = ahead.commands
+            self.budget.spent_s += ahead.spent_s
+        return FoundLeg(commands=np.concatenate([self._wait, leg]), source=ahead.source) if leg is not None else None
 
     def _task(
         self, start: Array, start_inputs: Array, given: Array, end: Array, end_inputs: Array, *, stretches: int

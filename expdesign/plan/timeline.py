@@ -13,12 +13,13 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedStretch:
-    """A leg with its commands (k, m) and states (k + 1, 6)."""
+    """A leg with its commands (k, m) and states (k + 1, 6), and what found its path."""
 
     kind: str
     name: str
     commands: Array
     states: Array
+    path: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,10 +56,10 @@ class Timeline:
         """Name of the stretch sailed last, or ""."""
         return self.stretches[-1].name if self.stretches else ""
 
-    def sail(self, kind: str, name: str, commands: Array, track: Trajectory) -> None:
+    def sail(self, kind: str, name: str, commands: Array, track: Trajectory, path: str = "") -> None:
         """Add a stretch."""
         states = np.hstack([track.pose, track.velocity])
-        self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states))
+        self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states, path=path))
 
     def undo_run(self) -> Placement:
         """Remove the last run and the leg to it; where the run began."""
@@ -72,7 +73,13 @@ class Timeline:
         states = np.concatenate([self.begin[None], *(stretch.states[1:] for stretch in self.stretches)])
         ends = np.cumsum([len(stretch.commands) for stretch in self.stretches]).tolist()
         legs = tuple(
-            Leg(kind=stretch.kind, name=stretch.name, first=end - len(stretch.commands), last=end)
+            Leg(
+                kind=stretch.kind,
+                name=stretch.name,
+                first=end - len(stretch.commands),
+                last=end,
+                path=stretch.path,
+            )
             for stretch, end in zip(self.stretches, ends, strict=True)
         )
         commands = Commands(sample_time_s=sample_time_s, names=names, values=values)

@@ -13,6 +13,7 @@ from expdesign.values import Array, seal
 
 PlannerName = Literal["beam", "lattice"]
 DRAFT = "a DRAFT: the nominal ship keeps to allowed water, no trials were drawn, and nobody may sail it"
+PathsName = Literal["ompl", "visibility"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,7 @@ class PlanSettings:
         planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.
         lattice_spacing_m: distance between the cells of the lattice planner, or None for one that suits the ship.
         draft: whether one placing of the runs and the check of the nominal track are enough; no key of a file.
+        paths: what finds the paths of legs that bend, of ships that turn on the spot: OMPL, or the visibility graph.
     """
 
     clearance_m: float = 20.0
@@ -43,6 +45,7 @@ class PlanSettings:
     planner: PlannerName = "beam"
     lattice_spacing_m: float | None = None
     draft: bool = False
+    paths: PathsName = "ompl"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,12 +73,14 @@ class Leg:
         name: of the primitive, or what the repositioning leads to.
         first: index of its first command; the trajectory sample of the same index is its start state.
         last: index of the trajectory sample at its end, which is the next leg's first.
+        path: where the path of a repositioning leg comes from, as `expdesign.plan.legs.LegPath`; "" where unknown.
     """
 
     kind: str
     name: str
     first: int
     last: int
+    path: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

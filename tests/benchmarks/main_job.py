@@ -16,7 +16,8 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections import defaultdict
+import time
+from collections import Counter, defaultdict
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
@@ -38,19 +39,23 @@ class MainJob:
         phase_s: processor seconds of each phase.
         peak_mib: memory of the largest process.
         summary: key numbers of the plan.
+        paths: legs by what found their path.
         together_mib: memory of all processes when it was largest.
+        wall_s: seconds that it took.
     """
 
     phase_s: dict[str, float]
     peak_mib: float
     summary: dict[str, float]
+    paths: dict[str, int]
     together_mib: float = 0.0
+    wall_s: float = 0.0
 
 
 def main_job(scenario: Path) -> MainJob:
     """A scenario run by a fresh process."""
     command = [sys.executable, __file__, "--measure", str(scenario)]
-    together_mib = 0.0
+    together_mib, begun_s = 0.0, time.monotonic()
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         while True:
             try:
@@ -60,7 +65,7 @@ def main_job(scenario: Path) -> MainJob:
                 together_mib = max(together_mib, memory_mib(process.pid))
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, command)
-    return replace(MainJob(**json.loads(output)), together_mib=together_mib)
+    return replace(MainJob(**json.loads(output)), together_mib=together_mib, wall_s=time.monotonic() - begun_s)
 
 
 def measured(scenario: Path) -> MainJob:
@@ -85,8 +90,10 @@ def measured(scenario: Path) -> MainJob:
         reach("design")
         outcome = run(scenario, Path(folder), jobs=0, cache=False, progress=progress)
         reach("files")
+        legs = json.loads((Path(folder) / "plan.json").read_text("utf-8"))["legs"]
+    paths = Counter(leg["path"] for leg in legs if "path" in leg)
     usage = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary))
+    return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary), paths=paths)
 
 
 def processor_s(process: int) -> float:

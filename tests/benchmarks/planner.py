@@ -8,20 +8,26 @@ with its proved bound and the share of it that the plan takes. What the plans co
 With ``--charts FOLDER`` two real charts with depths are planned on instead, those of them that the folder holds: half
 an hour of trials of the 30 m ship, 2.5 m draught, through the sounds of Alesund (`aalesund.geojson`) and out of
 Commencement Bay (the S-57 cell `US5WA22M.000`).
+
+With ``--paths`` every scenario is planned by OMPL and by the visibility graph, one after the other: repositioning and
+its bound, probability of leaving the water, least clearance, day, wall and processor seconds, and what found the paths.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 from expdesign import workflows
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import leg_water, search_space, ship_on_legs
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.search.lattice_search import LatticeSearch
+from expdesign.plan.values import PathsName
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
 from main_job import SCENARIOS, main_job
@@ -102,18 +108,38 @@ def row(scenario: Path) -> str:
     )
 
 
+def path_rows(scenario: Path) -> Iterator[str]:
+    """A line for each value of the key `plan.paths`."""
+    for way in get_args(PathsName):
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(shutil.copytree(scenario.parent, Path(folder) / "scenarios")) / scenario.name
+            copy.write_text(scenario.read_text("utf-8").replace("[plan]\n", f'[plan]\npaths = "{way}"\n'), "utf-8")
+            job = main_job(copy)
+        facts = job.summary
+        found = ", ".join(f"{count} {source}" for source, count in sorted(job.paths.items()))
+        yield (
+            f"| {scenario.stem} | {way} | {facts['repositioning_s']:.0f} ({facts['repositioning_bound_s']:.0f}) s "
+            f"| {facts['leave_water_probability']:.3f} | {facts['least_clearance_m']:.1f} m "
+            f"| {facts['informative_s'] + facts['repositioning_s']:.0f} s | {job.wall_s:.0f} s "
+            f"| {sum(job.phase_s.values()):.1f} s | {found} |"
+        )
+
+
+PATHS = ("scenario", "paths", "repositioning (bound)", "leaves", "clearance", "day", "wall", "processor", "found by")
+PLANS = ("scenario", "verified", "clearance", "repositioning", "bound", "ratio", "of informative", "lattice (bound)",
+         "of lattice")  # fmt: skip
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenarios", nargs="*", type=Path)
     parser.add_argument("--charts", type=Path)
+    parser.add_argument("--paths", action="store_true")
     wished = parser.parse_args()
     examples = [] if wished.charts else sorted(SCENARIOS.glob("*.toml"))
-    print(
-        "| scenario | verified | clearance | repositioning | bound | ratio | of informative | lattice (bound) "
-        "| of lattice |"
-    )
+    print("|", " | ".join(PATHS if wished.paths else PLANS), "|")
     print("|---" * 9 + "|")
     with tempfile.TemporaryDirectory() as written:
         extra = [] if wished.charts is None else list(charted(wished.charts, Path(written)))
         for scenario in [*(wished.scenarios or examples), *extra]:
-            print(row(scenario), flush=True)
+            for line in path_rows(scenario) if wished.paths else [row(scenario)]:
+                print(line, flush=True)

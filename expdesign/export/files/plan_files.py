@@ -173,6 +173,7 @@ def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
         "start": _state(plan, leg.first),
         "end": _state(plan, leg.last),
         "duration_s": sample_seconds(leg.last - leg.first, plan.commands.sample_time_s),
+        **({"path": leg.path} if leg.path else {}),
         **_sailed_entry(plan, index),
     }
 

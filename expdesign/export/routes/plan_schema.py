@@ -65,6 +65,7 @@ class _Leg(_Entry):
     index: int
     kind: Literal["primitive", "reposition"]
     name: str
+    path: str = ""
     start: _State
     end: _State
 

@@ -118,7 +118,7 @@ def _legs(path: Path, file: PlanFile) -> tuple[Leg, ...]:
             raise FileError(path, f"{key}.start.time_s", f"is {entry.start.time_s:g}, expected {begins:g}")
         if last <= first:
             raise FileError(path, f"{key}.end.time_s", f"is {entry.end.time_s:g}, expected a time after the start")
-        legs.append(Leg(kind=entry.kind, name=entry.name, first=first, last=last))
+        legs.append(Leg(kind=entry.kind, name=entry.name, first=first, last=last, path=entry.path))
     return tuple(legs)
 
 

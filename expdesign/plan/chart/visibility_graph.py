@@ -25,19 +25,17 @@ Corners = tuple[tuple[float, int], ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VisibilityGraph:
-    """Water, and the lengths between its corners that are in sight of each other.
+class Roadmap:
+    """Water, and the lengths between places of it that are in sight of each other.
 
     Attributes:
         water: polygons (east, north), grown by `Tuning.slit_m`.
-        corners: (n, 2) north/east of the corners that stick out into the water.
-        beside: (n, 2, 2) the corners before and after each along the shore.
-        lengths: (n, n) sparse distances between corners in sight of each other.
+        corners: (n, 2) north/east of places where paths may bend: shores' corners that stick out into the water, ...
+        lengths: (n, n) sparse distances between such places in sight of each other; not all need be there.
     """
 
     water: shapely.MultiPolygon
     corners: Array
-    beside: Array
     lengths: scipy.sparse.csr_matrix
 
     def shortest(self, start: Array, end: Array) -> Array | None:
@@ -62,16 +60,6 @@ class VisibilityGraph:
             chain.append(int(before[chain[-1]]))
         return nodes[chain[::-1]] if chain[-1] == n else None
 
-    def least_cost(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
-        """Least cost of a path between two points (2,), infinite where there is none.
-
-        Exact for costs of straight steps (k, 2) that grow with the step's length and obey the triangle inequality, even
-        if they depend on direction: the best path then bends at corners only. For points outside the water it is the
-        cost between its nearest points.
-        """
-        _, least, _ = self._least_costs(self.nearest(start), self.nearest(end), cost)
-        return float(least[len(self.corners) + 1])
-
     def _least_costs(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> tuple[Array, Array, np.ndarray]:
         """Corners and two points of the water, least costs from the first to all, and the node before each."""
         nodes = np.concatenate([self.corners, [start, end]])
@@ -80,11 +68,10 @@ class VisibilityGraph:
         tails, heads = [rows, columns], [columns, rows]
         for k, point in enumerate((start, end)):
             seen = self.sees(point, nodes)
+            seen = seen[seen < n + k]  # the ends see each other once
             tails += [np.full(len(seen), n + k), seen]
             heads += [seen, np.full(len(seen), n + k)]
         tail, head = np.concatenate(tails), np.concatenate(heads)
-        once = np.unique(tail * (n + 2) + head)  # the ends may see each other twice
-        tail, head = once // (n + 2), once % (n + 2)
         data = cost(nodes[head] - nodes[tail]) + 1e-12
         graph = scipy.sparse.coo_matrix((data, (tail, head)), shape=(n + 2, n + 2)).tocsr()
         least, before = scipy.sparse.csgraph.dijkstra(graph, indices=n, return_predecessors=True)
@@ -107,6 +94,27 @@ class VisibilityGraph:
     def joins(self, a: Array, b: Array) -> np.ndarray:
         """(n,) whether points (n, 2) are in sight of each other."""
         return _joined(self.water, a, b)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VisibilityGraph(Roadmap):
+    """The roadmap of all pairs that shortest paths lead over, so its paths are the shortest of the water.
+
+    Attributes:
+        beside: (n, 2, 2) the corners before and after each along the shore.
+    """
+
+    beside: Array
+
+    def least_cost(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
+        """Least cost of a path between two points (2,), infinite where there is none.
+
+        Exact for costs of straight steps (k, 2) that grow with the step's length and obey the triangle inequality, even
+        if they depend on direction: the best path then bends at corners only. For points outside the water it is the
+        cost between its nearest points.
+        """
+        _, least, _ = self._least_costs(self.nearest(start), self.nearest(end), cost)
+        return float(least[len(self.corners) + 1])
 
     def bends(self, points: Array, corners: np.ndarray, ahead: Array) -> np.ndarray:
         """(k, n) whether a shortest path from a point (k, 2) may bend at a corner (n,), on to a place (n, 2).
@@ -135,15 +143,21 @@ def visibility_graph_of(water: shapely.MultiPolygon, tolerance_m: float, corners
 
 def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     """The visibility graph of a water polygon with at most some thousands of corners."""
-    corners, before, after = _corners(as_multipolygon(water))
-    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), CHART.slit_m, join_style="mitre"))
-    shapely.prepare(grown)  # stays prepared for all later lines of sight
+    corners, before, after = shore_corners(as_multipolygon(water))
+    grown = opened(water)
     parts = np.array_split(np.arange(len(corners)), len(corners) ** 2 // CHART.pairs + 1)
     pairs = [_pairs_in_sight(grown, corners, before, after, tails) for tails in parts]
     tail, head = np.concatenate(pairs, axis=1)
     away = np.hypot(*(corners[tail] - corners[head]).T)
     lengths = scipy.sparse.coo_matrix((away, (tail, head)), shape=(len(corners), len(corners))).tocsr()
     return VisibilityGraph(water=grown, corners=corners, beside=np.stack([before, after], axis=1), lengths=lengths)
+
+
+def opened(water: shapely.Geometry) -> shapely.MultiPolygon:
+    """Water grown by `Tuning.slit_m`, prepared for lines of sight, which may touch the shore."""
+    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), CHART.slit_m, join_style="mitre"))
+    shapely.prepare(grown)
+    return grown
 
 
 def _pairs_in_sight(
@@ -179,7 +193,7 @@ def simplified(
         step_m = tolerance_m - moved_m
         simple = _straightened(moved(source, step_m if grow else -step_m), CHART.straight * step_m)
         most = max(count for times, count in corners if times * least_m <= tolerance_m)
-        if len(_corners(simple)[0]) <= (corners[0][1] if grow else most):
+        if len(shore_corners(simple)[0]) <= (corners[0][1] if grow else most):
             return simple
         made.append((simple, tolerance_m))
         if shapely.get_num_coordinates(source) > CHART.dense:
@@ -229,7 +243,7 @@ def _joined(water: shapely.MultiPolygon, a: Array, b: Array) -> np.ndarray:
     return found
 
 
-def _corners(water: shapely.MultiPolygon) -> tuple[Array, Array, Array]:
+def shore_corners(water: shapely.MultiPolygon) -> tuple[Array, Array, Array]:
     """Corners where the shore bends away from the water (n, 2) north/east, with their neighbours on the ring."""
     found: list[Array] = [np.zeros((3, 0, 2))]
     for polygon in shapely.get_parts(shapely.orient_polygons(water)):

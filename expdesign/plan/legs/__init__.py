@@ -8,6 +8,8 @@ from expdesign.plan.legs.helm import helm_leg
 from expdesign.plan.legs.recovery import displaced, recover
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import (
+    FoundLeg,
+    LegPath,
     LegTask,
     LegWater,
     acceptable,
@@ -19,6 +21,8 @@ from expdesign.plan.legs.water import (
 
 __all__ = [
     "LEGS",
+    "FoundLeg",
+    "LegPath",
     "LegTask",
     "LegWater",
     "acceptable",

@@ -17,7 +17,7 @@ from expdesign.plan.control import AgileShip, Helmsman, Reference
 from expdesign.plan.legs.optimise import solve_leg, solve_transition
 from expdesign.plan.legs.problem import LegProblem, hull_discs, leg_problem
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns
+from expdesign.plan.legs.water import FoundLeg, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
 
@@ -51,19 +51,19 @@ class Line:
         return np.column_stack([*columns, np.interp(along_m, middle, course)])
 
 
-def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> Array | None:
-    """Commands (k, m) from one state to the other, or None."""
+def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> FoundLeg | None:
+    """From one state to the other, or None."""
     for path in water.candidate_paths(task.start[:2], task.end[:2]):
-        line = _line(water, path)
+        line = _line(water, path.points)
         first_m, last_m = _end_lengths(task, water, ship, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
         brief_m = LEGS.whole_samples * water.vessel.sample_time_s * water.ship.transit_speed_mps
-        whole = short or (len(path) == 2 and line.length_m < brief_m)  # loses less time, where it is small enough
+        whole = short or (len(path.points) == 2 and line.length_m < brief_m)  # loses less time, where it is small
         values = _optimised(task, water, ship, line) if whole else None
         if values is None and not short:
             values = _in_parts(task, water, ship, line, first_m, last_m)
         if values is not None:
-            return values
+            return FoundLeg(commands=values, source=path.source)
     return None
 
 

@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.plan.control import Capability
-from expdesign.plan.legs._ompl import dubins_curve, search_dubins
+from expdesign.plan.legs._ompl import CURVE, DUBINS, dubins_curve, search_dubins
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns
+from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import Vessel, allocate, required_force
 
 
-def curved_leg(task: LegTask, water: LegWater) -> Array | None:
-    """Commands (k, m) along a Dubins path in safe water, or None when none is found."""
+def curved_leg(task: LegTask, water: LegWater) -> FoundLeg | None:
+    """Along a Dubins path in safe water, or None when none is found."""
     path = find_path(task, water)
     if path is None:
         return None
-    wide = _leg_problem(task, water, path)
+    wide = _leg_problem(task, water, path.points)
     for narrowing in (1.0, 0.5, 0.1):
         problem = replace(
             wide,
@@ -30,16 +30,16 @@ def curved_leg(task: LegTask, water: LegWater) -> Array | None:
         )
         values = solve_leg(problem)
         if values is not None and acceptable(problem.start, problem.end, water, values, task.past):
-            return values
+            return FoundLeg(commands=values, source=path.source)
     return None
 
 
-def find_path(task: LegTask, water: LegWater) -> Array | None:
-    """(k, 3) poses of a Dubins path whose swept hull stays in safe water, or None."""
+def find_path(task: LegTask, water: LegWater) -> LegPath | None:
+    """Poses (k, 3) of a Dubins path whose swept hull stays in safe water, or None."""
     radius, spacing = water.ship.turning_radius_m, water.vessel.length_m / 6
     direct = dubins_curve(task.start[:3], task.end[:3], radius_m=radius, spacing_m=spacing)
     if water.holds(direct):
-        return direct
+        return LegPath(points=direct, source=CURVE)
     if not all(water.holds(end) for end in (direct[:1], direct[-1:])):  # then no path does
         return None
     for attempt, reach in enumerate(LEGS.search_boxes):
@@ -55,7 +55,7 @@ def find_path(task: LegTask, water: LegWater) -> Array | None:
             seed=task.seed + 7919 * attempt,
         )
         if path is not None and water.holds(path):
-            return path
+            return LegPath(points=path, source=DUBINS)
     return None
 
 

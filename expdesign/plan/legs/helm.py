@@ -22,12 +22,12 @@ from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.recovery import Recovery, recover
 from expdesign.plan.legs.transit import steady_transit
 from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, acceptable, nearest_turns, through_water
+from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns, through_water
 from expdesign.values import Array
 
 
-def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> Array | None:
-    """Commands (k, m) from one state to the other, the run-up to a run included, or None."""
+def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> FoundLeg | None:
+    """From one state to the other, the run-up to a run included, or None."""
     before_run, samples = _run_up(task, water)
     tail = np.tile(task.end_inputs, (samples, 1))
     check = recover(task.start, task.past, water, ship)
@@ -35,14 +35,14 @@ def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> Array | None:
         path = _path(before_run, water, straights)
         if path is None:
             continue
-        values = _along(path, before_run, water, ship, check)
+        values = _along(path.points, before_run, water, ship, check)
         if values is None:
             continue
         whole = np.concatenate([values, tail + (values[-1] - task.end_inputs)])
-        turned = whole_turns(path[-1, 2] - task.end[2])
+        turned = whole_turns(path.points[-1, 2] - task.end[2])
         end = np.r_[task.end[:2], task.end[2] + turned, task.end[3:]]
         if acceptable(task.start, end, water, whole, task.past):
-            return whole
+            return FoundLeg(commands=whole, source=path.source)
     return None
 
 
@@ -137,16 +137,21 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip
     return [tries[index] for index in np.argsort(longer, kind="stable") if longer[index] < 2 * radius]
 
 
-def _path(task: LegTask, water: LegWater, straights: Straights) -> Array | None:
-    """(k, 3) places and courses from the leg's start to its end, or None where the water has no such path."""
+def _path(task: LegTask, water: LegWater, straights: Straights) -> LegPath | None:
+    """Places and courses (k, 3) from the leg's start to its end, or None where the water has no such path."""
     begin, end = straights.inner
     middle = find_path(replace(task, start=np.r_[begin, task.start[3:]], end=np.r_[end, task.end[3:]]), water)
     if middle is None:
         return None
-    length, end = water.vessel.length_m, np.r_[end[:2], middle[-1, 2]]
-    parts = (_straight(straights.first, straights.off_m, length), middle, _straight(end, straights.into_m, length))
+    length, end = water.vessel.length_m, np.r_[end[:2], middle.points[-1, 2]]
+    parts = (
+        _straight(straights.first, straights.off_m, length),
+        middle.points,
+        _straight(end, straights.into_m, length),
+    )
     path = np.concatenate(parts)
-    return path[np.r_[True, np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-9]]
+    apart = np.hypot(*np.diff(path[:, :2], axis=0).T) > 1e-9
+    return LegPath(points=path[np.r_[True, apart]], source=middle.source)
 
 
 def _course_pose(state: Array, water: LegWater) -> Array:

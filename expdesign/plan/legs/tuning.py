@@ -16,6 +16,9 @@ class Tuning:
             at most.
         search_batches: batches of samples after which it gives up.
         improving_slices: spent on a shorter path after the first solution.
+        roadmap_places: drawn for a roadmap besides the shores' corners, in `roadmap_tries` tries at most.
+        shortcuts: shares of a path that shortcuts span, tried one after the other, `shortcut_tries` of each at
+            most, and no more after `shortcut_misses` without a gain.
         corridor_hulls: width of corridors to either side at most, in hull lengths.
         memory_time_constants: after which a lagging actuator has forgotten: two parts in a thousand million are left.
         arrival: largest miss of a leg's end state, in hull lengths, and in transit speeds.
@@ -57,6 +60,11 @@ class Tuning:
     search_slices: int = 4
     search_batches: int = 100
     improving_slices: int = 1
+    roadmap_places: int = 500
+    roadmap_tries: int = 50_000
+    shortcuts: tuple[float, ...] = (1.0, 0.3, 0.1, 0.03)
+    shortcut_tries: int = 200
+    shortcut_misses: int = 60
     corridor_hulls: float = 3.0
     memory_time_constants: float = 20.0
     arrival: float = 1e-3

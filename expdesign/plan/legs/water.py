@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,9 +10,18 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.chart import CHART, ClearanceField, Corners, VisibilityGraph, polyline_length, visibility_graph_of
+from expdesign.plan.chart import (
+    CHART,
+    ClearanceField,
+    Corners,
+    VisibilityGraph,
+    polyline_length,
+    visibility_graph_of,
+)
 from expdesign.plan.control import Capability
+from expdesign.plan.legs._ompl import PLANE, roadmap_of, shortened
 from expdesign.plan.legs.tuning import LEGS
+from expdesign.plan.values import PathsName, PlanSettings
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Trajectory
@@ -58,6 +67,37 @@ class LegTask:
         return self.start_inputs[None] if self.before is None else self.before
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegPath:
+    """The path of a leg.
+
+    Attributes:
+        points: (k, 2) north/east, or (k, 3) with courses.
+        source: what found it, in words for plan.json: "straight", "visibility graph", "ompl PRMstar in R2", ...
+    """
+
+    points: Array
+    source: str
+
+    @property
+    def length_m(self) -> float:
+        """Length [m]."""
+        return polyline_length(self.points[:, :2])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundLeg:
+    """A leg, and what found its path.
+
+    Attributes:
+        commands: (k, m); the last azimuths without angle limits may differ from the task's by whole turns.
+        source: as `LegPath`.
+    """
+
+    commands: Array
+    source: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class LegWater:
     """Vessel, weather and water that all legs of a plan share.
@@ -68,6 +108,7 @@ class LegWater:
         clearance_m: least distance of the hull from anything forbidden.
         field: the same water on a grid.
         corners: that paths may bend at, as `Tuning.corners` of charts.
+        paths: what finds paths that bend, as `PlanSettings.paths`.
     """
 
     vessel: Vessel
@@ -77,6 +118,7 @@ class LegWater:
     clearance_m: float
     field: ClearanceField
     corners: Corners = CHART.corners
+    paths: PathsName = PlanSettings.paths
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:
@@ -99,16 +141,23 @@ class LegWater:
         return (self.clearance_m + float(swing_m)) * ROUND
 
     @cached_property
-    def visibility_graphs(self) -> tuple[VisibilityGraph, ...]:
+    def centre_waters(self) -> tuple[shapely.MultiPolygon, ...]:
         """For the centre lines of hulls that point along their path, from wide to narrow margins."""
-        spares, tolerance_m = self.ship.path_spares_m(self.vessel), self.vessel.length_m / 60
-        waters = [self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares]
-        return tuple(visibility_graph_of(water, tolerance_m, self.corners) for water in waters)
+        spares = self.ship.path_spares_m(self.vessel)
+        return tuple(self.area.water_to_plan_in(self.clearance_m + spare) for spare in spares)
 
-    @property
+    @cached_property
     def narrowest_graph(self) -> VisibilityGraph:
         """Of all the water that centre lines may use."""
-        return self.visibility_graphs[-1]
+        return self._graph(self.centre_waters[-1])
+
+    def _graph(self, water: shapely.MultiPolygon) -> VisibilityGraph:
+        return visibility_graph_of(water, self.tolerance_m, self.corners)
+
+    @property
+    def tolerance_m(self) -> float:
+        """By which shores are moved, at first, so that they have fewer corners."""
+        return self.vessel.length_m / 60
 
     @property
     def straight_margin_m(self) -> float:
@@ -120,16 +169,46 @@ class LegWater:
         """Clearance that the centre lines of legs need."""
         return self.clearance_m + self.ship.path_spares_m(self.vessel)[-1]
 
-    def candidate_paths(self, start: Array, end: Array) -> list[Array]:
-        """Paths (k, 2) between two points, shortest first; of similar lengths the one farther from the shore first.
+    def joins(self, start: Array, end: Array) -> bool:
+        """Whether a path leads from one point (2,) to another."""
+        return self._straight(start, end) or any(
+            self._graph(water).shortest(start, end) is not None for water in reversed(self.centre_waters)
+        )
+
+    def candidate_paths(self, start: Array, end: Array) -> Iterator[LegPath]:
+        """Paths between two points (2,), shortest first; of similar lengths the one farther from the shore first.
 
         Only the straight line where a hull may go straight; none where the points are not connected.
         """
-        straight = np.stack([start, end])
-        if shapely.contains_properly(self._open, shapely.LineString(straight[:, ::-1])):
-            return [straight]
-        paths = [path for graph in self.visibility_graphs if (path := graph.shortest(start, end)) is not None]
-        return sorted(paths, key=lambda path: np.ceil(polyline_length(path) / (2 * self.vessel.length_m)))
+        if self._straight(start, end):
+            yield LegPath(points=np.stack([start, end]), source="straight")
+            return
+        shortest = self.narrowest_graph.shortest(start, end)
+        least = 0.0 if shortest is None else self._rank(polyline_length(shortest))
+        longer: list[LegPath] = []
+        for path in filter(None, (self._path(water, start, end) for water in self.centre_waters)):
+            if self._rank(path.length_m) <= least:  # no other is shorter, so that those need not be found
+                yield path
+            else:
+                longer.append(path)
+        yield from sorted(longer, key=lambda path: self._rank(path.length_m))
+
+    def _rank(self, length_m: float) -> float:
+        """Equal for paths of similar lengths."""
+        return float(np.ceil(length_m / (2 * self.vessel.length_m)))
+
+    def _path(self, water: shapely.MultiPolygon, start: Array, end: Array) -> LegPath | None:
+        """A short path through a water; by the visibility graph where the roadmap has none."""
+        if self.paths == "ompl":
+            roadmap = roadmap_of(water, self.tolerance_m, self.corners)
+            if (points := roadmap.shortest(start, end)) is not None:
+                return LegPath(points=shortened(points, roadmap.water), source=PLANE)
+        points = self._graph(water).shortest(start, end)
+        return None if points is None else LegPath(points=points, source="visibility graph")
+
+    def _straight(self, start: Array, end: Array) -> bool:
+        """Whether a hull may go straight from one point (2,) to another."""
+        return bool(shapely.contains_properly(self._open, shapely.LineString(np.stack([start, end])[:, ::-1])))
 
     @cached_property
     def _open(self) -> shapely.MultiPolygon:

@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, leg_end
-from expdesign.plan.legs import LegTask, LegWater, agile_leg, curved_leg
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater, agile_leg, curved_leg
 from expdesign.plan.local_planner.agile_times import (
     TURNS,
     LegTimes,
@@ -65,8 +65,8 @@ class AgilePlanner:
     def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
         """Nothing: such ships leave and reach any place."""
 
-    def leg(self, task: LegTask, water: LegWater) -> Array | None:
-        """Commands (k, m): the shortest path with turns where the ship is, or else a Dubins curve, or None."""
+    def leg(self, task: LegTask, water: LegWater) -> FoundLeg | None:
+        """The shortest path with turns where the ship is, or else a Dubins curve, or None."""
         if water.parted(task.start[:2], task.end[:2]):
             return None
         found = agile_leg(task, water, self.ship)

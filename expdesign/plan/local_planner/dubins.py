@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import DubinsShip
-from expdesign.plan.legs import LegTask, LegWater, curved_leg, dubins_curve
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater, curved_leg, dubins_curve
 from expdesign.plan.local_planner.arcs import (
     Departures,
     arc_successors,
@@ -50,8 +50,8 @@ class DubinsPlanner:
     def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
         """Nothing: such ships leave and reach any place."""
 
-    def leg(self, task: LegTask, water: LegWater) -> Array | None:
-        """Commands (k, m) along a Dubins path, or None."""
+    def leg(self, task: LegTask, water: LegWater) -> FoundLeg | None:
+        """Along a Dubins path, or None."""
         return None if water.parted(task.start[:2], task.end[:2]) else curved_leg(task, water)
 
     def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:

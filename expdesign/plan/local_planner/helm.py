@@ -11,7 +11,17 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import HelmShip
-from expdesign.plan.legs import LegTask, LegWater, check_ends, displaced, dubins_curve, helm_leg, last_state, recover
+from expdesign.plan.legs import (
+    FoundLeg,
+    LegTask,
+    LegWater,
+    check_ends,
+    displaced,
+    dubins_curve,
+    helm_leg,
+    last_state,
+    recover,
+)
 from expdesign.plan.local_planner.arcs import (
     Departures,
     PathPoints,
@@ -65,8 +75,8 @@ class HelmPlanner:
         """Raise NoPlan where arcs do not lead away from the start, or up to the goal."""
         check_ends(start, goal, water)
 
-    def leg(self, task: LegTask, water: LegWater) -> Array | None:
-        """Commands (k, m) along arcs, the run-up to a run included, or None."""
+    def leg(self, task: LegTask, water: LegWater) -> FoundLeg | None:
+        """Along arcs, the run-up to a run included, or None."""
         return None if water.parted(task.start[:2], task.end[:2]) else helm_leg(task, water, self.ship)
 
     def with_transitions(self, space: SearchSpace, pairs: Sequence[Pair], trials: TransitionTrials) -> SearchSpace:

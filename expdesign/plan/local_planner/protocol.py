@@ -16,7 +16,7 @@ from expdesign.conventions import wrap_angle
 from expdesign.dictionary import Primitive
 from expdesign.plan.chart import ClearanceField, GoalDistance
 from expdesign.plan.control import AgileShip, Capability
-from expdesign.plan.legs import LegTask, LegWater
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
@@ -303,8 +303,8 @@ class LocalPlanner(Protocol):
     def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
         """Raise NoPlan where the ship cannot leave its start pose (3,) or reach its goal."""
 
-    def leg(self, task: LegTask, water: LegWater) -> Array | None:
-        """Commands (k, m) from one state to another in safe water, or None where none is found.
+    def leg(self, task: LegTask, water: LegWater) -> FoundLeg | None:
+        """From one state to another in safe water, or None where none is found.
 
         The last commands of azimuths without angle limits may differ from the task's by whole turns.
         """

@@ -29,7 +29,7 @@ def for_parted(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[st
              shapely.intersects(whole, part) for whole in water.area.water.geoms)]  # fmt: skip
     for part in sorted(parts, key=goal.distance):
         place = shapely.get_coordinates(shapely.shortest_line(part, goal))[0, ::-1]
-        if water.candidate_paths(start[:2], place):
+        if water.joins(start[:2], place):
             lat, lon = water.area.frame.to_degrees(place)
             yield (
                 f"the nearest place that a path leads to is goal.lat_deg = {lat:.6f}, goal.lon_deg = {lon:.6f} "
@@ -45,7 +45,7 @@ def for_passage(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[s
     water = leg_water(problem, ship_on_legs(problem))
 
     def passes(clearance_m: float) -> bool:
-        return bool(replace(water, clearance_m=clearance_m).candidate_paths(problem.start[:2], problem.goal[:2]))
+        return replace(water, clearance_m=clearance_m).joins(problem.start[:2], problem.goal[:2])
 
     clearance_m = largest(passes, problem.settings.clearance_m)
     if clearance_m is None:
