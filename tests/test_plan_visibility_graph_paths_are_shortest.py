@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -176,3 +177,12 @@ def test_narrow_passages_among_islands_remain_with_more_corners():
     assert water.covers(many)
     assert not shapely.covers(few, lane).all()
     assert shapely.covers(many, lane).all()
+
+
+def test_a_graph_that_another_process_gets_has_its_water_prepared():
+    graph = build_visibility_graph(shapely.box(0, 0, 100, 100).difference(shapely.box(40, 20, 60, 80)))
+    assert shapely.is_prepared(graph.water)
+    copied = pickle.loads(pickle.dumps(graph))
+    assert shapely.is_prepared(copied.water)
+    ends = np.array([50.0, 10.0]), np.array([50.0, 90.0])
+    assert np.array_equal(copied.shortest(*ends), graph.shortest(*ends))

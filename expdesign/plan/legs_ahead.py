@@ -56,7 +56,10 @@ def legs_ahead(
         return in_order(_found, (planner, water), ((task,) for task in tasks))
     listed = list(tasks)
     fresh = [task for task in listed if _place(task) not in known]
-    known |= zip(map(_place, fresh), in_order(_found, (planner, water), ((task,) for task in fresh)), strict=True)
+    if len(fresh) == 1:  # found here before another process has the water
+        remember(known, leg_found(planner, water, fresh[0]))
+    else:
+        known |= zip(map(_place, fresh), in_order(_found, (planner, water), ((task,) for task in fresh)), strict=True)
     return (known[_place(task)] for task in listed)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import scipy
@@ -37,6 +38,11 @@ class Roadmap:
     water: shapely.MultiPolygon
     corners: Array
     lengths: scipy.sparse.csr_matrix
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Prepare the water in another process, too: copies of geometries are not."""
+        self.__dict__.update(state)
+        shapely.prepare(self.water)
 
     def shortest(self, start: Array, end: Array) -> Array | None:
         """(k, 2) the shortest path between two points (2,), or None where the water does not connect them.

@@ -21,7 +21,6 @@ from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
 from expdesign.plan.search.successors import clear_successors
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
-from expdesign.processes import in_order
 from expdesign.values import Array
 
 
@@ -108,17 +107,9 @@ def place_runs(
     runs, poses = _chain(beam, best)
     if orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
-        chains = list(_different(beam, final_s, orders))
-        found = list(in_order(_polished, (space, ends), chains))
-        best = int(np.argmin([legs_s for _, legs_s in found]))
-        runs, poses = chains[best][0], found[best][0]
+        chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s, orders)]
+        runs, poses = min(chains, key=lambda chain: measured_s(space, chain[0], chain[1], ends))
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
-
-
-def _polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Array) -> tuple[Array, float]:
-    """(n, 3) better poses of runs in their order, and the time of the legs between them."""
-    better = polished(space, runs, poses, ends)
-    return better, measured_s(space, runs, better, ends)
 
 
 def _different(beam: PartialPlans, final_s: Array, count: int) -> Iterator[tuple[list[int], Array]]:
