@@ -4,8 +4,9 @@
 
 Held and interpolated signals are found and read in time (`held`); gyro, compass, log and positions are compared
 (`instruments`), each by an estimate with its standard error and what is left; the ship should answer her inputs in the
-sense that the vessel file gives (`steering`). Everything is told. Changed are the times of readings, and the scale of a
-gyro or log that compass and positions show wrong in all files together: there is no doubt which of the two is wrong.
+sense that the vessel file gives (`steering`). Everything is told. Changed are the times of readings, and, unless
+it is watched for, what two instruments show of a third in all files together: the scale of a gyro or log, and how late
+a log is.
 """
 
 from expdesign.kinematics.check import checked, in_stated_time

@@ -225,6 +225,7 @@ def _clocks(found: _Log) -> Iterator[Finding]:
 def _place(found: _Log, sample_time_s: float, speed: float, *, length_m: float) -> Iterator[Finding]:
     """Where the positions are measured; at one speed a late clock is the same."""
     arm, spread = found.of("arm")
+    spread = np.hypot(spread, TUNING.place_std * length_m)
     late = {"log", "positions"} & set(found.names)
     little = TUNING.place_matters * length_m + (0.0 if late else TUNING.delay_matters * sample_time_s * speed)
     if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), little):

@@ -38,6 +38,7 @@ class Tuning:
         scale_matters: change of a scale that is told.
         turn_matters_rad: misalignment that is told [rad].
         rate_matters: bias of a rate, as a share of its root mean square, that is told.
+        place_std: standard error of a place, at least, in ship lengths: small differences of clocks imitate that.
         place_matters: distance of an instrument, in ship lengths, that is told.
         delay_matters: of one instrument after another, in samples, that is told; Euler's map alone gives a half.
         delay_std: standard error of a delay, at least, in samples.
@@ -84,6 +85,7 @@ class Tuning:
     scale_matters: float = 0.02
     turn_matters_rad: float = 0.0175
     rate_matters: float = 0.1
+    place_std: float = 0.001
     place_matters: float = 0.05
     delay_matters: float = 0.6
     delay_std: float = 0.05

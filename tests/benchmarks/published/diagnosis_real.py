@@ -402,7 +402,7 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     except NoAnswer as error:
         return row | {"named": "", "verdict": f"no answer: {error}", "findings": [], "seconds": 0.0, "seen": None}
     row |= row_of(found, time.process_time() - begin)
-    row["named"], row["off"] = answer(injected, found, effects, of_instruments(clean))
+    row["named"], row["off"] = answer(injected, found, effects, of_instruments(trial.judged))
     row["doubts"] = list(getattr(own, "faults", ()))
     row["seen"] = [kinematics_see(clean, faulty) if injected.batch else False, None]
     known = not {"log"} & {key for key, _ in effects}
