@@ -119,11 +119,8 @@ class PlanTable(Table):
     )
     paths: PathsName = Field(
         default=PlanSettings.paths,
-        description="what finds the paths of legs that bend, of ships that turn on the spot: 'ompl', by a roadmap that "
-        "OMPL draws, or 'visibility', by the graph of the shore's corners, whose paths are the shortest. Those of OMPL "
-        "are mostly the same, and at most 0.8 per cent longer in the waters tried; the roadmap takes up to half a "
-        "second more. Legs that need not bend are straight. Ships that do not turn on the spot sail Dubins curves of "
-        "OMPL either way",
+        description="what finds the paths of legs that bend, of ships that turn on the spot: 'ompl', a roadmap by "
+        "OMPL, whose paths are up to 1 per cent longer, or 'visibility', the graph of the shore's corners",
     )
 
 
