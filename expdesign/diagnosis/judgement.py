@@ -246,7 +246,8 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
     It does if it runs away where the model in use does not; if its mean fit in short stretches is less by more than
     `Tuning.most_loss_points`; and if it simulates some output of whole runs worse than a constant, while the model in
     use simulates none so, or all of them worse by more than `Tuning.much_better_points` on average. A smaller loss in
-    whole runs is weak evidence: it depends on slow errors, which in a wrong model may cancel by chance.
+    whole runs is weak evidence, and so is any loss of a model that explains little of them: it depends on slow errors,
+    which in a wrong model may cancel by chance.
     """
     for length_s in (AHEAD_S, WHOLE_S):
         windows = cut_windows(ship.model, record, longest_s=length_s)
@@ -254,7 +255,7 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
         if length_s == AHEAD_S:
             loses = after.mean() < before.mean() - SELECTION_TUNING.most_loss_points
         else:
-            right = not (before < 0.0).any()
+            right = not (before < 0.0).any() and before.mean() > LITTLE_FIT
             less = after.mean() < before.mean() - SELECTION_TUNING.much_better_points
             loses = bool(right and (less or (after < 0.0).any()))
         if loses or (runs_away and not ran_before):
