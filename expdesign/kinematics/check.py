@@ -57,7 +57,7 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: boo
     done = {item.name: _what_is_done(item) if undo else "" for item in found}
     faults = [f"{everywhere}: {item.text}{done[item.name]}" for item in found]
     known = [item for item in found if done[item.name]]
-    record = replace(record, batches=tuple(_undone(batch, known, smoothed=smoothed) for batch in record.batches))
+    record = _undone(record, known, vessel.sensors, smoothed=smoothed)
     stands = {name for name, text in done.items() if not text}
     stands |= {*OF_LOG} if stands & {*OF_LOG} else set()
     for file in files * (len(files) > 1):
@@ -75,20 +75,22 @@ def _what_is_done(item: Finding) -> str:
     return " Here they are moved to their own time." if item.name == LATE and item.value > 0 else ""
 
 
-def _undone(batch: Batch, found: Sequence[Finding], *, smoothed: bool) -> Batch:
-    """A batch whose measured velocities are divided by the scales that were found, and at their own times."""
-    factors, late = np.ones(3), 0.0
+def _undone(record: Record, found: Sequence[Finding], sensors: Sensors, *, smoothed: bool) -> Record:
+    """The record with measured velocities divided by the scales that were found, and at their own times."""
+    late = sum(item.value for item in found if item.name == LATE)
+    record = replace(record, batches=tuple(_divided(batch, found) for batch in record.batches))
+    if not late:
+        return record
+    like = Sensors(heading_rad=sensors.heading_rad, velocity=Mounting(delay_s=late))
+    return replace(record, batches=at_reference_point(record, like, smoothed=smoothed).batches)
+
+
+def _divided(batch: Batch, found: Sequence[Finding]) -> Batch:
+    factors = np.ones(3)
     for item in found:
         for column in SCALES.get(item.name, ()):
             factors[column] *= 1.0 if OUTPUTS[column] in batch.derived else item.value
-        late += max(item.value, 0.0) if item.name == LATE else 0.0
-    batch = batch if (factors == 1.0).all() else replace(batch, velocity=batch.velocity / factors)
-    if not late:
-        return batch
-    (read,) = at_reference_point(
-        Record(batches=(batch,)), Sensors(velocity=Mounting(delay_s=late)), smoothed=smoothed
-    ).batches
-    return read
+    return batch if (factors == 1.0).all() else replace(batch, velocity=batch.velocity / factors)
 
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:
