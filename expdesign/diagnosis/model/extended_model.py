@@ -58,6 +58,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "scale": (-0.8, 1.5),
     "inertia": (-0.6, 1.5),
     "gyro": (-0.5, 0.5),
+    "log": (-0.5, 0.5),
     "lag": (0.0, 120.0),
     "delay": (0.0, 120.0),
     "slew": (0.0, 120.0),
