@@ -102,12 +102,12 @@ def workflows(monkeypatch: pytest.MonkeyPatch) -> Workflows:
 @pytest.mark.parametrize(
     ("typed", "name", "arguments", "options"),
     [
-        ("run a.toml", "run", (Path("a.toml"), None), {"vessel": None, "seed": 0, **SHARED}),
+        ("run a.toml", "run", (Path("a.toml"), None), {"vessel": None, "draft": False, "seed": 0, **SHARED}),
         (
             "run a.toml --out o --seed 7 --jobs 1 --no-cache",
             "run",
             (Path("a.toml"), Path("o")),
-            {"vessel": None, "seed": 7, "jobs": 1, "scheduler": None, "cache": False},
+            {"vessel": None, "draft": False, "seed": 7, "jobs": 1, "scheduler": None, "cache": False},
         ),
         ("score --seed 1 a.toml", "score", (Path("a.toml"), None), {"vessel": None, "seed": 1}),
         (

@@ -24,15 +24,22 @@ ANY_SIZE = ("theta", "term", "roll", "asymmetry", "wind:toward", "deadband")
 
 
 def situations() -> list[Situation]:
-    """Ships with forces, azimuths and a rudder; velocities measured and from the pose; depth; a stated slew rate."""
+    """Ships with forces, azimuths and a rudder; velocities measured and from the pose, or without one; depth; a stated rate."""
     found = []
-    for ship, pose_only, wind in (("barge", False, True), ("tug", True, False), ("coaster", False, False)):
+    kinds = (
+        ("barge", False, True, True),
+        ("tug", True, False, True),
+        ("coaster", False, False, True),
+        ("tug", False, False, False),
+    )
+    for ship, pose_only, wind, posed in kinds:
         record = hidden_record(ship, seed=3, batches=2, samples=150)
         batches = [from_pose(batch, wind=wind) if pose_only else batch for batch in record.batches]
         deep = np.linspace(4.0, 40.0, len(batches[0]))
         named = [f"run {number}" for number in range(len(batches))]
         batches = [replace(one, name=name, depth_m=deep) for one, name in zip(batches, named, strict=True)]
         batches = batches if wind else [replace(one, wind=None) for one in batches]
+        batches = batches if posed else [replace(one, pose=None) for one in batches]
         vessel, model = vessel_of(ship), vessel_of(ship).model
         slow = tuple(
             replace(one, responses=(Response(rate=0.1),) * len(one.signals)) if one.kind == "rudder" else one

@@ -1,6 +1,6 @@
 """Of several searches for the shortest day, the day is taken whose drawn trials end soonest."""
 
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -57,9 +57,10 @@ def test_searches_begin_with_other_candidates_and_the_first_with_those_of_the_se
         seeds.append(settings.seed)
         raise InputError("enough was seen")
 
+    problem = make_dataclass("Problem", ["settings", "seed"])(None, 0)
     monkeypatch.setattr(expdesign.shortest_day, "manoeuvres_worth_adding", grown)
     for start in (0, 1, 2, 1):
-        step._added(case, None, None, (7, start), lambda activity, share: None)
+        step._added(case, problem, None, (7, start), lambda activity, share: None)
     assert seeds[0] == 7
     assert len(set(seeds)) == 3
     assert seeds[1] == seeds[3]
@@ -67,7 +68,7 @@ def test_searches_begin_with_other_candidates_and_the_first_with_those_of_the_se
     case = replace(case, design=replace(case.design, grow=GrowSettings(seed=5)))
     for start in (0, 1):
         with pytest.raises(InputError, match="enough was seen"):
-            step._added(case, None, None, (7, start), lambda activity, share: None)
+            step._added(case, problem, None, (7, start), lambda activity, share: None)
     assert seeds[0] == 5 != seeds[1]
 
 

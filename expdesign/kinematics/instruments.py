@@ -174,6 +174,9 @@ def _certainty(found: _Log, name: str) -> float:
     """Size of a coefficient of its own, in those that are told."""
     value, spread = found.of(name)
     if name == "side":
+        share = value.real / abs(found.ahead.ratio)
+        if not 1.0 / TUNING.sway_within < share < TUNING.sway_within:  # the noise of a log that hardly drifts, or none
+            return 0.0
         apart = abs(value - found.ahead.ratio)
         return float(apart / max(TUNING.certain * np.hypot(spread[0], found.ahead.std[0]), TUNING.scale_matters))
     delay_s = abs(value.real + found.late_s * (name == "log"))

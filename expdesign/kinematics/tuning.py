@@ -36,6 +36,7 @@ class Tuning:
         scale_std: standard error of a scale, at least: readings of several samples, rounding and filters in instruments
             change scales by about as much.
         scale_matters: change of a scale that is told.
+        sway_within: factor within which the scale of sway is that of surge; beyond, sway is hardly more than noise.
         turn_matters_rad: misalignment that is told [rad].
         rate_matters: bias of a rate, as a share of its root mean square, that is told.
         place_std: standard error of a place, at least, in ship lengths: small differences of clocks imitate that.
@@ -83,6 +84,7 @@ class Tuning:
     certain: float = 6.0
     scale_std: float = 0.001
     scale_matters: float = 0.02
+    sway_within: float = 1.5
     turn_matters_rad: float = 0.0175
     rate_matters: float = 0.1
     place_std: float = 0.001
