@@ -24,7 +24,7 @@ ANY_SIZE = ("theta", "term", "roll", "asymmetry", "wind:toward", "deadband")
 
 
 def situations() -> list[Situation]:
-    """Ships with forces, azimuths and a rudder; velocities measured and from the pose, or without one; depth; a stated rate."""
+    """Ships with forces, azimuths and a rudder; velocities measured or from the pose, no pose; depth; a stated rate."""
     found = []
     kinds = (
         ("barge", False, True, True),
