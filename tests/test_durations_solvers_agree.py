@@ -104,7 +104,8 @@ def test_working_sets_agree_with_all_candidates_at_once(case: str, monkeypatch):
     monkeypatch.setattr(maximise, "TUNING", replace(TUNING, conic_candidates=30))
     few = maximised(task, as_stated=True)
     check_agreement(few, whole)
-    assert (few.method, whole.method) == (WORKING_SET, CVXPY)
+    assert few.method == WORKING_SET
+    assert whole.method == CVXPY or not task.smooth  # of which the answer with more digits is taken
 
 
 def test_thousands_of_candidates_are_solved_a_few_at_a_time_under_any_limits(monkeypatch):

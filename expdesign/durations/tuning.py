@@ -11,6 +11,7 @@ class Tuning:
 
     Attributes:
         largest_gap: designs with a wider gap are not returned.
+        wide_gap: gap from which a design that no Newton step can sharpen is sought by other means, too.
         target_gap: gap at which Newton's method ends.
         rounding_gap: below this gap, a Newton step that does not halve it is the last: the rest is rounding.
         least_gap_of_step: gap to which the objective of a Newton step is scaled at least.
@@ -55,6 +56,7 @@ class Tuning:
     """
 
     largest_gap: float = 1e-6
+    wide_gap: float = 1e-7
     target_gap: float = 1e-10
     rounding_gap: float = 1e-9
     least_gap_of_step: float = 1e-6

@@ -68,8 +68,9 @@ def maximised(task: ConcaveProblem, kind: str = "", *, as_stated: bool = False) 
     if not 1.0 - least.sum() > TUNING.loosening:  # least times take everything
         return _proven(task, least / least.sum(), kind, method=NO_CHOICE)
     best = _by_cvxpy(task, kind) if as_stated and _moderate(task) else None
-    if best is None or not best.gap < (TUNING.target_gap if task.smooth else TUNING.largest_gap):
-        own = _plain_d(task, kind) or _by_working_sets(task, kind) or _by_newton(task, kind)
+    if best is None or not best.gap < (TUNING.target_gap if task.smooth else TUNING.wide_gap):
+        few = best is not None and not task.smooth  # fewer at a time give an interior point more digits
+        own = _plain_d(task, kind) or _by_working_sets(task, kind, few=few) or _by_newton(task, kind)
         best = min(filter(None, (best, own)), key=lambda found: found.gap, default=None)
     if best is not None and best.gap < TUNING.largest_gap and _floors_kept(task, best.fractions):
         return best
@@ -134,15 +135,15 @@ def _plain_d(task: ConcaveProblem, kind: str) -> Optimum | None:
     return _proven(task, w, kind, method=WORKING_SET)
 
 
-def _by_working_sets(task: ConcaveProblem, kind: str) -> Optimum | None:
+def _by_working_sets(task: ConcaveProblem, kind: str, *, few: bool = False) -> Optimum | None:
     """The optimum of many candidates: of some of them, which those join that would raise it, until none does.
 
     Returns:
-        None for few candidates, or where the working sets do not lead there.
+        None for few candidates, unless these are asked for, or where the working sets do not lead there.
     """
     count, size = len(task.polytope.least), set_size(task.objective.dimension)
     best: Optimum | None = None
-    if count <= TUNING.conic_candidates:
+    if count <= TUNING.conic_candidates and not few:
         return None
     try:
         chosen = _first_set(task)
