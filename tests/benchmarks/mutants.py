@@ -28,6 +28,8 @@ FILES = {
     ),
     "durations/rounding": (
         "durations_whole_runs_are_the_best", "durations_certificate_holds", "durations_limits_are_kept",
+        "durations_keep_least_information_about_other_parameters",
+        "durations_nuisance_parameters_are_identifiable_or_merged",
     ),
     "plan/bounds/repositioning": ("plan_bound_holds",),
     "plan/bounds/displacement": ("plan_bound_holds",),
