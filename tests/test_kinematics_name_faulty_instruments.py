@@ -9,10 +9,11 @@ import pytest
 from expdesign.errors import FileError
 from expdesign.kinematics.check import _disagreements
 from expdesign.kinematics.instruments import Finding, log_against_positions
+from expdesign.kinematics.steering import faster_than_stated
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
-from expdesign.signals import Record
-from expdesign.vessel import Vessel
+from expdesign.signals import Batch, Record
+from expdesign.vessel import Actuator, Limit, Response, Vessel
 from expdesign.workflows import measured
 from instrumented_ship import KINDS, NAMES, POSE, Log, voyages, write_log, write_vessel
 from sample_files import outside, outside_record
@@ -177,6 +178,33 @@ def test_radians_under_the_name_of_degrees_are_told(tmp_path: Path, ship: Vessel
         log["rudder1_rad"] = np.radians(log["rudder1_rad"])
         (doubt,) = read(tmp_path, log, ship).doubts
         assert doubt.endswith("times with rudder1 57.3 times as large: radians under the name of degrees?")
+
+
+@pytest.mark.parametrize("sample_s", [0.05, 0.5])
+def test_an_even_movement_faster_than_stated_is_a_position_at_another_rate(sample_s: float) -> None:
+    """Not so orders, which jump, a helmsman's, who turns the wheel as he likes, and movements at the stated rate."""
+    rng, time = np.random.default_rng(0), np.arange(0.0, 300.0, sample_s)
+    order = 0.35 * np.sign(np.sin(2 * np.pi * time / 40.0))
+    slewed = np.zeros_like(order)
+    for k in range(1, len(order)):
+        slewed[k] = slewed[k - 1] + np.clip(order[k] - slewed[k - 1], -0.15 * sample_s, 0.15 * sample_s)
+    slewed += 0.0005 * rng.standard_normal(len(time))
+    helmsman = 0.35 * np.sin(2 * np.pi * time / 9.0) * np.sin(2 * np.pi * time / 40.0)
+    limit = Limit(low=-0.6, high=0.6)
+
+    def found(signal: np.ndarray, rate: float) -> list[Finding]:
+        batch = Batch(
+            name="run", sample_time_s=sample_s, input_names=("rudder1",), inputs=signal[:, None],
+            velocity=np.zeros((len(time), 3)),
+        )  # fmt: skip
+        own = Actuator(kind="rudder", number=1, limits=(limit,), responses=(Response(rate=rate),))
+        return list(faster_than_stated([batch], [own]))
+
+    (told,) = found(slewed, 0.04)
+    assert told.value == pytest.approx(0.15, rel=0.02)
+    assert "name it reached_rudder1_rad" in told.text
+    for signal, rate in ((slewed, 0.15), (order, 0.04), (helmsman, 0.04), (slewed, np.inf)):
+        assert found(signal, rate) == []
 
 
 def test_the_rudder_sign_is_the_vessel_files_and_no_convention(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from expdesign.kinematics.instruments import (
     gyro_against_heading,
     log_against_positions,
 )
-from expdesign.kinematics.steering import against_inputs
+from expdesign.kinematics.steering import against_inputs, faster_than_stated
 from expdesign.kinematics.tuning import TUNING
 from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
@@ -180,7 +180,8 @@ def _findings(record: Record, vessel: Vessel, *, smoothed: bool) -> list[Finding
         model = model_for(vessel.model, seen)
     except InputError:  # told by whoever needs them
         return []
-    return list(_disagreements(with_delivered_inputs(seen, model).batches, vessel, model))
+    moved = faster_than_stated(record.batches, vessel.model.actuators)
+    return [*_disagreements(with_delivered_inputs(seen, model).batches, vessel, model), *moved]
 
 
 def _file(batch: Batch) -> str:

@@ -30,7 +30,7 @@ from expdesign.kinematics.relation import relation
 from expdesign.kinematics.tuning import TUNING
 from expdesign.signals import Batch
 from expdesign.values import Array
-from expdesign.vessel import VesselModel
+from expdesign.vessel import Actuator, VesselModel, column_name
 
 GROUPS = (
     ("rudder", 2, ("rudder",), "the ship turns against the rudder", "positive to port"),
@@ -102,6 +102,41 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
                     text=f"{seen}: by {np.degrees(against):.0f} degrees in all the other way than the vessel file's "
                     f"model gives. {question}",
                 )  # fmt: skip
+
+
+def faster_than_stated(batches: Sequence[Batch], actuators: Sequence[Actuator]) -> Iterator[Finding]:
+    """Inputs that move evenly, and faster than an actuator of the vessel file can: positions, and a rate that is wrong.
+
+    Orders jump, or follow a helmsman; an actuator that slews goes on for several samples in equal steps.
+
+    Args:
+        batches: with inputs as recorded.
+        actuators: with the rates that the file states.
+    """
+    for actuator in actuators:
+        for signal, response in zip(actuator.signals, actuator.responses, strict=True):
+            own = [one for one in batches if signal in one.input_names and signal not in one.reached]
+            speeds = [np.diff(one.inputs[:, one.input_names.index(signal)]) / one.sample_time_s for one in own]
+            ramps = [part for values in speeds for part in _ramps(values, TUNING.faster * response.rate)]
+            long = [part[1:-1] for part in ramps if len(part) >= TUNING.ramp]
+            inner = np.concatenate(long) if long else np.zeros(0)
+            if sum(map(len, ramps)) > len(inner) / TUNING.ramps or len(long) < TUNING.fewest_ramps:
+                continue
+            rate, spread = float(np.median(inner)), float(np.median(np.abs(inner - np.median(inner))))
+            if spread < TUNING.ramp_spread * rate:
+                yield Finding(
+                    name=f"rate_of_{signal}", value=rate, std=spread / np.sqrt(len(long)), rest=spread,
+                    text=f"{signal} moves evenly at {rate:.3g} per second in {len(long)} places, where the vessel file "
+                    f"states {response.rate:.3g}: a measured position (name it reached_{column_name(signal)}), and "
+                    "another rate?",
+                )  # fmt: skip
+
+
+def _ramps(speeds: Array, least: float) -> list[Array]:
+    """Sizes of successive speeds (k,) above a least one and of one sign."""
+    sense = np.sign(speeds) * (np.abs(speeds) > least)
+    parts = np.split(np.arange(len(speeds)), np.flatnonzero(np.diff(sense)) + 1)
+    return [np.abs(speeds[part]) for part in parts if sense[part[0]]] if len(speeds) else []
 
 
 def _turned(answers: Array) -> Array:

@@ -52,6 +52,10 @@ class Tuning:
         drifts: that distance of ships, at least, from which the drift is expected.
         on_track: share of the expected drift below which heading and course are the same.
         turning: drift expected in turns [rad], root mean square, from which heading and course can be told apart.
+        faster: multiple of a stated rate above which an input moves faster than stated.
+        ramp, fewest_ramps: samples of an even movement, and how many of them tell.
+        ramps: share of the fast samples that must be inside such movements.
+        ramp_spread: median deviation from their speed, as a share of it.
         opposed: least and most size of an answer to an input, in units of the model's, that has the wrong sign.
         opposed_share: share of the changes that the input explains then.
         alike: factor from one within which an answer is that of the model.
@@ -99,6 +103,11 @@ class Tuning:
     drifts: float = 0.2
     on_track: float = 0.5
     turning: float = 0.02
+    faster: float = 1.2
+    ramp: int = 3
+    fewest_ramps: int = 3
+    ramps: float = 0.3
+    ramp_spread: float = 0.15
     opposed: tuple[float, float] = (0.1, 10.0)
     opposed_share: float = 0.3
     alike: float = 3.0
