@@ -49,7 +49,8 @@ class Fault:
         model: what it does to the model in use, by the record that is judged; None where there is no such fault.
         causes: names of the catalogue that are right.
         effects: of the extended model, with their true values; what an oracle fits.
-        record: pattern of what the record's own faults say of it, with size and standard error, and the true size.
+        record: pattern of what the record's own faults say of it, with size and standard error or without both, and the
+            true size.
         needs: kind of actuator that there must be.
     """
 
@@ -269,6 +270,8 @@ def answer(
     """
     pattern = fault.record[0] if fault.record else "(?!)"
     texts = [one.groups() for text in getattr(found.record, "faults", ()) if (one := re.search(pattern, text))]
+    if fault.record and texts and not texts[0]:
+        return "record", None
     if fault.record and texts:
         value, std = (float(number) for number in texts[0])
         before = own[effects[0][0]]
@@ -342,5 +345,8 @@ FAULTS = (
         record=(f"u_mps and v_mps come {PLUS} s later", LATE_S),
     ),
     Fault(name="term taken out", model=_taken_out),
-    Fault(name="rate of the rudder", model=_slower, causes=("actuator_slew",), needs="rudder"),
+    Fault(
+        name="rate of the rudder", model=_slower, causes=("actuator_slew",), needs="rudder",
+        record=("rudder1 moves evenly at", np.nan),
+    ),
 )  # fmt: skip
