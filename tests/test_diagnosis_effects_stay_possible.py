@@ -1,5 +1,6 @@
 """Every effect of every cause keeps within physical bounds, and what is said of it has finite numbers."""
 
+import importlib
 import math
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
 from expdesign.diagnosis.select.profile_likelihood import _limits
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.errors import NoAnswer
 from expdesign.signals import Record
 from expdesign.vessel import Response
 
@@ -134,3 +136,15 @@ def _limits_of(ship: ExtendedModel, windows, time: float) -> tuple[float, float]
             self.linear = type("L", (), {"motion": type("M", (), {"windows": windows})})
 
     return _limits(Found(), "change:time")  # type: ignore[arg-type]
+
+
+def test_a_search_that_cannot_begin_as_parameters_lead_away_is_no_answer(monkeypatch):
+    """Not a defect: the motion is finite, but not what its parameters do to it."""
+
+    def unbounded(*_arguments):
+        raise FloatingPointError
+
+    diagnosing = importlib.import_module("expdesign.diagnosis.diagnose")
+    monkeypatch.setattr(diagnosing, "select_causes", unbounded)
+    with pytest.raises(NoAnswer, match="its simulation of the data diverges"):
+        diagnosing.diagnose(vessel_of("barge"), hidden_record("barge", seed=3, batches=2, samples=150))

@@ -106,13 +106,17 @@ def diagnose(
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
     check_excitation(ship, windows)
+    unstable = Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
     if simulate_from_measured(ship, windows).diverged:
-        raise Diverged(f"vessel {vessel.name!r}: its simulation of the data diverges; the model is unstable")
+        raise unstable
     begun, windows = with_longer_windows(ship, record, windows)
     motion = simulate_from_measured(ship, windows)
     reported.done = SIMULATED
     before = accuracy(ship, record)
-    chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
+    try:
+        chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
+    except FloatingPointError:  # what the model's parameters do to its motion diverges
+        raise unstable from None
     concluding = reported.part(CONCLUDED, 0.0)
     concluding("looking for manoeuvres that distinguish causes", 0.0)
     proposals = proposals or standard_proposals(windows, ship.model.inputs, windows.sample_s)

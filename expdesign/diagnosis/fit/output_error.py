@@ -15,7 +15,7 @@ from expdesign.diagnosis.fit.fit import Fit, FitOptions, continuing, nearest_pos
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion import initial_states, longest_windows, stable_windows
+from expdesign.diagnosis.motion import initial_states, longest_windows, simulate_from_measured, stable_windows
 from expdesign.signals import Record
 
 
@@ -86,6 +86,8 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
     except (FloatingPointError, np.linalg.LinAlgError):
         return as_given
     longer = max(windows, stable_windows(found, record), key=lambda item: item.steps)
+    if simulate_from_measured(found, longer).diverged:
+        return as_given
     return found, replace(longer, white_noise=_length_s(longer) <= TUNING.ahead_s)
 
 
