@@ -18,7 +18,7 @@ from expdesign.workflows import measured
 from instrumented_ship import KINDS, NAMES, POSE, Log, voyages, write_log, write_vessel
 from sample_files import outside, outside_record
 
-SEEDS = 20
+SEEDS = 10
 COUNT = 8
 """Voyages of each fault."""
 
