@@ -78,6 +78,7 @@ def test_a_place_is_water_where_an_odd_number_of_outlines_encloses_it(loaded):
     assert any("islands" in note for note in area.notes)
 
 
+@pytest.mark.outside
 def test_the_pond_of_a_map_editor_has_its_water_inside(tmp_path):
     pond = outside("field/outline/pond-outline.geojson")
     (tmp_path / pond.name).write_text(pond.read_text(encoding="utf-8"), encoding="utf-8")
