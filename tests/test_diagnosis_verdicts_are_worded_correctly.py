@@ -199,3 +199,9 @@ def test_a_fault_of_the_record_ends_the_verdict_as_one_sentence(fault):
     said = verdict([], BEFORE, faults=[fault, "another"])
     assert re.search(r"Look at the record first: [^.?]+[.?]$", said)
     assert said.endswith("?") == fault.endswith("?")
+
+
+@pytest.mark.parametrize("cause", ["gyro_scale", "heading_bias", "lever_arm", "log_scale", "sensor_delay", "wind"])
+def test_instruments_are_to_be_corrected_and_nothing_else(cause):
+    said = verdict([finding(cause)], BEFORE)
+    assert ("Correct the instruments" in said) is (cause != "wind")

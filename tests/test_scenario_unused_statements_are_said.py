@@ -1,6 +1,7 @@
 """What files state and the trial does not use, or takes as certain, is said; the motion confirms it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ WIND, CURRENT, UNREAD, CERTAIN = (
     "no term of the vessel",
     "exactly known",
 )
+
+EXAMPLES = Path(__file__).parents[1] / "scenarios"
 
 
 def loaded(tmp_path, *changes):
@@ -99,6 +102,14 @@ def test_parameters_are_said_to_be_exactly_known_exactly_where_all_draws_have_on
         named = set(line.replace(",", " ").split())
         assert {name for name, width in zip(model.names, spread, strict=True) if width == 0} == named & set(model.names)
         assert ("every parameter" in line) is not spread.any()
+
+
+@pytest.mark.parametrize(("name", "acts"), [("helsinki-hour", True), ("coaster", False), ("fast-boat-designed", False)])
+def test_a_stated_search_for_paths_is_said_not_to_act_exactly_where_legs_are_curves(name, acts):
+    case = load_scenario(EXAMPLES / f"{name}.toml")
+    assert [line for line in case.remarks if "plan.paths" in line] == []
+    stated = replace(case, plan=replace(case.plan, paths="visibility"))
+    assert any("plan.paths does not act" in line for line in stated.remarks) is not acts
 
 
 def test_a_calm_scenario_of_a_ship_known_in_part_has_nothing_to_say(tmp_path):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from expdesign.dictionary.spec import PrimitiveSpec
+from expdesign.errors import NoPlan
 from expdesign.growing import GrowSettings
 from expdesign.plan.values import PlanSettings, UnderWay
 from expdesign.sea_area import SeaArea
@@ -142,4 +143,16 @@ class Scenario:
             *([f"no term of the vessel's model reads {', '.join(unread)}, so that these commands and their limits move "
                "no ship"] if unread else []),
             *([f"exactly known in drawn trials: {known}"] if certain else []),
+            *(["plan.paths does not act: it is of ships that turn on the spot, and this one does not"]
+              if self.plan.paths != PlanSettings.paths and not self._turns_on_the_spot else []),
         )  # fmt: skip
+
+    @property
+    def _turns_on_the_spot(self) -> bool:
+        """Whether legs are those of a ship that does, or no legs are possible."""
+        from expdesign.plan.control import AgileShip, capability
+
+        try:
+            return isinstance(capability(self.vessel, self.plan), AgileShip)
+        except NoPlan:  # told where a trial is planned
+            return True

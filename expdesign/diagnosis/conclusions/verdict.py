@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
+from expdesign.diagnosis.causes import sensors
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
@@ -59,7 +60,7 @@ LITTLE_FIT = 50.0
 """Fit [%] of an output below which data are not called free of error, whatever noise there is."""
 MOST_NAMED = 3
 """Parameters, or equivalent causes, in a sentence."""
-SENSORS = ("heading_bias", "lever_arm", "sensor_delay", "gyro_scale")
+SENSORS = tuple(getattr(sensors, name).name for name in sensors.__all__)
 WEATHER = ("current", "wind")
 
 
