@@ -1,5 +1,7 @@
 """The verdict of a diagnosis: a sentence of what is missing, one of how sure that is, and one of what to do.
 
+A fault of the record itself comes first, and then is what to do.
+
 What else is known goes into remarks.
 """
 
@@ -140,7 +142,7 @@ def verdict(
     kinds: Sequence[str] = (),
     faults: Sequence[str] = (),
 ) -> str:
-    """What the simulation lacks, how sure that is, and what to do: three sentences.
+    """What the simulation lacks, how sure that is, and what to do: three sentences, a fault of the record first.
 
     Args:
         findings: by what the model loses without each.
@@ -160,7 +162,7 @@ def verdict(
     elif within_std:
         certain = [item for item in within_std if item.is_certain] or list(within_std)
         best = _reduction(max(certain, key=lambda item: item.share), verbs=("halve", "cut"))
-        what = "These data show no error of the model beyond the stated standard deviations of its parameters"
+        what = f"{NO_ERROR} beyond the stated standard deviations of its parameters"
         sure = f"Re-estimated within these, the parameters {best} on {unit} held out"
         sentences = [what, sure, "Use the extended vessel file, which has them"]
     elif unexplained is not None:
@@ -176,12 +178,14 @@ def verdict(
         noise = "what remains is like the noise of the sensors, which may hide the motion or an error of it"
         sentences = [what, f"{_accuracy(before)}; {noise}", MORE_DATA]
     else:
-        sentences = ["These data show no error of the model", _accuracy(before), "Keep the vessel file"]
-    if faults:
-        sentences[-1] = f"Look at the record first: {faults[0].rstrip('.')}"
+        sentences = [NO_ERROR, _accuracy(before), "Keep the vessel file"]
+    if faults:  # what is to be done, and a record that is in doubt clears no model
+        known = [_accuracy(before)] if sentences[0].startswith(NO_ERROR) else sentences[:-1]
+        sentences = [f"Look at the record first: {faults[0].rstrip('.')}", *known]
     return _sentences(sentences)
 
 
+NO_ERROR = "These data show no error of the model"
 MORE_RUNS = "more runs would tell"
 MORE_DATA = "Keep the vessel file; sail more runs, and measure wind and current, before it is changed"
 
