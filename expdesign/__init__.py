@@ -27,4 +27,4 @@ from expdesign.threads import use_one_thread
 
 use_one_thread()
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

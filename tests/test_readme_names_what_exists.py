@@ -1,4 +1,4 @@
-"""The READMEs are short, and name files and commands that exist."""
+"""READMEs and manual are short, and name files and commands that exist."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from expdesign.cli import main
 
 ROOT = Path(__file__).parents[1]
 READMES = (ROOT / "README.md", ROOT / "scenarios" / "README.md", ROOT / "tests" / "benchmarks" / "README.md")
+MANUAL = tuple(sorted((ROOT / "expdesign" / "manual").glob("*.md")))
 
 
 @pytest.mark.parametrize("readme", READMES, ids=lambda path: path.parent.name)
@@ -27,8 +28,8 @@ def test_the_readme_fits_on_a_few_screens() -> None:
 
 
 def commands() -> list[str]:
-    """Command lines of all READMEs, continued lines joined."""
-    text = "\n".join(readme.read_text() for readme in READMES).replace("\\\n", " ")
+    """Command lines of all READMEs and of the manual, continued lines joined."""
+    text = "\n".join(readme.read_text() for readme in (*READMES, *MANUAL)).replace("\\\n", " ")
     return sorted(set(re.findall(r"(?<!from )\bexpdesign ([a-z][\w-]+ [^`&#\n]*)", text)))
 
 

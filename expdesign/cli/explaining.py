@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markdown import Markdown
 from rich.table import Table
 
 from expdesign.cli.app import Json, app
@@ -46,7 +47,7 @@ def _show(console: Console, topic: Topic) -> None:
     """Tables as wide as the terminal."""
     console.print(topic.title, style="bold")
     if topic.text:
-        console.print(topic.text)
+        console.print(topic.text if topic.sections else Markdown(topic.text))
     for section in topic.sections:
         console.print()
         if section.title:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from importlib.resources import files as files_of
 
 from expdesign.errors import InputError, nearest
 from expdesign.workflows.explanations import files, plug_ins
@@ -26,27 +27,50 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
     "formats": ("route formats", plug_ins.formats_topic),
 }
 """Topic -> its summary and the function that explains it."""
+MANUAL = {
+    "conventions": "frames, signs, units, models: read this first",
+    "commands": "which command, which method, when",
+    "first-plan": "your first plan, in half an hour",
+    "first-estimate": "from your data to a model, in ten minutes",
+    "information": "how long to run what: information, durations, certificates",
+    "planning": "one trajectory through the water: places, legs, verification, drawn trials",
+    "estimation": "from data to parameters and their standard errors",
+    "diagnosis": "what the simulation gets wrong, and why",
+    "operation": "watching a ship in service, indices, step trials, roll",
+}
+"""Page of the manual -> its summary. The pages are the Markdown files in `expdesign/manual`."""
+
+
+def page(name: str) -> Topic:
+    """A page of the manual: its heading is the title, the rest Markdown."""
+    text = (files_of("expdesign") / "manual" / f"{name}.md").read_text(encoding="utf-8")
+    title, _, rest = text.removeprefix("# ").partition("\n")
+    return Topic(name=name, title=title, text=rest.strip(), sections=())
 
 
 def explain(subject: str = "") -> Topic:
     """Explain a subject.
 
     Args:
-        subject: a topic; a table, a manoeuvre family or another section of one; or a name, such as design.total_s or
-            actuators[2].kind. Without it, the list of topics.
+        subject: a page of the manual; a topic; a table, a manoeuvre family or another section of one; or a name, such
+            as design.total_s or actuators[2].kind. Without it, the list of topics.
 
     Raises:
         InputError: nothing has that name; the message offers the nearest.
     """
     wanted = re.sub(r"\[\d*\]", "", subject)
     if not wanted:
+        pages = tuple(Explained(name=name, meaning=line) for name, line in MANUAL.items())
         entries = tuple(Explained(name=name, meaning=line) for name, (line, _) in TOPICS.items())
         text = "expdesign explain TOPIC shows one, expdesign explain NAME a single key, family or other name."
-        section = Section(name="topics", title="", entries=entries)
-        return Topic(name="topics", title="Topics", text=text, sections=(section,))
+        manual = Section(name="manual", title="Manual", entries=pages)
+        names = Section(name="topics", title="Keys of files, and names", entries=entries)
+        return Topic(name="topics", title="Topics", text=text, sections=(manual, names))
+    if wanted in MANUAL:
+        return page(wanted)
     if wanted in TOPICS:
         return TOPICS[wanted][1]()
-    known: list[str] = list(TOPICS)
+    known: list[str] = [*TOPICS, *MANUAL]
     found: dict[str, Section] = {}
     for _, build in TOPICS.values():
         topic = build()

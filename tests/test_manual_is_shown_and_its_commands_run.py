@@ -1,0 +1,59 @@
+"""Every page of the manual is listed and shown, and the commands of its tutorials do what the pages say."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from expdesign.cli import main
+from expdesign.workflows import explain
+from expdesign.workflows.explanations.explain import MANUAL, page
+
+ROOT = Path(__file__).parents[1]
+PAGES = ROOT / "expdesign" / "manual"
+LONG = ("run", "replan", "diagnose", "simulate", "estimate")  # wait for a whole plan
+
+
+def tutorial(name: str) -> list[list[str]]:
+    """Commands of a tutorial, in order."""
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8").replace("\\\n", " ")
+    return [shlex.split(line) for line in re.findall(r"^ {7}expdesign (.*)$", text, re.MULTILINE)]
+
+
+def test_the_list_of_pages_is_that_of_the_files() -> None:
+    assert sorted(MANUAL) == sorted(path.stem for path in PAGES.glob("*.md"))
+    listed = [entry.name for section in explain().sections for entry in section.entries]
+    assert set(MANUAL) <= set(listed)
+
+
+@pytest.mark.parametrize("name", MANUAL)
+def test_a_page_is_shown_whole(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", name]) == 0
+    shown = capsys.readouterr().out
+    assert f"# {page(name).title}\n\n{shown.partition(chr(10))[2].strip()}\n" == (PAGES / f"{name}.md").read_text()
+
+
+def carried_out(commands: list[list[str]], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "scenarios").symlink_to(ROOT / "scenarios")
+    monkeypatch.chdir(folder)
+    for command in commands:
+        assert main(command) == 0, command
+        named = [folder / word for word in command if word.startswith("runs/")]
+        assert all(path.exists() for path in named)
+
+
+def test_what_the_tutorials_ask_before_a_plan_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commands = [command for command in tutorial("first-plan") if command[0] not in LONG]
+    assert {command[0] for command in commands} == {"explain", "score", "durations"}
+    carried_out(commands, tmp_path, monkeypatch)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["first-plan", "first-estimate"])
+def test_a_tutorial_runs_from_its_first_command_to_its_last(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    carried_out(tutorial(name), tmp_path, monkeypatch)
