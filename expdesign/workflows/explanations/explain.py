@@ -64,8 +64,8 @@ def explain(subject: str = "") -> Topic:
         entries = tuple(Explained(name=name, meaning=line) for name, (line, _) in TOPICS.items())
         text = "expdesign explain TOPIC shows one, expdesign explain NAME a single key, family or other name."
         manual = Section(name="manual", title="Manual", entries=pages)
-        names = Section(name="topics", title="Keys of files, and names", entries=entries)
-        return Topic(name="topics", title="Topics", text=text, sections=(manual, names))
+        keys = Section(name="topics", title="Keys of files, and names", entries=entries)
+        return Topic(name="topics", title="Topics", text=text, sections=(manual, keys))
     if wanted in MANUAL:
         return page(wanted)
     if wanted in TOPICS:
