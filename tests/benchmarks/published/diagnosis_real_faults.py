@@ -323,11 +323,11 @@ FAULTS = (
     ),
     Fault(
         name="log 0.95", batch=_scaled(SCALE, SCALE, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
-        record=(f"u_mps and v_mps are {PLUS} times", SCALE),
+        record=(f"u_mps (?:and v_mps are|(?=.*perhaps v_mps)is) {PLUS} times", SCALE),
     ),
     Fault(
         name="log ahead 0.95", batch=_scaled(SCALE, 1, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
-        record=(f"u_mps is {PLUS} times", SCALE),
+        record=(f"u_mps (?:and v_mps are(?=.*u_mps alone)|is) {PLUS} times", SCALE),
     ),
     Fault(
         name="current 0.07 m/s", batch=_drifting, causes=("current",),
