@@ -32,11 +32,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from diagnosis_real_faults import (
     AHEAD_S,
     FAULTS,
+    OF_MODEL,
     answer,
     current_of,
     error_ahead,
     kinematics_see,
     of_instruments,
+    of_model,
     oracle,
 )
 from diagnosis_real_hulls import HULLS, WINDY, averaged, fitted_vessel, runs, trial_of
@@ -209,7 +211,8 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     except NoAnswer as error:
         return row | {"named": "", "verdict": f"no answer: {error}", "findings": [], "seconds": 0.0, "seen": None}
     row |= row_of(found, time.process_time() - begin)
-    row["named"], row["off"] = answer(injected, found, effects, of_instruments(trial.judged))
+    own_size = of_instruments(trial.judged) | (of_model(vessel, clean) if {*OF_MODEL} & {*dict(effects)} else {})
+    row["named"], row["off"] = answer(injected, found, effects, own_size)
     row["doubts"] = list(getattr(own, "faults", ()))
     row["seen"] = [kinematics_see(clean, faulty) if injected.batch else False, None]
     known = not {"log"} & {key for key, _ in effects}
