@@ -29,8 +29,10 @@ from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import score_tests
 from expdesign.diagnosis.select.selection import _equivalent
 from expdesign.diagnosis.select.selection_round import _alternatives, open_candidates
+from expdesign.diagnosis.select.shortlist import _shortlist
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
+from hidden_effects import Weather
 
 RUNS, SAMPLES, APART, NOISE = 14, 60, 0.3, 1.0
 
@@ -177,6 +179,23 @@ def test_runs_that_differ_by_themselves_are_no_evidence_of_a_cause_on_average():
     assert min(plain) < 1e-6
     assert min(counted) > 0.05 / len(counted) / 10
     assert np.median(counted) > np.median(plain)
+
+
+def test_a_missing_term_that_noise_cannot_imitate_is_fitted_however_much_runs_differ_without_it():
+    """Y_ur is missing: without it, its own effect in turns of all kinds is most of how three runs differ."""
+    counted = []
+    for seed in (0, 4, 5):
+        calm = Weather(current_std=0.0, wind_std=0.0)
+        record = hidden_record("tug", seed=seed, batches=3, samples=200, weather=calm)
+        ship = extended_model(vessel_of("tug", without=("Y_ur",), relative_std=0.1), record)
+        windows = cut_windows(ship.model, record)
+        base = fit_nuisance(ship, windows, initial_states(windows))
+        tests = score_tests(base, open_candidates(base, windows), np.random.default_rng(seed))
+        (own,) = [item for item in tests if "term:Y_ur" in item.candidate.free]
+        assert tail(own.statistic, 1) < 1e-7
+        assert own in _shortlist(tests)
+        counted.append(own.p_value)
+    assert np.median(counted) > 0.01
 
 
 def test_candidates_are_equivalent_by_a_margin_that_grows_with_the_spread_between_runs():

@@ -123,6 +123,22 @@ def test_a_fault_is_named_with_its_size(tmp_path: Path, ship: Vessel, name: str,
     assert abs(np.mean(errors)) < 1.12 * 4.0 / np.sqrt(COUNT)
 
 
+@pytest.mark.parametrize("kind", ["random", "straight", "zigzag"])
+def test_a_log_wrong_ahead_alone_is_told_from_one_wrong_in_both_axes_or_both_are_named(
+    tmp_path: Path, ship: Vessel, kind: str
+) -> None:
+    """In 200 s she drifts little: the likelier of both is first, the other left out only where it is wrong."""
+    first, errors = [], []
+    for truth, columns in (("surge_scale", ("u_mps",)), ("velocity_scale", ("u_mps", "v_mps"))):
+        for log in voyages(COUNT, kind, sample_s=0.4, seed=5, last_s=200.0):
+            (found,) = findings(tmp_path, scaled(*columns, by=0.95)(log), ship).values()
+            first.append(found.name == truth)
+            assert first[-1] or "sway is too little to tell" in found.text
+            errors.append((found.value - 0.95) / found.std)
+    assert np.mean(first) > 0.9 - 3.0 * np.sqrt(0.9 * 0.1 / len(first))
+    assert np.sqrt(np.mean(np.square(errors))) < 1.12 * 1.9
+
+
 @pytest.mark.parametrize("name", ["yaw_rate_scale", "velocity_scale", "surge_scale", "velocity_delay_s"])
 def test_what_two_instruments_show_of_a_third_is_undone(tmp_path: Path, ship: Vessel, name: str) -> None:
     for log in voyages(4, "random", sample_s=0.4, seed=3):

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from diagnosis_real import POND, averaged_over, tried
+from diagnosis_real import tried
+from diagnosis_real_hulls import averaged_over
 from expdesign.signals import Batch
+from real_data_cases import POND
 from sample_files import outside
 
 

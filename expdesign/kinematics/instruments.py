@@ -14,7 +14,7 @@ R turns by the measured heading. A distance of zero in the last means that the s
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -111,12 +111,14 @@ class _Log:
             for certain.
         sample_s: time between samples.
         late_s: by which the velocities were late, and were moved before.
+        apart: the same with a scale of sway of its own, which is not certainly another; None where nothing tells.
     """
 
     ahead: Relation
     names: tuple[str, ...]
     sample_s: float
     late_s: float = 0.0
+    apart: _Log | None = None
 
     def of(self, name: str) -> tuple[complex, Array]:
         """Coefficient of a regressor, and the standard errors of its parts."""
@@ -155,7 +157,7 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
             break
         late_s += found.of("log")[0].real
         found = _certain(related, tuple(name for name in found.names if name in optional))
-    return found
+    return found if found is None or "side" in found.names else replace(found, apart=related((*found.names, "side")))
 
 
 def _certain(related: Callable[[Sequence[str]], _Log | None], optional: Sequence[str]) -> _Log | None:
@@ -184,17 +186,12 @@ def _certainty(found: _Log, name: str) -> float:
 
 
 def _log_scale(found: _Log) -> Iterator[Finding]:
-    """The scale of a log, or those of its two axes."""
+    """The scale of a log, or those of its two axes where these are certainly different."""
+    if "side" not in found.names:
+        yield from _one_scale(found)
+        return
     whole = found.ahead
     scale, std = 1.0 / whole.size, whole.size_std / whole.size**2
-    if "side" not in found.names:
-        if whole.differs(1.0, by=TUNING.scale_matters):
-            yield Finding(
-                name="velocity_scale", value=scale, std=std, rest=whole.rest,
-                text=f"u_mps and v_mps are {with_std(scale, std)} times the speed that the positions give: the scale "
-                f"of a log? Where the positions are right, multiply sensors.velocity_scale by {scale:.4g}.",
-            )  # fmt: skip
-        return
     side, spread = found.of("side")
     axes = (("surge", "u_mps", scale, std), ("sway", "v_mps", 1.0 / side.real, spread[0] / side.real**2))
     for axis, column, value, error in axes:
@@ -205,6 +202,36 @@ def _log_scale(found: _Log) -> Iterator[Finding]:
                 text=f"{column} is {with_std(value, error)} times the {axis} speed that the positions give: the scale "
                 "of one axis of a log?",
             )  # fmt: skip
+
+
+def _one_scale(found: _Log) -> Iterator[Finding]:
+    """A scale of both axes, or of surge alone: the likelier is said first, and the other one unless it is excluded.
+
+    A log that is wrong in both is no likelier beforehand than one that is wrong in one, so neither has to be certain.
+    """
+    if not found.ahead.differs(1.0, by=TUNING.scale_matters):
+        return
+    excluded, nearer = (True, False) if found.apart is None else _sway_is_right(found.apart)
+    whole = found.apart.ahead if nearer and found.apart is not None else found.ahead
+    scale, std = 1.0 / whole.size, whole.size_std / whole.size**2
+    size = with_std(scale, std)
+    if nearer:
+        text = f"u_mps is {size} times the surge speed that the positions give, and perhaps v_mps too (sway is too " \
+            "little to tell): the scale of a log?"  # fmt: skip
+    else:
+        text = f"u_mps and v_mps are {size} times the speed that the positions give" \
+            f"{'' if excluded else ', or u_mps alone (sway is too little to tell)'}: the scale of a log? Where the " \
+            f"positions are right, multiply sensors.velocity_scale by {scale:.4g}."  # fmt: skip
+    name = "surge_scale" if nearer else "velocity_scale"
+    yield Finding(name=name, value=scale, std=std, rest=whole.rest, text=text)
+
+
+def _sway_is_right(apart: _Log) -> tuple[bool, bool]:
+    """Whether a scale of one is excluded for sway, and whether sway's is nearer to one than to that of surge."""
+    side, spread = apart.of("side")
+    plain = 1.0 / TUNING.sway_within < side.real < TUNING.sway_within  # not the noise of a log that hardly drifts
+    excluded = plain and abs(side.real - 1.0) > TUNING.certain * spread[0]
+    return excluded, bool(plain and not excluded and abs(side.real - 1.0) < abs(side.real - abs(apart.ahead.ratio)))
 
 
 def _clocks(found: _Log) -> Iterator[Finding]:

@@ -147,7 +147,8 @@ def improves_held_out(
         return simulated
     share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
     alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
-    shows = least > 0.0 and (alone or (simulated[0] and share >= TUNING.least_reduction))
+    worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
+    shows = least > 0.0 and (alone or (simulated[0] and worth_a_word))
     low, high = gains[0][1]
     if not shows and simulated[0] and high >= 0.0 and low <= 0.0:
         beside = held_beside_the_same_fit(found, held, re_estimated)

@@ -72,6 +72,18 @@ class ScoreTest:
         """The p-value adjusted for multiple tests."""
         return of_several(self.p_value, self.multiplicity)
 
+    @property
+    def is_worth_a_fit(self) -> bool:
+        """Whether noise alone gives less than one as large in a round.
+
+        How runs differ does not count yet: without a large cause its own effect is most of that. It counts once the
+        cause is in the model, when its size is tested.
+
+        Source: J. Fan and J. Lv, Journal of the Royal Statistical Society B 70 (2008), 849-911: a screen must keep.
+        """
+        by_noise = _p_value(self.statistic, self.candidate.size, positive=self.candidate.positive)
+        return bool(by_noise * self.multiplicity <= 1.0)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Scores:

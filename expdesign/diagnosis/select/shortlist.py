@@ -92,7 +92,7 @@ def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
     count: dict[str, int] = {}
     for test in ranked:
         cause = test.candidate.cause
-        if test.p_value * test.multiplicity > 1.0 or test.statistic < least:
+        if not test.is_worth_a_fit or test.statistic < least:
             continue
         if cause not in count and len(count) == TUNING.shortlist:
             continue

@@ -11,8 +11,8 @@ a vessel file cannot hold, such as a roll mode, takes no part in that prediction
 and asks for the right name first; what is found on untouched records must improve runs that nobody used. On the pond
 the model has terms of the wind and is fitted by output error: least squares alone leave up to three times its error in
 yaw. Oracles that know the fault say whether the records show it. `--log FILE` keeps a line of JSON for each trial, of
-this version or of another (copies of this file and `diagnosis_real_faults` in its folder), and `--table FILE ...`
-compares such files. Both studies say what they took (processor seconds), in Markdown.
+this version or of another (copies of these four files in its folder), and `--table FILE ...` compares such files. Both
+studies say what they took (processor seconds), in Markdown.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,27 +32,24 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from diagnosis_real_faults import (
     AHEAD_S,
     FAULTS,
-    SEEN,
-    STD,
+    OF_MODEL,
     answer,
     current_of,
     error_ahead,
     kinematics_see,
     of_instruments,
+    of_model,
     oracle,
 )
-from expdesign.assessment import EstimateOptions, assess
+from diagnosis_real_hulls import HULLS, WINDY, averaged, fitted_vessel, runs, trial_of
+from diagnosis_real_table import found_words, read_log, seconds_words, sorted_rows, told_faults
 from expdesign.diagnosis import Diagnosis, diagnose
-from expdesign.diagnosis.model import resisting
-from expdesign.errors import InputError, NoAnswer, NotInformative
-from expdesign.estimation.regression import AIR
+from expdesign.errors import NoAnswer, NotInformative
 from expdesign.processes import as_finished
-from expdesign.records import load_records
-from expdesign.scenario import load_vessel
-from expdesign.signals import Batch, Record
+from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from real_data_cases import POND, TANK, Case, vessel_of
+from real_data_cases import POND, TANK, Case
 from shared_work import add_sharing, shared_work
 
 try:
@@ -61,10 +57,6 @@ try:
 except ImportError:  # a version that has none
     checked = None
 
-PACE_S = 0.5
-"""Time between samples after averaging: the ships need seconds for anything they do."""
-LONGEST_S, JUDGED_S = 300.0, 200.0
-"""Length that every run is cut to, and every one with a fault, to keep the studies short."""
 HELD_OUT: dict[str, dict[str, tuple[str, ...]]] = {
     TANK.folder: {"zigzag_20_10_p": ("zigzag_20_10_p",), "zigzag_30_05": ("zigzag_30_05",)},
     POND.folder: {
@@ -74,10 +66,8 @@ HELD_OUT: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 """Folder -> name of a group of runs -> how the names of its files begin."""
-WINDY = ("random", "turn_14", "zigzag")
-"""Runs of the pond under way in wind; berthing is slow and short, cut turns are parts of others."""
-TRIPLE, VISIBLE = 3, 0.01
-"""Runs of a trial; reduction of an error below which a finding improves nothing."""
+TRIPLE = 3
+"""Runs of a trial."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,99 +86,6 @@ class Tried:
     before: Mapping[str, Array]
     with_wind: Mapping[str, Array]
     after: Mapping[str, Array]
-
-
-def averaged_over(batch: Batch, every: int, longest_s: float) -> Batch:
-    """A batch with means over so many samples in place of single ones, cut to a length.
-
-    What is measured is averaged around an instant, inputs from there to the next one. Headings are continuous in a
-    batch, so means are right for them too.
-    """
-    count = min(len(batch), int(longest_s / batch.sample_time_s)) // every - 1
-
-    def means(values: Array | None, begin: int = every // 2) -> Array | None:
-        rows = slice(begin, begin + count * every)
-        return None if values is None else values[rows].reshape(count, every, -1).mean(axis=1)
-
-    inputs, velocity = means(batch.inputs, every), means(batch.velocity)
-    assert inputs is not None  # a batch has both
-    assert velocity is not None
-    return Batch(
-        name=batch.name,
-        sample_time_s=batch.sample_time_s * every,
-        input_names=batch.input_names,
-        inputs=inputs,
-        velocity=velocity,
-        pose=means(batch.pose),
-        wind=means(batch.wind),
-        derived=batch.derived,
-    )
-
-
-def runs(case: Case, data: Path, beginnings: tuple[str, ...]) -> Record:
-    """Runs of a case whose files begin so, averaged and cut.
-
-    Raises:
-        InputError: there are none.
-    """
-    files = [file for file in sorted((data / case.folder).glob("*.csv")) if file.stem.startswith(beginnings)]
-    if not files:
-        raise InputError(f"{data / case.folder} has no runs {', '.join(beginnings)}, expected measured CSV files")
-    record = load_records(files, vessel_inputs=("n1", "rudder1"))
-    every = round(PACE_S / case.sample_time_s)
-    return Record(batches=tuple(averaged_over(batch, every, LONGEST_S) for batch in record.batches))
-
-
-def fitted_vessel(case: Case, record: Record, *, wind: bool) -> Vessel:
-    """The case's ship with or without terms of the wind, fitted by least squares.
-
-    Raises:
-        NotInformative: the data tell nothing of parameters of which none is left to hold.
-    """
-    ship = vessel_of(case)
-    model = ship.model
-    kept = [i for i, expression in enumerate(model.expressions) if wind or not set(AIR) & set(expression.signals)]
-    zeros = np.zeros(len(kept))
-    terms = tuple(model.terms[i] for i in kept)
-    still = replace(model, terms=terms, parameters=zeros, parameter_std=zeros, sample_time_s=PACE_S)
-    return simulating(replace(ship, model=still, sample_time_s=PACE_S), record, "ls-air" if wind else "ls")
-
-
-def simulating(ship: Vessel, record: Record, method: str) -> Vessel:
-    """A ship fitted by a method of least squares.
-
-    Where the model runs away on these data, damping that grows fastest with speed and pushes is taken out, and the rest
-    fitted anew: nobody has a model in use that cannot be simulated. Where the data do not tell parameters apart, the
-    first of them is held, as `estimate` advises.
-
-    Raises:
-        NotInformative: the data tell nothing of parameters of which none is left to hold.
-    """
-    held = list[str]()
-    fastest = max(float(np.nanmax(np.abs(batch.velocity))) for batch in record.batches)
-    while True:
-        options = EstimateOptions(methods=(method,), mean="none", fixed=tuple(held))
-        try:
-            model = assess(ship, record, options).best.model
-        except NotInformative as error:
-            if not error.parameters:
-                raise
-            held.append(error.parameters[0])
-            continue
-        values = dict(zip(model.names, model.parameters.tolist(), strict=True))
-        pushing = [name for name, sign in resisting(model).items() if values[name] * sign < 0]
-        if not pushing or error_ahead(replace(ship, model=model), record).max() < fastest:
-            return replace(ship, model=model)
-        held += pushing
-
-
-def best_vessel(case: Case, record: Record) -> Vessel:
-    """The pond's model with wind by output error after least squares."""
-    fitted = fitted_vessel(case, record, wind=True)
-    model = fitted.model
-    held = tuple(name for name, value in zip(model.names, model.parameters.tolist(), strict=True) if value == 0.0)
-    options = EstimateOptions(methods=("oe-air",), mean="none", horizon_s=AHEAD_S, fixed=held)
-    return replace(fitted, model=assess(fitted, record, options).best.model)
 
 
 def tried(case: Case, data: Path, *, seed: int = 0) -> Tried:
@@ -282,94 +179,6 @@ def triple(data: Path, number: int, seed: int) -> dict[str, object]:
     }  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Trial:
-    """Runs of a ship: the model is fitted to some, others are judged, and others nobody uses."""
-
-    vessel: Vessel
-    judged: Record
-    unseen: Record | None
-
-
-def tank_trial(data: Path, rng: np.random.Generator) -> Trial:
-    """Of the 7 m model, by least squares."""
-    names = [file.stem for file in sorted((data / TANK.folder).glob("*.csv")) if "10_10" not in file.stem]
-    judged, fitted, unseen = divided(names, 3, 2, rng)
-    vessel = fitted_vessel(TANK, runs(TANK, data, fitted), wind=False)
-    return Trial(vessel=vessel, judged=read(data / TANK.folder, judged), unseen=runs(TANK, data, unseen))
-
-
-def pond_trial(data: Path, rng: np.random.Generator) -> Trial:
-    """Of the 3 m model, by output error with wind."""
-    names = [file.stem for file in sorted((data / POND.folder).glob("*.csv")) if file.stem.startswith(WINDY)]
-    judged, unseen, fitted = divided(names, 3, 4, rng)
-    vessel = best_vessel(POND, runs(POND, data, fitted[:8]))
-    return Trial(vessel=vessel, judged=read(data / POND.folder, judged), unseen=runs(POND, data, unseen))
-
-
-def crash_trial(data: Path, _rng: np.random.Generator) -> Trial:
-    """Of the 7 m model by a vessel file that `estimate` wrote of other runs."""
-    folder = data / "field" / "crash"
-    return Trial(
-        vessel=load_vessel(folder / "vessel.toml"),
-        judged=read(folder, ("zz_20_10_p", "zz_20_10_s")),
-        unseen=runs(TANK, data, ("zigzag_30_05", "zigzag_15_01")),
-    )
-
-
-def other_tank_trial(data: Path, rng: np.random.Generator) -> Trial:
-    """Of the same hull in another tank, four runs: two are judged, by a model of the turning circle and one more."""
-    folder = data / "field" / "oe-worse"
-    judged, fitted, _ = divided(["zz_-10", "zz_10", "zz_20"], 2, 1, rng)
-    start = load_vessel(folder / "marin10.toml")
-    start = replace(start, model=replace(start.model, parameter_std=np.zeros(len(start.model.terms))))
-    vessel = simulating(start, averaged(read(folder, (*fitted, "tc_35"))), "ls")
-    return Trial(vessel=vessel, judged=read(folder, judged), unseen=None)
-
-
-def clean_trial(data: Path, rng: np.random.Generator) -> Trial:
-    """Of a simulated 30 m vessel."""
-    ship = load_vessel(data / "clean-30m" / "vessel.toml")
-    record = load_records([data / "clean-30m" / "trial.csv"], vessel_inputs=ship.model.inputs, sample_time_s=1.0)
-    names = [batch.name for batch in record.batches]
-    judged, fitted, unseen = (
-        Record(batches=tuple(batch for batch in record.batches if batch.name in some))
-        for some in divided(names, 3, 3, rng)
-    )
-    return Trial(vessel=simulating(ship, fitted, "ls"), judged=judged, unseen=unseen)
-
-
-HULLS: dict[str, Callable[[Path, np.random.Generator], Trial]] = {
-    "tank": tank_trial, "tank 20/10": crash_trial, "other tank": other_tank_trial, "clean 30 m": clean_trial,
-    "pond": pond_trial,
-}  # fmt: skip
-
-
-@lru_cache(maxsize=1)
-def trial_of(hull: str, data: Path, number: int, seed: int) -> Trial:
-    """The trial of a hull, which all faults share."""
-    return HULLS[hull](data, np.random.default_rng([seed, number]))
-
-
-def divided(names: Sequence[str], first: int, second: int, rng: np.random.Generator) -> tuple[tuple[str, ...], ...]:
-    """So many names, so many others, and the rest."""
-    drawn = rng.permutation(list(names)).tolist()
-    return tuple(map(tuple, (drawn[:first], drawn[first : first + second], drawn[first + second :])))
-
-
-def read(folder: Path, names: Sequence[str]) -> Record:
-    """Runs as recorded."""
-    return load_records([folder / f"{name}.csv" for name in sorted(names)], vessel_inputs=("n1", "rudder1"))
-
-
-def averaged(record: Record) -> Record:
-    """Means over `PACE_S`, and no more than `JUDGED_S` of each run, where samples are closer."""
-    every = round(PACE_S / record.batches[0].sample_time_s)
-    return record if every < 2 else replace(
-        record, batches=tuple(averaged_over(batch, every, JUDGED_S) for batch in record.batches)
-    )  # fmt: skip
-
-
 def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str, object]:
     """Runs of a ship with a fault: do oracles see it, is it named, and is its size right?"""
     injected = FAULTS[place]
@@ -402,7 +211,8 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     except NoAnswer as error:
         return row | {"named": "", "verdict": f"no answer: {error}", "findings": [], "seconds": 0.0, "seen": None}
     row |= row_of(found, time.process_time() - begin)
-    row["named"], row["off"] = answer(injected, found, effects, of_instruments(trial.judged))
+    own_size = of_instruments(trial.judged) | (of_model(vessel, clean) if {*OF_MODEL} & {*dict(effects)} else {})
+    row["named"], row["off"] = answer(injected, found, effects, own_size)
     row["doubts"] = list(getattr(own, "faults", ()))
     row["seen"] = [kinematics_see(clean, faulty) if injected.batch else False, None]
     known = not {"log"} & {key for key, _ in effects}
@@ -449,89 +259,6 @@ def told_triples(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
         )
 
 
-def told_faults(*logs: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A row per hull and fault, with the answers of every log, then counts."""
-    columns = " | ".join(f"named {at + 1} | off {at + 1} | said {at + 1}" for at in range(len(logs)))
-    yield f"| hull | fault | instruments, oracle's p | {columns} |"
-    yield "|" + "---|" * (3 + 3 * len(logs))
-    tables = [{(row["hull"], row["fault"], row["number"]): row for row in rows} for rows in logs]
-    seen_keys = [key for key, row in tables[0].items() if row["named"] is not None]
-    for key in seen_keys:
-        rows = [table.get(key) for table in tables]
-        cells = [cell for row in rows for cell in cells_of(row)]
-        yield f"| {key[0]} | {key[1]} | {seen_words(rows[0])} | {' | '.join(cells)} |"
-    for at, table in enumerate(tables):
-        rows = [table[key] for key in seen_keys if key in table]
-        visible = [row for row in rows if row["fault"] != "untouched" and visible_to_oracle(tables[0][key_of(row)])]
-        right = [row for row in visible if row["named"] in RIGHT]
-        sized = [row for row in visible if row["named"] in RIGHT and row.get("off") is not None]
-        close = [row for row in sized if row["off"] <= STD]
-        clean = [row for row in rows if row["fault"] == "untouched"]
-        kept = [keeps_promise(row) for row in clean if row["findings"] and row.get("promised")]
-        silent = sum(not row["findings"] and not row.get("doubts") for row in clean)
-        yield (
-            f"{at + 1}: of {len(visible)} faults that an oracle sees {len(right)} are named first or as equivalent; "
-            f"{len(close)} of {len(sized)} sizes are within {STD:g} standard errors; of {len(clean)} untouched sets "
-            f"{silent} are silent, and the findings of {sum(kept)} of {len(kept)} others improve unseen runs by what "
-            f"they state; {seconds_words([row for row in rows if row.get('seconds')])}."
-        )
-
-
-RIGHT = ("record", "first", "equivalent")
-
-
-def key_of(row: dict[str, Any]) -> tuple[str, str, int]:
-    """Of a trial."""
-    return row["hull"], row["fault"], row["number"]
-
-
-def cells_of(row: dict[str, Any] | None) -> tuple[str, str, str]:
-    """How a fault was named, how far off its size is, and all that was found."""
-    if row is None:
-        return "?", "", ""
-    off = "" if row.get("off") is None else f"{row['off']:.1f}"
-    doubts = [text.partition(": ")[2][:60] for text in row.get("doubts", ())]
-    unseen = ""
-    if row["fault"] == "untouched" and row["findings"] and row.get("promised"):
-        ((output, least),) = row["promised"]
-        share = row["unseen"]["uvr".index(output)]
-        unseen = f" (unseen runs {100 * share:+.0f} %, stated {100 * least:+.0f} % of {output})"
-    if not row["findings"] and "no answer" in row["verdict"]:
-        return "no answer", "", row["verdict"][:100]
-    return row["named"] or "-", off, "; ".join([*doubts, found_words(row)]) + unseen
-
-
-def seen_words(row: dict[str, Any]) -> str:
-    """What the oracles say."""
-    if not row.get("seen"):
-        return ""
-    instruments, p_value = row["seen"]
-    return ("yes" if instruments else "no") + ("" if p_value is None else f", {p_value:.1e}")
-
-
-def visible_to_oracle(row: dict[str, Any]) -> bool:
-    """Whether any oracle sees the fault."""
-    instruments, p_value = row.get("seen") or (False, None)
-    return bool(instruments or (p_value is not None and p_value < SEEN))
-
-
-def keeps_promise(row: dict[str, Any]) -> bool:
-    """Whether unseen runs improve by what the findings state at least."""
-    ((output, least),) = row["promised"]
-    return bool(row["unseen"]["uvr".index(output)] >= min(least, 1.0))
-
-
-def found_words(row: dict[str, Any]) -> str:
-    """Causes with their gains in points."""
-    return ", ".join(f"{cause} {gain:+.1f}" for cause, gain, _ in row["findings"]) or "nothing"
-
-
-def seconds_words(rows: Sequence[dict[str, Any]]) -> str:
-    """Median and largest processor time."""
-    times = [row["seconds"] for row in rows]
-    return f"median {np.median(times):.1f} s, largest {max(times):.1f} s"
-
-
 def short(name: str) -> str:
     """A run's name without date."""
     kind, *_, rest = name.partition("_")
@@ -564,17 +291,6 @@ def counted(chosen: argparse.Namespace) -> Iterator[str]:
         yield from told_triples(sorted(rows, key=lambda row: row["number"]))
     else:
         yield from told_faults(sorted_rows(rows))
-
-
-def sorted_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """By hull, fault and trial."""
-    hulls, faults = list(HULLS), [item.name for item in FAULTS]
-    return sorted(rows, key=lambda row: (hulls.index(row["hull"]), faults.index(row["fault"]), row["number"]))
-
-
-def read_log(path: Path) -> list[dict[str, Any]]:
-    """Rows of a log."""
-    return sorted_rows([json.loads(line) for line in path.read_text().splitlines()])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -17,7 +17,9 @@ import scipy
 
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit import fit
 from expdesign.diagnosis.model.term_library import term_library
+from expdesign.diagnosis.motion import fitted_start, stable_windows
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.result_names import public_name
@@ -33,10 +35,12 @@ CERTAIN = 5.0
 """Parameters that are so many standard deviations from zero may be taken out."""
 LEAST_COST = 0.1
 """Relative growth of some error 30 s ahead by which a term that is taken out must show."""
-SEEN = 0.01
-"""p-value of an oracle that sees."""
+SEEN = 0.05
+"""p-value of an oracle that sees: six stretches give no less than 0.016."""
 STD = 2.5
 """Standard errors within which a size is right."""
+OF_MODEL = ("delay:all",)
+"""Effects that a model may lack before a fault."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,6 +249,18 @@ def of_instruments(record: Record) -> dict[str, float]:
     return {"gyro": gyro - 1.0, "log": float(scale) - 1.0, "lever:forward": float(-arm), "late:u": float(-late)}
 
 
+def of_model(vessel: Vessel, record: Record) -> dict[str, float]:
+    """The dead time that a model lacks on untouched records already, by the likelihood: least squares make one.
+
+    Their differences from sample to sample are those of a ship a little later than she is.
+    """
+    ship = extended_model(vessel, record)
+    windows = stable_windows(ship, record)
+    return {
+        "delay:all": float(fit(ship, windows, ("delay:all",), starts=fitted_start(ship, windows)).value("delay:all"))
+    }
+
+
 def _changes(batch: Batch) -> tuple[Array, Array, Array, Array]:
     """Changes over windows: (n, 2) way and turn by velocities and by the pose; (n,) of the bow and of the velocity."""
     assert batch.pose is not None
@@ -263,7 +279,7 @@ def answer(
 ) -> tuple[str, float | None]:
     """How a fault is named, and the largest distance of its size from the truth, in stated standard errors.
 
-    What instruments disagreed about before counts as part of the truth.
+    What instruments disagreed about before, or the model lacked, counts as part of the truth.
 
     By the "record" itself, "first", as "equivalent" to the first, "among" others, or "" where it is not named. The
     distance is None where no size is stated, or none is known.
@@ -284,7 +300,7 @@ def answer(
         return ("equivalent" if causes and {*found.findings[0].not_distinguishable_from} & right else ""), None
     true = dict(effects)
     off = [
-        abs(value - true[key]) / std
+        abs(value - true[key] - own.get(key, 0.0) * (key in OF_MODEL)) / std
         for key, (value, std) in estimates(item, found).items()
         if np.isfinite(true.get(key, np.nan))
     ]
@@ -323,11 +339,11 @@ FAULTS = (
     ),
     Fault(
         name="log 0.95", batch=_scaled(SCALE, SCALE, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
-        record=(f"u_mps and v_mps are {PLUS} times", SCALE),
+        record=(f"u_mps (?:and v_mps are|(?=.*perhaps v_mps)is) {PLUS} times", SCALE),
     ),
     Fault(
         name="log ahead 0.95", batch=_scaled(SCALE, 1, 1), causes=("log_scale",), effects=(("log", SCALE - 1),),
-        record=(f"u_mps is {PLUS} times", SCALE),
+        record=(f"u_mps (?:and v_mps are(?=.*u_mps alone)|is) {PLUS} times", SCALE),
     ),
     Fault(
         name="current 0.07 m/s", batch=_drifting, causes=("current",),
