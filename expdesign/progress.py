@@ -21,6 +21,11 @@ def within(progress: Progress, low: float, high: float) -> Progress:
     return lambda activity, share: progress(activity, low + (high - low) * share)
 
 
+def of_part(progress: Progress, part: str) -> Progress:
+    """Progress whose activities say which part of the work they belong to."""
+    return lambda activity, share: progress(f"{part}: {activity}", share)
+
+
 def ending(progress: Progress, *, most_s: float, refusal: Callable[[str], Exception]) -> Progress:
     """Progress of work that is given up where more time than this has passed by the clock.
 

@@ -36,7 +36,7 @@ def counted_work() -> Iterator[tuple[Counts, Progress]]:
     phase = ["design"]
 
     def progress(activity: str, share: float) -> None:
-        phase[0] = PHASES.get(activity, phase[0])
+        phase[0] = PHASES.get(activity.rpartition(": ")[2], phase[0])
 
     def counting(call: Callable, count: Callable[..., dict[str, int]]) -> Callable:
         def counted(*arguments: Any, **options: Any) -> Any:

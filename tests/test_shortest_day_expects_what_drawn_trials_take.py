@@ -11,10 +11,11 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
+from expdesign.plan.checked import drawn_lateness_s
 from expdesign.plan.control import capability
 from expdesign.plan.monte_carlo import sail_trials
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import draft_trial, with_lateness
+from expdesign.plan.solve import draft_trial
 from expdesign.plan.tuning import PLAN
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day.prices import DraftedDay, _legs_s
@@ -41,9 +42,9 @@ def drafted() -> DraftedDay:
         goal=np.array([400.0, 200.0, 0.0]),
         expected=True,
     )
-    return DraftedDay(
-        repeats=(2,), draft=with_lateness(problem, draft_trial(problem)), information=np.zeros((5, 1, 1)), margin=0.0
-    )
+    draft = draft_trial(problem)
+    day = DraftedDay(repeats=(2,), draft=draft, information=np.zeros((5, 1, 1)), margin=0.0)
+    return day.late(drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
 
 
 def test_a_draft_is_expected_to_take_as_long_as_other_drawn_trials_of_it(drafted):

@@ -11,7 +11,9 @@ import pytest
 from expdesign import workflows
 from expdesign.information import regressor_rows
 from expdesign.memory import VARIABLE
+from expdesign.plan.solve import draft_trial
 from expdesign.scenario import load_scenario
+from expdesign.shortest_day import drafting
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, delivered
 from outside_check import columns
@@ -123,6 +125,21 @@ def test_files_and_report_say_where_the_minutes_go(day):
     assert days_s == sorted(days_s)  # more information never takes less
     assert "the way to the goal takes 7\N{NO-BREAK SPACE}min" in page
     assert 'id="pareto-' in page
+
+
+def test_two_processes_find_the_same_day_and_draft_no_runs_twice(day, tmp_path):
+    folder, scenario = day
+    drafted = []
+
+    def once(problem, **options):
+        drafted.append(problem.design.repeats)
+        return draft_trial(problem, **options)
+
+    with patch.object(drafting, "draft_trial", once):
+        workflows.run(Path(scenario), tmp_path, seed=1, jobs=2, cache=False)
+    for name in ("plan.json", "day.json", "track.csv"):
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+    assert len(drafted) == len(set(drafted)) > 1
 
 
 def test_a_draft_is_the_first_day_tried_with_what_it_tells(day, tmp_path):

@@ -96,9 +96,9 @@ class Measure:
     courses: Array | None = None
 
     def __call__(self, specs: Sequence[PrimitiveSpec]) -> Runs:
-        """The runs of specifications; those of one duration are simulated together."""
+        """The runs of specifications; those of one duration are simulated together, the longest first."""
         durations = np.array([spec.settings["duration_s"] for spec in specs])
-        order = np.argsort(durations, kind="stable")
+        order = np.argsort(-durations, kind="stable")
         ends = np.flatnonzero(np.diff(durations[order])) + 1
         batches = [
             rows[first : first + TUNING.batch]
@@ -223,14 +223,28 @@ def refined(
     rng: np.random.Generator,
     progress: Progress = silent,
 ) -> tuple[Archive, ...]:
-    """The archives with local steps from each family's best candidates."""
-    spaces, grown = [archive.space for archive in archives], tuple(archives)
-    for generation, stride in enumerate(TUNING.strides):
-        progress("searching for runs that add more information", generation / len(TUNING.strides))
-        seed = int(rng.integers(2**32))
+    """The archives with local steps from each family's best candidates.
+
+    Those of one duration are simulated together, and the durations beside each other, the longest first.
+    """
+    progress("searching for runs that add more information", 0.0)
+    seeds = [int(rng.integers(2**32)) for _ in TUNING.strides]
+    durations_s = np.array([archive.space.run_s for archive in archives])
+    groups = [np.flatnonzero(durations_s == run_s).tolist() for run_s in np.unique(durations_s)[::-1]]
+    found = in_order(_stepped, (worth, measure, seeds), (([archives[k] for k in group],) for group in groups))
+    grown = {
+        k: archive for group, some in zip(groups, found, strict=True) for k, archive in zip(group, some, strict=True)
+    }
+    return tuple(grown[k] for k in range(len(archives)))
+
+
+def _stepped(worth: Worth, measure: Measure, seeds: Sequence[int], archives: Sequence[Archive]) -> list[Archive]:
+    """Archives of one duration with local steps, each generation with a seed of its own."""
+    spaces, grown = [archive.space for archive in archives], list(archives)
+    for stride, seed in zip(TUNING.strides, seeds, strict=True):
         points = [_steps(archive, worth, stride, _stream(seed, archive.space)) for archive in grown]
         more = _measured(spaces, points, measure)
-        grown = tuple(archive.with_more(other) for archive, other in zip(grown, more, strict=True))
+        grown = [archive.with_more(other) for archive, other in zip(grown, more, strict=True)]
     return grown
 
 

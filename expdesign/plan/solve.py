@@ -25,7 +25,7 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
-from expdesign.plan.checked import drawn_lateness_s, drawn_risk, verified
+from expdesign.plan.checked import drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs_ahead import KnownLegs
@@ -123,8 +123,8 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         checking = phases_of(problem, room.space.planner, reported).trials
         checking("verifying", 0.0)
         checks = in_order(_check, (whole, water, sailed), ((verified,), (_bound_s,)))
-        verification = next(checks)
         risk, trials = drawn_risk(problem, water, sailed, attempt=attempt, progress=checking)
+        verification = next(checks)
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
@@ -194,11 +194,6 @@ def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Pr
         NoPlan: no path, no room, or no dynamically feasible leg.
     """
     return _in_water(problem, never_falling(progress), partial(_drafted, like=like), like)
-
-
-def with_lateness(problem: PlanProblem, draft: Draft) -> Draft:
-    """The draft of a trial with what drawn trials take longer than it."""
-    return replace(draft, late_s=drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
 
 
 def _drafted(

@@ -7,7 +7,6 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.shortest_day.accuracy import Accuracy, stated_accuracy
     from expdesign.shortest_day.alternate import check_way_fits, fullest_day, shortest_day
-    from expdesign.shortest_day.bounds import day_bound
     from expdesign.shortest_day.cheapest import Choice, cheapest_runs
     from expdesign.shortest_day.manoeuvres import manoeuvres_worth_adding
     from expdesign.shortest_day.values import AccuracySettings, DayBound, DayParts, DayTried, ShortestDay
@@ -22,7 +21,6 @@ __all__ = [
     "ShortestDay",
     "cheapest_runs",
     "check_way_fits",
-    "day_bound",
     "fullest_day",
     "manoeuvres_worth_adding",
     "shortest_day",
@@ -35,7 +33,6 @@ if not TYPE_CHECKING:
         {
             "accuracy": ("Accuracy", "stated_accuracy"),
             "alternate": ("check_way_fits", "fullest_day", "shortest_day"),
-            "bounds": ("day_bound",),
             "cheapest": ("Choice", "cheapest_runs"),
             "manoeuvres": ("manoeuvres_worth_adding",),
             "values": ("AccuracySettings", "DayBound", "DayParts", "DayTried", "ShortestDay"),

@@ -16,17 +16,17 @@ import numpy as np
 from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, plan_trial
-from expdesign.plan.values import Plan
+from expdesign.plan.values import Plan, SailedTrial
 from expdesign.processes import in_order
-from expdesign.progress import Progress, in_phases, silent
+from expdesign.progress import Progress, in_phases, never_falling, of_part, silent
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.bounds import fastest_mps, way_bound_s
+from expdesign.shortest_day.bounds import day_bound, fastest_mps, way_bound_s
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_costs_s
 from expdesign.shortest_day.drafting import Drafting
 from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, near_day, offered
 from expdesign.shortest_day.tuning import TUNING
-from expdesign.shortest_day.values import DayParts, DayTried, ShortestDay
+from expdesign.shortest_day.values import DayBound, DayParts, DayTried, ShortestDay
 from expdesign.values import Array
 
 
@@ -153,16 +153,13 @@ class _Search:
         """
         prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
         count = 1 if self.problem.settings.draft else TUNING.rounds
-        *rounds, last = in_phases(progress, *np.ones(count + 1))
-        refused, left = NoPlan("no day was planned"), iter(rounds)
-        told: Progress | None = next(left)
-        while told is not None:
-            choice = choose(prices, days, choices)
-            if choice is None:
-                break
+        *told, last = in_phases(never_falling(progress), *np.ones(count + 1))
+        rounds = [of_part(one, f"day {number} of at most {count}") for number, one in enumerate(told, start=1)]
+        refused = NoPlan("no day was planned")
+        while rounds and (choice := choose(prices, days, choices)) is not None:
             choices.append(choice)
             try:
-                days.append(self.drafted(choice, days, told))
+                days.append(self.drafting.drafted(choice.repeats, days, rounds[0]))
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
@@ -170,7 +167,7 @@ class _Search:
                     self.placeless.update(fresh)
                     if error.what != "sailing":
                         continue  # soon found, and no reason to try fewer days
-            told = next(left, None)
+            rounds = rounds[1:]
         if not days:
             raise refused
         return days, choices[-1], last
@@ -246,10 +243,6 @@ class _Search:
         """What runs cost and tell with their legs, by the prices."""
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
 
-    def drafted(self, choice: Choice, days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
-        """The day with these runs."""
-        return self.drafting.drafted(choice.repeats, days, progress)
-
     def pruned(self, days: Sequence[DraftedDay]) -> list[DraftedDay]:
         """The shortest days that reach the accuracy, less runs that it does not need; none of which all are needed."""
         reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[: TUNING.pruned]
@@ -293,6 +286,7 @@ class _Search:
         refused = None
         for day in best:
             design = self.drafting.design(day.repeats)
+            bound = self.bound(day.draft.sailed)
             try:
                 plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
             except NoPlan as error:  # a longer day may be less risky
@@ -307,10 +301,19 @@ class _Search:
                     cost_bound_s=last.bound_s,
                     information=float(np.exp(margin)),
                     parts=_parts(day.draft, plan),
+                    bound=next(bound if plan.trajectory is day.draft.sailed.trajectory else self.bound(plan), None),
                 )
         if refused is not None:
             raise refused
         return None
+
+    def bound(self, day: Plan | SailedTrial) -> Iterator[DayBound]:
+        """The bound on days like this one, begun beside its drawn trials where there are other processes.
+
+        None where a draft is all that is asked for.
+        """
+        asked = () if self.problem.settings.draft else ((day,),)
+        return in_order(day_bound, (self.problem, self.accuracy), asked)
 
     def falls_short(self, days: Sequence[DraftedDay]) -> str:
         """That no day reaches the accuracy, the best that is possible, and what would help."""

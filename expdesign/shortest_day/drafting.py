@@ -13,8 +13,9 @@ import numpy as np
 
 from expdesign.durations import DurationDesign, with_repeats
 from expdesign.errors import NotInformative
+from expdesign.plan.checked import drawn_lateness_s
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import Draft, draft_trial, redrafted, with_lateness
+from expdesign.plan.solve import Draft, draft_trial, redrafted
 from expdesign.plan.values import Placement, SailedTrial
 from expdesign.plan.verify import expected_errors, track_information
 from expdesign.progress import Progress
@@ -40,27 +41,26 @@ class Drafting:
         """The day with these runs; the water and the transitions of the day before are not worked out again.
 
         Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
-        are taken to be as late as the days before, second for second. Where a draft is all that is asked for, no trials
-        are drawn.
+        are taken to be as late as the days before. Where a draft is all that is asked for, no trials are drawn.
         """
-        like = days[-1].draft if days else None
-        day = self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))
-        if self.problem.settings.draft:
+        like, problem = days[-1].draft if days else None, self._of(repeats)
+        day = self._judged(repeats, draft_trial(problem, like=like, progress=progress))
+        if problem.settings.draft:
             return day
         if day.margin >= 0 or not days:
-            return self._late(day)
-        share = np.mean([day.expected_s / day.day_s for day in days]) - 1.0
-        return replace(day, draft=replace(day.draft, late_s=share * day.draft.sailed.legs_s))
+            draft = day.draft
+            return day.late(drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
+        return _as_late(day, days)
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
-        """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""
+        """The day, or a shorter one with fewer of its runs that reaches the accuracy too, as late second for second."""
         begun = day
         while True:
             drafts = (self._redrafted(day.draft, rest) for rest in _with_one_fewer(day, self.accuracy))
             shorter = (other for other in drafts if other and other.margin >= 0 and other.day_s < day.day_s)
             found = next(shorter, None)
             if found is None:
-                return day if day is begun else self._late(day)
+                return day if day is begun else _as_late(day, [begun])
             day = found
 
     def told_by(self, sailed: SailedTrial) -> tuple[Array, Array | None, float]:
@@ -88,10 +88,6 @@ class Drafting:
             repeats=tuple(repeats), draft=draft, information=information, margin=margin, covariance=covariance
         )
 
-    def _late(self, day: DraftedDay) -> DraftedDay:
-        """The day with what drawn trials of it take longer."""
-        return replace(day, draft=with_lateness(self._of(day.repeats), day.draft))
-
     def _redrafted(self, draft: Draft, placements: Sequence[Placement]) -> DraftedDay | None:
         """The day of a draft with runs at given places alone; None where they are too few, or a leg is not found."""
         names = [item.primitive for item in placements]
@@ -100,6 +96,12 @@ class Drafting:
             return None
         other = redrafted(self._of(repeats), draft, placements)
         return None if other is None else self._judged(repeats, other)
+
+
+def _as_late(day: DraftedDay, others: Sequence[DraftedDay]) -> DraftedDay:
+    """The day as late as others, second for second."""
+    share = np.mean([other.expected_s / other.day_s for other in others]) - 1.0
+    return day.late(share * day.draft.sailed.legs_s)
 
 
 def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:

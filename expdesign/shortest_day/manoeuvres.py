@@ -79,7 +79,9 @@ def manoeuvres_worth_adding(
     shares = cheapest_shares(accuracy, offer, level=level)
     for number in range(TUNING.growth_rounds):
         worth, before_s = _worth(shares, problem, transit_mps), shares.bound_s
-        progress("searching for manoeuvres that shorten the day", (number + 0.5) / (TUNING.growth_rounds + 1))
+        which = f"{number + 1} of at most {TUNING.growth_rounds}"
+        activity = f"searching for manoeuvres that shorten the day, search {which}"
+        progress(activity, (number + 0.5) / (TUNING.growth_rounds + 1))
         archives = _refined(archives, worth, measure, rng)
         found = _better(archives, worth, settings)
         if not found:

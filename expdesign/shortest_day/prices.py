@@ -84,6 +84,10 @@ class DraftedDay:
         """The same as drawn trials take on average, go-arounds included [s]."""
         return self.day_s + float(self.draft.late_s.sum())
 
+    def late(self, late_s: Array) -> DraftedDay:
+        """The day whose legs take drawn trials so much longer (legs,) [s]."""
+        return replace(self, draft=replace(self.draft, late_s=late_s))
+
 
 def first_prices(problem: PlanProblem) -> Prices:
     """Prices before any day was planned: the way is at least the straight line to the goal."""

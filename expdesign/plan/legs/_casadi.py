@@ -87,6 +87,8 @@ class Program:
         options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         options |= {"ipopt.mumps_pivot_order": 0}  # minimum degree: by far the least work for chains of samples
+        # all is scaled here: what MUMPS would scale, and what a second solution would refine, changes no digit kept
+        options |= {f"ipopt.mumps_{name}scaling": 0 for name in ("", "permuting_")} | {"ipopt.min_refinement_steps": 0}
         if not self.free:
             options["ipopt.mu_strategy"] = "adaptive"  # from good guesses it takes half the iterations
         options["jac_g"] = ca.Function("nlp_jac_g", variables_and_parameters, [constraints, jacobian])

@@ -17,10 +17,11 @@ from expdesign.conventions import wrap_angle
 from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
-from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
+from expdesign.plan.search.local_search import ChainEnds, polished
 from expdesign.plan.search.successors import clear_successors
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
+from expdesign.processes import in_order
 from expdesign.values import Array
 
 
@@ -107,8 +108,10 @@ def place_runs(
     runs, poses = _chain(beam, best)
     if orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
-        chains = [(runs, polished(space, runs, poses, ends)) for runs, poses in _different(beam, final_s, orders)]
-        runs, poses = min(chains, key=lambda chain: measured_s(space, chain[0], chain[1], ends))
+        chains = list(_different(beam, final_s, orders))
+        better = list(in_order(polished, (space, ends), chains))
+        best = int(np.argmin([seconds for _, seconds in better]))
+        runs, poses = chains[best][0], better[best][0]
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
 

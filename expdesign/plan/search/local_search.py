@@ -59,14 +59,14 @@ class Chain:
         return tuple(part.tobytes() for part in near)
 
 
-def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> Array:
-    """(n, 3) better poses for the same runs in the same order.
+def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Array) -> tuple[Array, float]:
+    """(n, 3) better poses for the same runs in the same order, and the time of all legs by the rule [s].
 
     Args:
         space: the primitives and the water; with a rule for the time of legs.
+        ends: of the chain; the last leg leads to the goal.
         runs: (n,) indices of primitives.
         poses: (n, 3) where they begin.
-        ends: of the chain.
     """
     legs = _Legs(space=space, ends=ends)
     chain = legs.measured(np.asarray(runs), poses)
@@ -84,7 +84,7 @@ def polished(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainE
         if chain is before:
             break
         chain = legs.measured(chain.runs, chain.poses)
-    return chain.poses
+    return chain.poses, measured_s(space, runs, chain.poses, ends)
 
 
 def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> float:

@@ -13,6 +13,7 @@ class Tuning:
         beam_width: partial plans kept.
         polished_orders: orders of runs of which the best plan is polished; the best one then counts.
         checked_at_once, sorted_at_once: successors checked for clearance at a time, and sorted.
+        many_runs, sparse_discs: of more runs than this, every so manieth disc is looked at before all of them.
         cell_hulls, heading_rad: places of which one successor is kept: their size in hull lengths, and in heading.
         shift_hulls, turn_deg: steps of the local search, and with each a turn.
         blocks_at_once: moves of a block looked at together at first, four times as many then.
@@ -34,6 +35,8 @@ class Tuning:
     polished_orders: int = 6
     checked_at_once: int = 1024
     sorted_at_once: int = 8192
+    many_runs: int = 50
+    sparse_discs: int = 8
     cell_hulls: float = 2.0
     heading_rad: float = 0.4
     shift_hulls: tuple[float, ...] = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)

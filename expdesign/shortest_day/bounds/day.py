@@ -9,7 +9,7 @@ from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.bounds import Headway, time_to_sail_s
 from expdesign.plan.legs import through_water
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.values import Plan
+from expdesign.plan.values import Plan, SailedTrial
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds.fewest_samples import fewest_samples
 from expdesign.shortest_day.bounds.motions import Motions
@@ -22,7 +22,7 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY
 
 
-def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
+def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan | SailedTrial) -> DayBound:
     """A bound for all days whose velocities through water stay within those of the dictionary and of a plan.
 
     Args:
@@ -55,7 +55,7 @@ def day_bound(problem: PlanProblem, accuracy: Accuracy, plan: Plan) -> DayBound:
     )
 
 
-def _velocities(problem: PlanProblem, plan: Plan) -> Array:
+def _velocities(problem: PlanProblem, plan: Plan | SailedTrial) -> Array:
     """(k, 3) velocities through water of all runs and of a plan."""
     heading_rad, ground = plan.trajectory.pose[:, 2], plan.trajectory.velocity
     current = to_body(problem.environment.current_to, heading_rad, NUMPY)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from expdesign.progress import Progress, silent, within
+from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.workflows.command_text import command_text
 from expdesign.workflows.outcome import Outcome
@@ -16,6 +16,11 @@ from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.trial_files import built_route, check_no_trial, report_content, trial_files
 from expdesign.workflows.steps.workers import workers
+
+WORK = (0.05, 0.08, 0.02, 0.68, 0.17)
+"""Share of the work: scoring, durations, comparing criteria, planning, and writing."""
+WORK_OF_SEARCH = (0.01, 0.02, 0.01, 0.90, 0.06)
+"""The same where the shortest day is searched for."""
 
 
 def run(
@@ -61,12 +66,13 @@ def run(
 
 
 def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
-    information, growth = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.05, 0.13))
-    progress("comparing criteria", 0.13)
+    work = WORK if case.design.accuracy is None else WORK_OF_SEARCH
+    scoring, designing, comparing, planning, writing = in_phases(progress, *work)
+    information, growth = ready(case, seed=seed, progress=scoring)
+    design = designed(case, information, seed=seed, progress=designing)
+    comparing("comparing criteria", 0.0)
     compared = compared_criteria(case, design)
-    day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 0.83))
-    writing = within(progress, 0.83, 1.0)
+    day = planned_day(case, information, design, seed=seed, progress=planning)
     writing("writing routes, run cards and report", 0.0)
     route = None if day.plan.draft else built_route(case, day.plan)
     content = report_content(case, day.information, day.design, day.plan, seed)

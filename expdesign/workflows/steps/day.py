@@ -184,7 +184,7 @@ def _searched(
     progress: Progress,
 ) -> Day:
     """The day of one search; each start searches for manoeuvres from other candidates."""
-    from expdesign.shortest_day import day_bound, fullest_day, shortest_day
+    from expdesign.shortest_day import fullest_day, shortest_day
 
     asked = case.design.accuracy
     assert asked is not None  # there is an accuracy
@@ -202,8 +202,6 @@ def _searched(
         else partial(fullest_day, day_s=asked.day_s, added=names)
     )
     found = recalled(search, problem, accuracy, progress=planning)
-    if not case.plan.draft:
-        found = replace(found, bound=recalled(day_bound, problem, accuracy, found.plan))
     return Day(information=information, design=found.design, plan=found.plan, shortest=found, added=added)
 
 
