@@ -45,6 +45,7 @@ class Fit:
         linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
         precision: (c, c) of the effects' priors.
         step: (c,) to the optimum of the linear model within bounds.
+        gain: by how much it lowers the cost of the linear model.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
         freedom: degrees of freedom of the covariance, where it counts how runs differ.
@@ -63,6 +64,7 @@ class Fit:
     grams: GramMatrices
     precision: Array
     step: Array
+    gain: float
     converged: bool
     simulations: int = 1
     freedom: float = math.inf
