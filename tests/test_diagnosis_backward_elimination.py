@@ -395,6 +395,6 @@ def test_p_values_of_a_large_effect_count_all_tests():
     base = fit_nuisance(ship, windows, initial_states(windows))
     situation = Situation(ship=base.ship, windows=windows)
     candidates = [item for cause in CAUSES for item in cause.candidates(situation)]
-    openings, far = starting_points(base, windows, score_tests(base, candidates, np.random.default_rng(0)))
+    openings, far = starting_points(base, windows, score_tests(base, candidates, np.random.default_rng(0)), {})
     assert far
     assert all(one.test.multiplicity > 5.0 for one in openings)
