@@ -222,8 +222,8 @@ def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:
 
 def _solved(A: Array, b: Array) -> Array:
     """x of A x = b by Cholesky's method, in units in which A has a unit diagonal; the shortest one of a singular A."""
-    size = np.sqrt(np.diag(A))
-    if (size > 0).all():
+    if len(b) and (np.diag(A) > 0).all():
+        size = np.sqrt(np.diag(A))
         root, x, failed = dposv(A / np.outer(size, size), b / size)
         if not failed and np.diag(root).min() > LEAST_PIVOT:
             return np.asarray(x / size)
