@@ -144,9 +144,10 @@ def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
     half, apart = averaging_half_width(rows_per_step), finer // rows_per_step
     if not half:
         return values
-    taps = np.zeros(2 * half * apart + 1)
-    taps[::apart] = 1.0 / (2 * half + 1)
-    return np.asarray(scipy.ndimage.convolve1d(values, taps, axis=0, mode="nearest"))
+    others = [(0, 0)] * (values.ndim - 1)
+    held = np.pad(values, [(half * apart, half * apart), *others], mode="edge").reshape(-1, apart, *values.shape[1:])
+    means = scipy.ndimage.uniform_filter1d(held, 2 * half + 1, axis=0)[half:-half]  # a running sum, of any width
+    return np.asarray(means.reshape(values.shape))
 
 
 def _wind(ship: ExtendedModel, windows: Windows) -> tuple[Array, Array]:

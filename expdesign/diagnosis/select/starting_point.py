@@ -113,7 +113,10 @@ def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
 
 
 def start_in_short_windows(
-    short_fit: Fit, shortlist: Sequence[ScoreTest], certain: int, known: dict[Hashable, tuple[StartingPoint, Fit | None]]
+    short_fit: Fit,
+    shortlist: Sequence[ScoreTest],
+    certain: int,
+    known: dict[Hashable, tuple[StartingPoint, Fit | None]],
 ) -> list[StartingPoint]:
     """Starting points from fits in short windows; candidates that gain much less than the best are left out.
 
