@@ -72,8 +72,8 @@ LEAST_GAIN_WITHIN_STD = 1.0
 MOST_SAMPLES = 400_000
 """Eleven hours at 10 Hz. 36,000 of 1 s take about 840 MiB of memory, the program's own included."""
 FEW_SAMPLES = 10_000
-"""Compared samples up to which other processes cost as much as they do: to start them, and to send them fits. Of an hour
-at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere."""
+"""Compared samples up to which other processes save no time, because they are started and fits are sent to them: of an
+hour at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere."""
 SIMULATED = 18.0
 """Work before the selection, in simulations of all data."""
 

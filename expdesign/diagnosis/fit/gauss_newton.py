@@ -181,8 +181,8 @@ def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:
 def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
     """The fit after a step, halved where it raises the cost by more than allowed, None if no share of it lowers it.
 
-    A whole step may raise it a little, because weights depend on the effects; where shares do so too, the fit is as good
-    as its steps make it. Shares that would hardly lower it are not tried. Beside it the number of simulations.
+    A whole step may raise it a little, because weights depend on the effects. Where shares of it do so too, the fit is
+    as good as its steps make it. Shares that would hardly lower it are not tried. Beside it the number of simulations.
     """
     held = problem.options.fixed_weights
     effects = np.broadcast_to(best.step, (len(best.starts), len(best.step)))

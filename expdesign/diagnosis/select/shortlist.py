@@ -19,7 +19,6 @@ from expdesign.diagnosis.select.starting_point import (
 )
 from expdesign.diagnosis.select.tuning import TUNING
 
-
 SHORT = "in short windows"
 """What is known of short windows beside a fit: the fit in them, and candidates beside that."""
 
