@@ -11,6 +11,7 @@ from clean_trials import SHIP_50M, at_rate, clean_trial
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows, fastest_rate
 from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
+from expdesign.diagnosis.motion.exogenous_inputs import _averaged
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
@@ -113,3 +114,13 @@ def test_another_record_is_cut_like_the_first_whatever_step_its_own_speeds_ask_f
     assert (like.rows_per_step, like.steps_per_sample) == (windows.rows_per_step, windows.steps_per_sample)
     assert like.measured.shape == windows.measured.shape
     assert like.heading.shape == windows.heading.shape
+
+
+@pytest.mark.parametrize(("rows_per_step", "parts"), [(1, 4), (2, 2), (5, 1), (37, 1), (50, 2)])
+def test_means_of_inputs_are_those_of_the_samples_around_every_instant(rows_per_step, parts):
+    """The last and the first input hold beyond the data; samples around an instant are whole samples away from it."""
+    rows = np.random.default_rng(0).normal(size=(4 * rows_per_step * parts, 2, 3)).cumsum(axis=0)
+    half = rows_per_step // 2
+    around = np.arange(len(rows))[:, None] + parts * np.arange(-half, half + 1)
+    means = rows[np.clip(around, 0, len(rows) - 1)].mean(axis=1)
+    np.testing.assert_allclose(_averaged(rows, rows_per_step * parts, rows_per_step), means, atol=1e-10)

@@ -5,6 +5,7 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.fit import gauss_newton
 from expdesign.diagnosis.fit.fit import FitOptions, after_step
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.model.terms import term_factors
@@ -56,3 +57,21 @@ def test_factors_beside_uncertain_parameters_end_where_they_end_from_elsewhere(k
     assert found.converged
     assert abs(found.value(key) - other.value(key)) < 0.3 * found.std(key)
     assert abs(found.value(key) - truth) < 3 * found.std(key)
+
+
+def test_a_share_of_a_step_is_taken_only_where_it_lowers_the_cost(monkeypatch):
+    """Weights depend on the effects, so that near the end whole steps and all shares of them may raise the cost."""
+    searched, steps = gauss_newton._line_search, []
+
+    def noted(problem, best):
+        ahead, tries = searched(problem, best)
+        steps.append((best.cost, None if ahead is None else ahead.cost, tries))
+        return ahead, tries
+
+    monkeypatch.setattr(gauss_newton, "_line_search", noted)
+    record = hidden_record("tug", seed=3, batches=3, samples=150, relative_std=0.1)
+    extended = extended_model(vessel_of("tug", relative_std=0.1), record)
+    windows = cut_windows(extended.model, record)
+    fit(extended, windows, (), starts=initial_states(windows))
+    assert steps[-1][1] is None  # no share of the last one lowers it
+    assert all(after <= before for before, after, tries in steps if after is not None and tries > 1)

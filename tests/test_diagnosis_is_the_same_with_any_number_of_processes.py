@@ -1,5 +1,7 @@
 """Fits of candidates and folds may be shared among processes; what is found does not depend on it."""
 
+import sys
+
 import numpy as np
 
 from diagnosis_case import hidden_record, vessel_of
@@ -7,7 +9,8 @@ from expdesign.diagnosis import Diagnosis, diagnose
 from expdesign.processes import local_processes
 
 
-def test_two_processes_find_what_one_finds():
+def test_two_processes_find_what_one_finds(monkeypatch):
+    monkeypatch.setattr(sys.modules["expdesign.diagnosis.diagnose"], "FEW_SAMPLES", 0)
     record = hidden_record("barge", seed=12, batches=3, samples=100, effects={"gain": -0.2})
 
     def found(processes: int) -> Diagnosis:

@@ -53,7 +53,7 @@ def mean_of_runs(rng: np.random.Generator, *, runs: int = RUNS, apart: float = A
     return Fit(
         ship=None, keys=("mean",), free_count=1, covariance=np.linalg.inv(m.A), starts=np.zeros((runs, 3)), noise=noise,
         cost=0.0, deviance=0.0, linear=None, sensitivities=sensitivities, grams=grams, precision=np.zeros((1, 1)),
-        step=np.zeros(1), converged=True,
+        step=np.zeros(1), gain=0.0, converged=True,
     )  # type: ignore[arg-type]  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -60,6 +61,7 @@ from expdesign.diagnosis.selected import CONCLUDED, Selected, explains_little, m
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import Diverged, InputError
+from expdesign.processes import local_processes
 from expdesign.progress import Estimated, silent
 from expdesign.reduction import with_reduced_wind
 from expdesign.signals import Record
@@ -69,6 +71,9 @@ LEAST_GAIN_WITHIN_STD = 1.0
 """Gain of fit [points] from which parameters re-estimated within their standard deviations are the verdict."""
 MOST_SAMPLES = 400_000
 """Eleven hours at 10 Hz. 36,000 of 1 s take about 840 MiB of memory, the program's own included."""
+FEW_SAMPLES = 10_000
+"""Compared samples up to which other processes save no time, because they are started and fits are sent to them: of an
+hour at 1 Hz, a fifth of the work can be shared, and takes twice as long elsewhere."""
 SIMULATED = 18.0
 """Work before the selection, in simulations of all data."""
 
@@ -113,8 +118,10 @@ def diagnose(
     motion = simulate_from_measured(ship, windows)
     reported.done = SIMULATED
     before = accuracy(ship, record)
+    few = windows.measured[..., 0].size <= FEW_SAMPLES
     try:
-        chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
+        with local_processes(1) if few else nullcontext():
+            chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
     except FloatingPointError:  # what the model's parameters do to its motion diverges
         raise unstable from None
     concluding = reported.part(CONCLUDED, 0.0)

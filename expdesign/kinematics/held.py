@@ -81,6 +81,8 @@ def _read_at(changes: Places, rounded: bool, count: int, *, interpolated: bool) 
     single = gaps[gaps <= TUNING.single * np.median(gaps) + 0.5]
     several = np.maximum(np.round(gaps / single.mean()), 1.0)
     about = float(gaps.sum() / several.sum())
+    if about + 1.0 / several.sum() < TUNING.shortest_interval:  # nearly every sample is a reading
+        return None
     near = about + np.linspace(-1.0, 1.0, TUNING.tried) / several.sum()
     interval = float(max(near, key=lambda value: (_explained(changes, value), -abs(value - about))))
     if abs(interval - round(interval)) * several.sum() < TUNING.whole * np.sqrt(several.sum()):
@@ -100,7 +102,7 @@ def _read_at(changes: Places, rounded: bool, count: int, *, interpolated: bool) 
 def _explained(changes: Places, interval: float) -> float:
     """Share of the changes that fall on the first sample at or after a reading, at the best phase."""
     phases = np.unique(np.mod(changes[: TUNING.phases], interval))
-    return max(float(np.mean(np.mod(changes - phase + 1e-6, interval) < 1.0)) for phase in phases)
+    return float((np.mod(changes - phases[:, None] + 1e-6, interval) < 1.0).mean(axis=1).max())
 
 
 def _rounded(steps: Array) -> bool:

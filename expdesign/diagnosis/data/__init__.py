@@ -7,7 +7,7 @@ from expdesign.diagnosis.data.noise import (
     channel_std,
     fit_ar_noise,
     linear_basis,
-    random_current_covariance,
+    random_current_precision,
     white_noise,
     whitened,
 )
@@ -26,7 +26,7 @@ __all__ = [
     "has_heading",
     "linear_basis",
     "missing_wind_share",
-    "random_current_covariance",
+    "random_current_precision",
     "white_noise",
     "whitened",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -189,10 +190,17 @@ def _lagged_rows(values: Array, order: int) -> Array:
     return stacked[np.isfinite(stacked).all(axis=1)]
 
 
-def random_current_covariance(count: int, spacing_s: float, time_s: float) -> Array:
-    """(2 count, 2 count) of hat coefficients, north then east, for unit standard deviation."""
+@lru_cache(maxsize=256)
+def random_current_precision(count: int, spacing_s: float, time_s: float) -> tuple[Array, float]:
+    """(2 count, 2 count) inverse covariance of hat coefficients, north then east, for unit standard deviation.
+
+    Beside it the log determinant of the covariance.
+    """
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) * spacing_s
-    return np.asarray(np.kron(np.eye(2), np.exp(-apart / time_s)), dtype=float)
+    covariance = np.kron(np.eye(2), np.exp(-apart / time_s))
+    inverse = np.linalg.inv(covariance)
+    inverse.flags.writeable = False
+    return inverse, float(np.linalg.slogdet(covariance)[1])
 
 
 def linear_basis(steps: int, step_s: float, spacing_s: float) -> Array:

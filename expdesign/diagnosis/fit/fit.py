@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from expdesign.diagnosis.data import Noise
 from expdesign.diagnosis.fit.gram_matrices import GramMatrices, gram_matrices, marginalised
@@ -22,6 +23,8 @@ POSITIVE = ("lag:", "delay:", "slew:")
 """Effects that are times, from zero on."""
 LEAST_TIME_S = 1e-6
 """Taken for zero: derivatives are differences upward."""
+LEAST_PIVOT = 1e-6
+"""Of a matrix with a unit diagonal that counts as regular: the size of a direction beside all others."""
 LITTLE = 1e-6
 """Share of a step from which slopes of factors are taken."""
 
@@ -42,6 +45,7 @@ class Fit:
         linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
         precision: (c, c) of the effects' priors.
         step: (c,) to the optimum of the linear model within bounds.
+        gain: by how much it lowers the cost of the linear model.
         converged: a further step would not lower the cost noticeably.
         simulations: of all windows that the fit took.
         freedom: degrees of freedom of the covariance, where it counts how runs differ.
@@ -60,6 +64,7 @@ class Fit:
     grams: GramMatrices
     precision: Array
     step: Array
+    gain: float
     converged: bool
     simulations: int = 1
     freedom: float = math.inf
@@ -207,12 +212,22 @@ def best_step(A: Array, score: Array, bounds: Array) -> tuple[Array, float]:
         free = ~held
         step[held] = np.clip(step, *bounds)[held]
         left = score[free] - A[np.ix_(free, held)] @ step[held]
-        step[free] = np.linalg.lstsq(A[np.ix_(free, free)], left, rcond=None)[0]
+        step[free] = _solved(A[np.ix_(free, free)], left)
         outside = free & ((step < bounds[0]) | (step > bounds[1]))
         if not outside.any():
             break
         held |= outside
     return step, float(2.0 * score @ step - step @ A @ step)
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """x of A x = b by Cholesky's method, in units in which A has a unit diagonal; the shortest one of a singular A."""
+    if len(b) and (np.diag(A) > 0).all():
+        size = np.sqrt(np.diag(A))
+        root, x, failed = dposv(A / np.outer(size, size), b / size)
+        if not failed and np.diag(root).min() > LEAST_PIVOT:
+            return np.asarray(x / size)
+    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
 
 
 def after_step(ship: ExtendedModel, keys: Sequence[str], step: Array) -> dict[str, float]:

@@ -151,6 +151,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
         grams=grams,
         precision=problem.precision,
         step=step,
+        gain=gain,
         converged=gain < TUNING.converged_below,
     )
 
@@ -178,16 +179,19 @@ def _with_noise_refitted(problem: _Problem, found: Fit) -> Fit:
 
 
 def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
-    """The fit after a step, halved until the cost rises no more than allowed, None if no share of it achieves that.
+    """The fit after a step, halved where it raises the cost by more than allowed, None if no share of it lowers it.
 
-    Beside it the number of simulations.
+    A whole step may raise it a little, because weights depend on the effects. Where shares of it do so too, the fit is
+    as good as its steps make it. Shares that would hardly lower it are not tried. Beside it the number of simulations.
     """
     held = problem.options.fixed_weights
-    limit = best.cost + TUNING.allowed_rise
     effects = np.broadcast_to(best.step, (len(best.starts), len(best.step)))
     start_step = _resized(best.grams.initial_state_steps(effects), best.ship.states)
     for halvings in range(TUNING.halvings + 1):
         share = 0.5**halvings
+        if halvings and share * (2.0 - share) * best.gain < TUNING.converged_below:
+            return None, halvings
+        limit = best.cost + (0.0 if halvings else TUNING.allowed_rise)
         ship = best.ship.with_effects(after_step(best.ship, best.keys, share * best.step))
         starts = best.starts + share * start_step
         motion = simulate_nearby(ship, problem.windows, starts, best.linear)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.data import Noise, before_windows, random_current_covariance, whitened
+from expdesign.diagnosis.data import Noise, before_windows, random_current_precision, whitened
 from expdesign.diagnosis.fit.linear_model import Sensitivities
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.values import Array
@@ -135,7 +135,7 @@ def window_information(grams: GramMatrices, found: Sensitivities, noise: Noise) 
     A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
     if noise.current_std_mps == 0.0 or found.knot_count == 0:
         return A, s
-    ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))
+    ZZ = grams.XX[:, c:, c:] + current_precision(found, noise)[0]
     solved = np.linalg.solve(ZZ, np.concatenate([grams.XX[:, c:, :c], grams.Xe[:, c:, None]], axis=2))
     ZX = np.swapaxes(grams.XX[:, c:, :c], 1, 2)
     return A - ZX @ solved[..., :-1], s - (ZX @ solved[..., -1:])[..., 0]
@@ -160,11 +160,11 @@ def marginalised_under(grams: GramMatrices, found: Sensitivities, noises: Sequen
     """The same under several random currents, none of them zero, with the same whitening."""
     c = found.numbers
     A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
-    priors = np.stack([current_prior(found, noise) for noise in noises])
+    precisions, sizes = zip(*(current_precision(found, noise) for noise in noises), strict=True)
     ZX, Ze = grams.XX[:, c:, :c], grams.Xe[:, c:]
-    ZZ = grams.XX[:, c:, c:] + np.linalg.inv(priors)[:, None]
+    ZZ = grams.XX[:, c:, c:] + np.stack(precisions)[:, None]
     solved = np.linalg.solve(ZZ, np.concatenate([ZX, Ze[..., None]], axis=2))
-    log_dets = np.linalg.slogdet(ZZ)[1].sum(axis=1) + len(A) * np.linalg.slogdet(priors)[1]
+    log_dets = np.linalg.slogdet(ZZ)[1].sum(axis=1) + len(A) * np.array(sizes)
     each = s - np.einsum("wzc,twz->twc", ZX, solved[..., -1])
     known = np.swapaxes(ZX, 1, 2) @ solved[..., :-1]
     return [
@@ -179,10 +179,13 @@ def marginalised_under(grams: GramMatrices, found: Sensitivities, noises: Sequen
     ]
 
 
-def current_prior(found: Sensitivities, noise: Noise) -> Array:
-    """(z, z) covariance of the random current at its knots, north before east [m^2/s^2]."""
-    unit = random_current_covariance(found.knot_count, found.spacing_s, noise.current_time_s)
-    return np.asarray(noise.current_std_mps**2 * unit)
+def current_precision(found: Sensitivities, noise: Noise) -> tuple[Array, float]:
+    """(z, z) inverse covariance of the random current at its knots, north before east [s^2/m^2].
+
+    Beside it the log determinant of the covariance.
+    """
+    unit, size = random_current_precision(found.knot_count, found.spacing_s, noise.current_time_s)
+    return unit / noise.current_std_mps**2, size + 2.0 * len(unit) * float(np.log(noise.current_std_mps))
 
 
 def information(found: Sensitivities, noise: Noise) -> MarginalInformation:

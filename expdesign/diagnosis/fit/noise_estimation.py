@@ -12,7 +12,7 @@ from expdesign.diagnosis.fit.fit import best_step
 from expdesign.diagnosis.fit.gram_matrices import (
     GramMatrices,
     MarginalInformation,
-    current_prior,
+    current_precision,
     gram_matrices,
     marginalised,
     marginalised_under,
@@ -105,7 +105,7 @@ def _remainder(grams: GramMatrices, found: Sensitivities, noise: Noise, prior: P
     step, _ = best_step(m.A + prior.precision, score, prior.bounds)
     effects = np.broadcast_to(step, (len(grams.Xe), c))
     if noise.current_std_mps > 0 and found.knot_count:
-        ZZ = grams.XX[:, c:, c:] + np.linalg.inv(current_prior(found, noise))
+        ZZ = grams.XX[:, c:, c:] + current_precision(found, noise)[0]
         b = np.linalg.solve(ZZ, (grams.Xe[:, c:] - grams.XX[:, c:, :c] @ step)[..., None])[..., 0]
         normal = np.random.default_rng(0).standard_normal((*b.shape, 1))
         b = b + np.linalg.solve(np.swapaxes(np.linalg.cholesky(ZZ), 1, 2), normal)[..., 0]

@@ -18,7 +18,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
 from expdesign.diagnosis.fit.gram_matrices import (
     GramMatrices,
-    current_prior,
+    current_precision,
     gram_matrices,
     start_columns,
     whitened_error,
@@ -55,7 +55,7 @@ def prediction_gain(
 
 def _current(grams: GramMatrices, found: Sensitivities, noise: Noise) -> Array:
     """(w, z) likeliest random current at its knots."""
-    prior = np.linalg.inv(current_prior(found, noise))
+    prior = current_precision(found, noise)[0]
     return np.asarray(np.linalg.solve(grams.XX + prior, grams.Xe[..., None])[..., 0])
 
 

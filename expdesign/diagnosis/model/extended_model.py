@@ -26,11 +26,15 @@ The search begins at the values that the vessel file states; every test is of th
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
+from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model.terms import (
     Effects,
     ScaledTerm,
@@ -41,6 +45,7 @@ from expdesign.diagnosis.model.terms import (
     unit_terms,
 )
 from expdesign.simulation.tape import Evaluation, evaluation
+from expdesign.values import Array
 from expdesign.vessel import Roll, Term, VesselModel
 from expdesign.vessel.expressions import Expression
 from expdesign.waves import G_MPS2
@@ -112,6 +117,19 @@ class ExtendedModel:
     def regressors(self) -> Evaluation:
         """Regressors of `scaled_terms`, to be evaluated together."""
         return evaluation([part.expression for part in self.scaled_terms])
+
+    @cached_property
+    def combined_terms(self) -> tuple[tuple[int, ...], list[tuple[int, Array]]]:
+        """(t,) rows of `scaled_terms` ordered by equation; of u, v and r the first row, and factors of all its rows."""
+        order = [[place for place, part in enumerate(self.scaled_terms) if part.equation == name] for name in OUTPUTS]
+        rows = np.argsort([place for places in order for place in places]).tolist()
+        first = [0, *itertools.accumulate(map(len, order))]
+        own = [np.array([self.factor(self.scaled_terms[place]) for place in places]) for places in order]
+        return tuple(rows), list(zip(first, own, strict=False))
+
+    def factor(self, part: ScaledTerm) -> float:
+        """Factor of a term in its rate: over the inertia, but for ratios of inertias."""
+        return part.factor if part.coriolis else part.factor / (1 + self.get(f"inertia:{part.equation}"))
 
     @property
     def input_products(self) -> Mapping[str, Expression]:

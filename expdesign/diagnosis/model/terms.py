@@ -46,10 +46,6 @@ class ScaledTerm:
     reads_air: bool = False
     reads_turn: bool = False
 
-    def after_factor(self, exogenous: Mapping[str, Array]) -> Array:
-        """The change of the factor at every time."""
-        return np.asarray(self.after * exogenous["after"])
-
 
 def own_terms(model: VesselModel, effects: Effects) -> list[ScaledTerm]:
     """The model's own terms."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -37,8 +36,7 @@ def rates_by_term(
     result = []
     regressors = evaluation([part.expression for part in parts]).values(signals)
     for part, regressor in zip(parts, regressors, strict=True):
-        value = _value(ship, part, regressor, exogenous)
-        value = value if part.coriolis else value / _heavier(ship, part.equation, exogenous)
+        value = np.broadcast_to(ship.factor(part) * regressor * _varying(ship, part, exogenous), u.shape)
         plain = _coupled(ship, [value if name == part.equation else still for name in OUTPUTS])
         result.append(plain if ship.roll is None else ship.roll.rates(plain, still, (still, still)))
     return result
@@ -47,15 +45,18 @@ def rates_by_term(
 def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: ExogenousInputs) -> tuple[Array, ...]:
     """d/dt (u, v, r) through water, without roll."""
     signals = _signals(ship, u, v, r, exogenous)
-    totals = dict.fromkeys(OUTPUTS, np.zeros_like(u))
-    steady = dict(totals)
-    for part, regressor in zip(ship.scaled_terms, ship.regressors.values(signals), strict=True):
-        into = steady if part.coriolis else totals
-        into[part.equation] = into[part.equation] + _value(ship, part, regressor, exogenous)
+    places, factors = ship.combined_terms
+    terms = np.empty((len(places), *u.shape))
+    for place, part, value in zip(places, ship.scaled_terms, ship.regressors.values(signals), strict=True):
+        terms[place] = value
+        if part.after or SHOAL in exogenous:
+            terms[place] *= _varying(ship, part, exogenous)
+    rows = terms.reshape(len(terms), u.size)
+    rates = [(own @ rows[first : first + len(own)]).reshape(u.shape) for first, own in factors]
     lean = ship.get("asymmetry")
     if lean and not any(part.reads_turn for part in ship.scaled_terms):
-        totals["r"] = totals["r"] + lean * ahead_force(signals, ship.model)
-    return _coupled(ship, [totals[n] / _heavier(ship, n, exogenous) + steady[n] for n in OUTPUTS])
+        rates[2] += lean * ahead_force(signals, ship.model) / (1 + ship.get("inertia:r")) / _heavier(ship, exogenous)
+    return _coupled(ship, rates)
 
 
 def _coupled(ship: ExtendedModel, rates: Sequence[Array]) -> tuple[Array, ...]:
@@ -77,15 +78,14 @@ def _signals(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous: Exoge
     return signals
 
 
-def _value(ship: ExtendedModel, part: ScaledTerm, regressor: Any, exogenous: ExogenousInputs) -> Any:
-    """One term, before inertia."""
-    value = (part.factor + part.after_factor(exogenous) if part.after else part.factor) * regressor
+def _varying(ship: ExtendedModel, part: ScaledTerm, exogenous: ExogenousInputs) -> Array | float:
+    """What multiplies a term over time: a change of the ship, and the depth."""
+    factor = 1.0 + part.after / part.factor * exogenous["after"] if part.after else 1.0
     if part.damping and SHOAL in exogenous:
-        value = value * (1 + ship.get("shallow:damping") * exogenous[SHOAL])
-    return value
+        factor = factor * (1 + ship.get("shallow:damping") * exogenous[SHOAL])
+    return factor if part.coriolis else factor / _heavier(ship, exogenous)
 
 
-def _heavier(ship: ExtendedModel, equation: str, exogenous: ExogenousInputs) -> Array | float:
-    """Factor of inertia."""
-    factor = 1 + ship.get(f"inertia:{equation}")
-    return factor if SHOAL not in exogenous else factor * (1 + ship.get("shallow:inertia") * exogenous[SHOAL])
+def _heavier(ship: ExtendedModel, exogenous: ExogenousInputs) -> Array | float:
+    """Factor of inertia by the depth."""
+    return 1 + ship.get("shallow:inertia") * exogenous[SHOAL] if SHOAL in exogenous else 1.0

@@ -16,7 +16,7 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
-RISE = "rise "
+BEGIN, END = "begin ", "end "
 
 
 class ExogenousInputs(dict[str, Array]):
@@ -24,14 +24,17 @@ class ExogenousInputs(dict[str, Array]):
 
     `u_c v_c` water and `u_w v_w` air, their velocity in the b-frame [m/s], where they move;
     `h`, draught over depth, and `after`, one after a change of the ship, where the model reads such things.
-    Values are means over each step; signals that change within steps also have a rise, `rise NAME`, from the beginning
-    of each step to its end.
+    Values are means over each step; signals that change within steps also have values at the beginning of each step and
+    at its end, `begin NAME` and `end NAME`.
     """
 
     @cached_property
-    def rising(self) -> tuple[tuple[str, str], ...]:
-        """Names of signals that change within steps, and of their rises."""
-        return tuple((name.removeprefix(RISE), name) for name in self if name.startswith(RISE))
+    def rising(self) -> tuple[str, ...]:
+        """Names of signals that change within steps."""
+        return tuple(name.removeprefix(BEGIN) for name in self if name.startswith(BEGIN))
+
+    def __getstate__(self) -> None:
+        """What is cached is not sent to other processes."""
 
     def at(self, step: int) -> ExogenousInputs:
         """One integrator step of every window."""
@@ -41,17 +44,20 @@ class ExogenousInputs(dict[str, Array]):
 
     def at_fraction(self, share: float) -> ExogenousInputs:
         """Values within the steps, from -0.5 at their beginning to 0.5 at their end."""
-        if not self.rising:
+        if not self.rising or share == 0.0:
             return self
         result = ExogenousInputs(self)
-        for name, rise in self.rising:
-            result[name] = self[name] + share * self[rise]
+        for name in self.rising:
+            begin, end = self[f"{BEGIN}{name}"], self[f"{END}{name}"]
+            at_end = begin if share == -0.5 else end
+            result[name] = at_end if abs(share) == 0.5 else self[name] + share * (end - begin)
         return result
 
     def begun(self, steps: int) -> ExogenousInputs:
         """The first steps."""
         return ExogenousInputs({name: values[:, :steps] for name, values in self.items()})
 
+    @cached_property
     def without_last_step(self) -> ExogenousInputs:
         """All steps but the last."""
         return self.begun(-1)
@@ -92,7 +98,7 @@ def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
         found |= {place: acting[..., at] for at, place in enumerate(places)}
     signals = windows.gather(found)
     names = _force_names(ship)
-    names = (*names, *(f"{RISE}{name}" for name in names)) if finer > 1 else names
+    names = (*names, *(f"{end}{name}" for end in (BEGIN, END) for name in names)) if finer > 1 else names
     return ExogenousInputs({name: signals[..., i] for i, name in enumerate(names)})
 
 
@@ -104,8 +110,8 @@ def _forces_like(
     shape = known[names[0]].shape if names[0] in known else None
     if actuator_effects(ship) != actuator_effects(other) or shape != windows.heading.shape or {*names} - {*known}:
         return _forces(ship, windows)
-    rises = [f"{RISE}{name}" for name in names]
-    return ExogenousInputs({name: known[name] for name in (*names, *rises) if name in known})
+    ends = [f"{end}{name}" for end in (BEGIN, END) for name in names]
+    return ExogenousInputs({name: known[name] for name in (*names, *ends) if name in known})
 
 
 def _force_names(ship: ExtendedModel) -> tuple[str, ...]:
@@ -113,9 +119,9 @@ def _force_names(ship: ExtendedModel) -> tuple[str, ...]:
 
 
 def _acting(ship: ExtendedModel, rows: Array, finer: int, rows_per_step: int) -> Array:
-    """(k, m, b) inputs, forces and products, as means over integrator steps, and their rises where steps have parts.
+    """(k, m, b) inputs, forces and products: means over integrator steps; where steps have parts, ends of lines, too.
 
-    A straight line with this mean and rise has the mean and the first moment of the signal within the step. Where
+    A straight line between these ends has the mean and the first moment of the signal within the step. Where
     measurements are averaged over samples, so is the signal, because the mean force drives the mean motion.
     """
     table = dict(zip(ship.model.inputs, np.moveaxis(rows, 1, 0), strict=True))
@@ -129,8 +135,8 @@ def _acting(ship: ExtendedModel, rows: Array, finer: int, rows_per_step: int) ->
         return known
     parts = _averaged(known, finer, rows_per_step).reshape(len(rows) // finer, finer, *known.shape[1:])
     place = (np.arange(finer) + 0.5) / finer - 0.5
-    rises = 12.0 * np.einsum("f,kf...->k...", place, parts) / finer
-    return np.concatenate([parts.mean(axis=1), rises], axis=1)
+    means, half_rises = parts.mean(axis=1), 6.0 * np.einsum("f,kf...->k...", place, parts) / finer
+    return np.concatenate([means, means - half_rises, means + half_rises], axis=1)
 
 
 def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
@@ -138,9 +144,10 @@ def _averaged(values: Array, finer: int, rows_per_step: int) -> Array:
     half, apart = averaging_half_width(rows_per_step), finer // rows_per_step
     if not half:
         return values
-    taps = np.zeros(2 * half * apart + 1)
-    taps[::apart] = 1.0 / (2 * half + 1)
-    return np.asarray(scipy.ndimage.convolve1d(values, taps, axis=0, mode="nearest"))
+    others = [(0, 0)] * (values.ndim - 1)
+    held = np.pad(values, [(half * apart, half * apart), *others], mode="edge").reshape(-1, apart, *values.shape[1:])
+    means = scipy.ndimage.uniform_filter1d(held, 2 * half + 1, axis=0)[half:-half]  # a running sum, of any width
+    return np.asarray(means.reshape(values.shape))
 
 
 def _wind(ship: ExtendedModel, windows: Windows) -> tuple[Array, Array]:

@@ -53,10 +53,10 @@ def _rk4_part(
 
 
 def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
-    """(w, k, n, n) derivatives of the rates, by central differences; as many at once as keep memory small."""
+    """(..., n, n) derivatives of the rates, by central differences; as many at once as keep memory small."""
     n = ship.states
     columns = np.moveaxis(states, -1, 0)[:, None]
-    moves = TUNING.difference * np.concatenate([np.eye(n), -np.eye(n)])[:, :, None, None]
+    moves = TUNING.difference * np.concatenate([np.eye(n), -np.eye(n)]).reshape(2 * n, n, *[1] * (states.ndim - 1))
     at_once = max(1, TUNING.samples_at_once // max(1, states[..., 0].size))
     rates = np.empty((2 * n, n, *states.shape[:-1]))
     for low in range(0, 2 * n, at_once):
@@ -65,7 +65,7 @@ def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInput
         for column, rate in enumerate(state_rates(ship, moved, exogenous)):
             rates[low : low + at_once, column] = rate
     jacobian = (rates[:n] - rates[n:]) / (2 * TUNING.difference)
-    return np.ascontiguousarray(jacobian.transpose(2, 3, 1, 0))
+    return np.ascontiguousarray(np.moveaxis(jacobian, (0, 1), (-1, -2)))
 
 
 def transition_matrices(jacobian: Array, h: float, parts: int = 1) -> tuple[Array, Array]:
@@ -101,7 +101,7 @@ def propagated(transition: Array, first: Array, missed: Array) -> Array:
 
 
 def stacked_rates(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
-    """(w, k, n) rates of states (w, k, n)."""
+    """(..., n) rates of states (..., n)."""
     found = state_rates(ship, tuple(np.moveaxis(states, -1, 0)), exogenous)
     result = np.empty(states.shape)
     for column, part in enumerate(found):

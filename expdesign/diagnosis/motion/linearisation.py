@@ -32,10 +32,9 @@ INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "log
 
 def linearise(motion: Motion) -> LinearisedMotion:
     """Transition matrices from finite differences of the rates, all steps at once."""
-    ends = (motion.states[:, :-1], motion.states[:, 1:])
-    exogenous = motion.exogenous.without_last_step()
-    path_rates = np.stack([stacked_rates(motion.ship, end, exogenous) for end in ends])
-    jacobian = (state_jacobian(motion.ship, ends[0], exogenous) + state_jacobian(motion.ship, ends[1], exogenous)) / 2
+    exogenous = motion.exogenous.without_last_step
+    path_rates = stacked_rates(motion.ship, motion.ends, exogenous)
+    jacobian = state_jacobian(motion.ship, motion.ends, exogenous).mean(axis=0)
     step_s = motion.windows.step_s
     transition, forcing = transition_matrices(jacobian, step_s, parts_of_step(motion.ship, step_s))
     return LinearisedMotion(motion=motion, transition=transition, forcing=forcing, path_rates=path_rates)
@@ -78,11 +77,8 @@ def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float)
             "u_w" in motion.exogenous or not any(part.reads_air for part in changed.scaled_terms)
         )
         exogenous = motion.exogenous if known else _exogenous_after(motion, changed)
-        exogenous = exogenous.without_last_step()
-        ends = (motion.states[:, :-1], motion.states[:, 1:])
-        force = np.mean([stacked_rates(changed, end, exogenous) for end in ends], axis=0) - linear.path_rates.mean(
-            axis=0
-        )
+        exogenous = exogenous.without_last_step
+        force = stacked_rates(changed, motion.ends, exogenous).mean(axis=0) - linear.mean_rates
     return Disturbance(
         force=force / per if np.any(force) else None,
         sensor=sensor / per if np.any(sensor) else None,
@@ -108,14 +104,11 @@ def term_disturbances(linear: LinearisedMotion, keys: Sequence[str]) -> dict[str
     }
     if not parts:
         return {}
-    exogenous = motion.exogenous.without_last_step()
-    ends = [
-        rates_by_term(ship, tuple(parts.values()), tuple(np.moveaxis(end, -1, 0)), exogenous)
-        for end in (motion.states[:, :-1], motion.states[:, 1:])
-    ]
+    exogenous = motion.exogenous.without_last_step
+    found = rates_by_term(ship, tuple(parts.values()), tuple(np.moveaxis(motion.ends, -1, 0)), exogenous)
     return {
-        key: Disturbance(force=np.stack([(a + b) / 2 for a, b in zip(*rates, strict=True)], axis=-1), sensor=None)
-        for key, *rates in zip(parts, *ends, strict=True)
+        key: Disturbance(force=np.stack([(ends[0] + ends[1]) / 2 for ends in rates], axis=-1), sensor=None)
+        for key, rates in zip(parts, found, strict=True)
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,12 @@ class Motion:
     heading_change: Array
     predicted: Array
 
+    @cached_property
+    def ends(self) -> Array:
+        """(2, w, k - 1, n) states at the beginning and at the end of every step; components lie apart in memory."""
+        components = np.moveaxis(self.states, -1, 0)
+        return np.moveaxis(np.stack([components[..., :-1], components[..., 1:]], axis=1), 0, -1)
+
     @property
     def error(self) -> Array:
         """(w, s, 4) measured less simulated, nan where not measured."""
@@ -58,13 +65,18 @@ class LinearisedMotion:
         motion: the simulation.
         transition: (w, k - 1, n, n) transition over each step.
         forcing: (w, k - 1, n, n) effect of a constant acceleration over each step.
-        path_rates: (w, k, n) rates along the path at both ends of every step with its inputs, stacked (2, w, k - 1, n).
+        path_rates: (2, w, k - 1, n) rates along the path at both ends of every step, with its inputs.
     """
 
     motion: Motion
     transition: Array
     forcing: Array
     path_rates: Array
+
+    @cached_property
+    def mean_rates(self) -> Array:
+        """(w, k - 1, n) means of the rates at both ends."""
+        return np.asarray(self.path_rates.mean(axis=0))
 
     def selected(self, keep: NDArray[np.bool_]) -> LinearisedMotion:
         """Only some of the windows, by a mask (w,)."""

@@ -72,7 +72,7 @@ def _motion(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs, s
     """Heading and sensor outputs along the states."""
     with np.errstate(over="ignore", invalid="ignore"):
         turns = runge_kutta_step(
-            ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), exogenous.without_last_step(), windows.step_s
+            ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), exogenous.without_last_step, windows.step_s
         )[1]
     heading_change = np.zeros(states.shape[:2])
     heading_change[:, 1:] = np.cumsum(turns, axis=1)
@@ -115,7 +115,7 @@ def _newton_from_measured(
     """(w, k, n) states by Newton's method from the measured velocities, without roll; None without convergence."""
     states = np.zeros((len(start), windows.steps, ship.states))
     states[..., :3] = _measured_states(windows)
-    transition = _transition(ship, windows, exogenous.without_last_step(), states)
+    transition = _transition(ship, windows, exogenous.without_last_step, states)
     return _newton_over_all_steps(ship, windows, exogenous, start, states, transition)
 
 
@@ -140,7 +140,7 @@ def _newton_over_all_steps(
     Sources: P. Bellen and M. Zennaro, Journal of Computational and Applied Mathematics 25 (1989), 341-350; E. Hairer
     and G. Wanner, Solving Ordinary Differential Equations II (1996), IV.8, for when to end.
     """
-    middle, last = exogenous.without_last_step(), np.inf
+    middle, last = exogenous.without_last_step, np.inf
     for number in range(TUNING.newton_rounds):
         made = np.stack(
             runge_kutta_step(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1
@@ -208,7 +208,7 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
         now = ship_velocities(ship, first + rise * step / head.steps_per_sample)
         line[:, step, :3] = np.where(modelled, now, 0.0)
     inputs = exogenous.begun(head.steps)
-    middle = inputs.without_last_step()
+    middle = inputs.without_last_step
     with np.errstate(over="ignore", invalid="ignore"):
         transition = _transition(ship, head, middle, line)
         made = runge_kutta_step(ship, tuple(np.moveaxis(line[:, :-1], -1, 0)), middle, head.step_s)[0]

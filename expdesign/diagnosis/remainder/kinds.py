@@ -137,10 +137,9 @@ def _with_inputs(
         rows[:, column] = change(rows[:, column], since)
     ends_of_runs = np.cumsum([len(part) for part in windows.batch_inputs])[:-1]
     changed = np.split(rows, ends_of_runs)
-    exogenous = exogenous_inputs(motion.ship, replace(windows, batch_inputs=tuple(changed))).without_last_step()
-    ends = (motion.states[:, :-1], motion.states[:, 1:])
-    force = np.mean([stacked_rates(motion.ship, one, exogenous) for one in ends], axis=0)
-    return Disturbance(force=force - linear.path_rates.mean(axis=0), sensor=None)
+    exogenous = exogenous_inputs(motion.ship, replace(windows, batch_inputs=tuple(changed))).without_last_step
+    force = stacked_rates(motion.ship, motion.ends, exogenous).mean(axis=0) - linear.mean_rates
+    return Disturbance(force=force, sensor=None)
 
 
 def _cut(size: float, values: Array, _since: NDArray[np.bool_]) -> Array:

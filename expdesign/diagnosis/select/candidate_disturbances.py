@@ -43,7 +43,7 @@ def _smooth_disturbance(linear: LinearisedMotion, candidate: Candidate, key: str
 def _roll_disturbance(linear: LinearisedMotion, candidate: Candidate, key: str) -> Disturbance:
     """Acceleration by a roll angle that the simulated path itself excites."""
     motion = linear.motion
-    rates = linear.path_rates.mean(axis=0)
+    rates = linear.mean_rates
     middle = (motion.states[:, :-1] + motion.states[:, 1:]) / 2
     side = rates[..., 1] + middle[..., 0] * middle[..., 2]
     w0, damping = 2 * np.pi / candidate.fixed["roll:period"], candidate.fixed["roll:damping"]

@@ -107,7 +107,7 @@ def best_step(
     """The best candidate of a round's tests, fitted; None where none is significant."""
     if not work.allows(FURTHER):
         return None
-    points, far = starting_points(base, windows, tests)
+    points, far = starting_points(base, windows, tests, work.fits_beside(base))
     rough = _rough_fits(base, windows, points, work, far=far)
     possible = [item for item in rough if _is_possible(item)]
     astray = leads_away(validation.of(base))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +19,22 @@ from expdesign.diagnosis.select.starting_point import (
 )
 from expdesign.diagnosis.select.tuning import TUNING
 
+SHORT = "in short windows"
+"""What is known of short windows beside a fit: the fit in them, and candidates beside that."""
 
-def starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -> tuple[list[StartingPoint], bool]:
-    """Starting points, and whether the best candidate is a large effect; then they come from short windows."""
+
+def starting_points(
+    base: Fit, windows: Windows, tests: tuple[ScoreTest, ...], known: dict[Hashable, Any]
+) -> tuple[list[StartingPoint], bool]:
+    """Starting points, and whether the best candidate is a large effect; then they come from short windows.
+
+    `known` is of `Work.fits_beside`.
+    """
     shortlist = _shortlist(tests)
     shortlist += _hidden_by_random_current(base, tests, shortlist)
-    short_fit = fit_short_windows(base, windows)
+    if SHORT not in known:
+        known[SHORT] = fit_short_windows(base, windows), {}
+    short_fit, beside = known[SHORT]
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
         return [starting_point(base, test) for test in shortlist], False
@@ -36,7 +47,7 @@ def starting_points(base: Fit, windows: Windows, tests: tuple[ScoreTest, ...]) -
         for item in of_short
         if id(item.candidate) not in listed
     ]
-    return start_in_short_windows(short_fit, [*certain, *others], len(certain)), True
+    return start_in_short_windows(short_fit, [*certain, *others], len(certain), beside), True
 
 
 def _never_left_out(shortlist: Sequence[ScoreTest]) -> list[ScoreTest]:

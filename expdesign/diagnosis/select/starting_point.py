@@ -5,7 +5,7 @@ Large effects begin in short windows: long simulations are too far from the data
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,16 +112,27 @@ def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
         return None
 
 
-def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certain: int) -> list[StartingPoint]:
+def start_in_short_windows(
+    short_fit: Fit,
+    shortlist: Sequence[ScoreTest],
+    certain: int,
+    known: dict[Hashable, tuple[StartingPoint, Fit | None]],
+) -> list[StartingPoint]:
     """Starting points from fits in short windows; candidates that gain much less than the best are left out.
 
     Args:
         short_fit: the model in use, by `fit_short_windows`.
         shortlist: tests of the candidates.
         certain: this many of the first are never left out.
+        known: candidate -> its first guess and its fit, beside this one, of earlier rounds and of this one.
     """
-    points = list(in_order(starting_point, (short_fit,), [(test,) for test in shortlist]))
-    fits = list(in_order(_fit_in_short_windows, (short_fit,), [(point,) for point in points]))
+    keys = [_same(test.candidate) for test in shortlist]
+    waiting = {key: test for key, test in zip(keys, shortlist, strict=True) if key not in known}
+    guesses = list(in_order(starting_point, (short_fit,), [(test,) for test in waiting.values()]))
+    fitted = in_order(_fit_in_short_windows, (short_fit,), [(point,) for point in guesses])
+    known |= dict(zip(waiting, zip(guesses, fitted, strict=True), strict=True))
+    points = [replace(known[key][0], test=test) for key, test in zip(keys, shortlist, strict=True)]
+    fits = [known[key][1] for key in keys]
     noise = likeliest([short_fit, *(found for found in fits if found is not None)]).noise
     without = profile_cost(short_fit, noise)
     gains = [-np.inf if found is None else without - profile_cost(found, noise) for found in fits]
@@ -132,6 +143,11 @@ def start_in_short_windows(short_fit: Fit, shortlist: Sequence[ScoreTest], certa
         for number, (point, found, gain) in enumerate(zip(points, fits, gains, strict=True))
         if number < certain or gain > TUNING.least_gain_share * max(gains)
     ]
+
+
+def _same(candidate: Candidate) -> Hashable:
+    """What candidates that are fitted alike share."""
+    return candidate.cause, tuple(candidate.free.items()), tuple(candidate.fixed.items())
 
 
 def _fit_in_short_windows(short_fit: Fit, point: StartingPoint) -> Fit | None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from typing import Any
 
 from expdesign.diagnosis.fit import Fit
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import Estimated, silent
 
@@ -27,11 +27,9 @@ class Work:
     untried: list[str] = field(default_factory=list)
     rounds_left: int = TUNING.first_rounds
     progress: Estimated = field(default_factory=lambda: Estimated(silent))
-    _fits: tuple[Fit | None, dict[Hashable, FittedCandidate | None]] = field(
-        default_factory=lambda: (None, {}), repr=False
-    )
+    _fits: tuple[Fit | None, dict[Hashable, Any]] = field(default_factory=lambda: (None, {}), repr=False)
 
-    def fits_beside(self, base: Fit) -> dict[Hashable, FittedCandidate | None]:
+    def fits_beside(self, base: Fit) -> dict[Hashable, Any]:
         """Fits of candidates beside this one, for another round from it; those beside others are forgotten."""
         if self._fits[0] is not base:
             self._fits = base, {}

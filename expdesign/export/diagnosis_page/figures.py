@@ -18,6 +18,7 @@ from expdesign.vessel import column_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.transforms import Bbox
 
 BINS, FEWEST = 16, 15
 """Largest number of groups, and smallest number of samples in each."""
@@ -145,10 +146,11 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     limits = [1.15 * max(float(np.abs(items[i].mean).max() + items[i].std.max()) for items in tests.values())
               for i in range(len(residuals.outputs))]  # fmt: skip
     ranked = sorted(tests, key=lambda name: min(item.p_value for item in tests[name]))
+    places: list[Bbox] = []
     return [
         (
             any(item.p_value < clear for item in tests[name]),
-            _residual_figure(name, residuals.outputs, tests[name], limits, clear),
+            _residual_figure(name, residuals.outputs, tests[name], limits, clear, places),
         )
         for name in ranked
     ]
@@ -156,10 +158,18 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
 
 @page_figure
 def _residual_figure(
-    name: str, outputs: tuple[str, ...], items: list[Dependence], limits: list[float], clear: float
+    name: str,
+    outputs: tuple[str, ...],
+    items: list[Dependence],
+    limits: list[float],
+    clear: float,
+    places: list[Bbox],
 ) -> str:
-    """One variable: means of the residual with two standard errors, an output above the other."""
-    figure = new_figure(2.6, 0.55 + 0.95 * len(outputs))
+    """One variable: means of the residual with two standard errors, an output above the other.
+
+    The limits and sizes of all such figures are the same, so `places` of their axes are found for the first of them.
+    """
+    figure = new_figure(2.6, 0.55 + 0.95 * len(outputs), arranged=not places)
     rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
     factor = DEGREES if name == "heading" else 1 / 60 if name == "time" else DEGREES if name == "r" else 1.0
     for axes, output, item, limit in zip(rows, outputs, items, limits, strict=True):
@@ -175,9 +185,12 @@ def _residual_figure(
         light_grid(axes)
     rows[-1].set_xlabel(variable_label(name), fontsize=9)
     figure.align_ylabels()
-    return svg(
-        figure, key=f"residual-{name}", label=f"Acceleration that the model lacks against {variable_label(name)}"
-    )
+    for axes, place in zip(rows, places, strict=False):
+        axes.set_position(place)
+    label = f"Acceleration that the model lacks against {variable_label(name)}"
+    drawn = svg(figure, key=f"residual-{name}", label=label)
+    places += [] if places else [axes.get_position() for axes in rows]
+    return drawn
 
 
 def variable_label(name: str) -> str:

@@ -41,9 +41,6 @@ from expdesign.workflows.steps.workers import workers
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
-FEW_SAMPLES = 1000
-"""Number of samples up to which other processes take longer to start than they save."""
-
 
 def diagnose(
     data: Sequence[Path],
@@ -77,7 +74,7 @@ def diagnose(
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     reported = Estimated(progress, after=drawing)
-    with workers(jobs if samples > FEW_SAMPLES else 1, load=None), doubted(record):
+    with workers(jobs, load=None), doubted(record):
         found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=reported)
     reported.after = 0.0
     roll = _roll(ship, record)
