@@ -6,11 +6,19 @@ import numpy as np
 
 from expdesign.errors import NoPlan
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo import Trials, estimate_risk, failed_chance_constraint, sail_trials, trials_needed
+from expdesign.plan.monte_carlo import (
+    Trials,
+    estimate_risk,
+    failed_chance_constraint,
+    sail_trials,
+    shares_allowed,
+    trials_needed,
+)
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import verify_plan
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
@@ -67,8 +75,17 @@ def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial)
     return np.asarray(problem.vessel.sample_time_s * trials.samples[:, done].mean(axis=1) - sailed.legs_s)
 
 
-def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> bool:
-    """Whether drawn trials accept a first plan."""
+def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budget: WorkBudget) -> bool:
+    """Whether drawn trials accept a first plan; their work is counted."""
     risk, trials = drawn_risk(problem, water, sailed)
+    budget.sailed(trials.samples_sailed)
     confidence = problem.settings.confidence
     return not failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
+
+
+def promising(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budget: WorkBudget) -> bool:
+    """Whether it is likelier than not that drawn trials would accept a plan, by few of them; their work is counted."""
+    rng = np.random.default_rng((problem.seed, PLAN.trials_stream))
+    trials = sail_trials(water, sailed, draws=PLAN.lateness_trials, rng=rng)
+    budget.sailed(trials.samples_sailed)
+    return shares_allowed(trials.shares(), problem.settings.confidence)

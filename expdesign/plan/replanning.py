@@ -14,9 +14,11 @@ from expdesign.plan.assembly import (
     footprints,
     search_space,
 )
+from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo import (
     Trials,
     failed_chance_constraint,
+    shares_allowed,
     trials_needed,
     violates_chance_constraint,
     worst_leg,
@@ -37,12 +39,16 @@ class Refused:
         sailed: commands, motion and legs.
         risk, trials: by drawn trials.
         failed: why it is refused.
+        water: that legs of it keep to.
+        spent_s: counted work that it took.
     """
 
     sailed: SailedTrial
     risk: RiskEstimate
     trials: Trials
     failed: str
+    water: LegWater
+    spent_s: float
 
     @property
     def place(self) -> Array | None:
@@ -56,6 +62,14 @@ class Refused:
         """The run that, with the leg to it, leaves the water or is aborted in most trials."""
         failing = (self.trials.left | self.trials.aborted).mean(axis=1)
         return self.sailed.legs[int(failing.argmax())].name
+
+    def promises(self, name: str, confidence: float) -> bool:
+        """Whether a plan without the runs of a name should be acceptable, by what failed in the rest of this one.
+
+        Some margin is asked for: runs placed anew fail in other places.
+        """
+        left, aborted = self.trials.shares([leg.name != name for leg in self.sailed.legs])
+        return shares_allowed((left / PLAN.promise, aborted / PLAN.promise), confidence)
 
 
 def worth_replanning(
@@ -79,7 +93,7 @@ def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: 
         error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
         return error
     error.what, error.which, error.confidence = "risk", last.worst, lower
-    error.plan = first.water, made[0].sailed
+    error.plan = made[0]
     return error
 
 

@@ -55,24 +55,39 @@ from expdesign.values import Array, seal
 Planned = TypeVar("Planned")
 
 
-def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: Progress = silent) -> Plan:
+def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Args:
         problem: the trial.
-        drafted: its draft, where there is one already.
         progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
             one key helps, if one of those tried does.
     """
-    reported = never_falling(progress)
     try:
-        return _in_water(problem, reported, _planned) if drafted is None else _checked(problem, drafted, reported)
+        return _in_water(problem, never_falling(progress), _planned)
     except NoPlan as error:
-        within = replace(problem, area=error.within or (drafted or problem).area)
-        raise advised(within, error, progress) from None
+        raise with_advice(problem, error, progress) from None
+
+
+def plan_drafted(problem: PlanProblem, draft: Draft, *, progress: Progress = silent) -> Plan:
+    """The plan of a draft. Its refusal comes without advice, as another draft may do.
+
+    Raises:
+        NoPlan: as of `plan_trial`.
+    """
+    try:
+        return _checked(problem, draft, never_falling(progress))
+    except NoPlan as error:
+        error.within = draft.area
+        raise
+
+
+def with_advice(problem: PlanProblem, refused: NoPlan, progress: Progress = silent) -> NoPlan:
+    """A refusal with which change of one key helps, in the water that was planned in."""
+    return advised(replace(problem, area=refused.within or problem.area), refused, progress)
 
 
 def _in_water(
@@ -128,8 +143,9 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
-        budget.sailed(int(trials.samples.max(axis=1).sum()))
-        made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed))
+        budget.sailed(trials.samples_sailed)
+        spent_s = budget.spent_s - before_s
+        made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed, water=room.water, spent_s=spent_s))
         if not worth_replanning(problem, risk, budget, attempt=attempt, before_s=before_s):
             break
         try:
