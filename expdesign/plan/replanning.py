@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,62 +14,19 @@ from expdesign.plan.assembly import (
     footprints,
     search_space,
 )
-from expdesign.plan.legs import LegWater
+from expdesign.plan.checked import Refused
 from expdesign.plan.monte_carlo import (
     Trials,
     failed_chance_constraint,
-    shares_allowed,
     trials_needed,
     violates_chance_constraint,
     worst_leg,
 )
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Leg, RiskEstimate, SailedTrial
+from expdesign.plan.values import Leg, RiskEstimate
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
-from expdesign.values import Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Refused:
-    """A plan that is too risky.
-
-    Attributes:
-        sailed: commands, motion and legs.
-        risk, trials: by drawn trials.
-        failed: why it is refused.
-        water: that legs of it keep to.
-        spent_s: counted work that it took.
-    """
-
-    sailed: SailedTrial
-    risk: RiskEstimate
-    trials: Trials
-    failed: str
-    water: LegWater
-    spent_s: float
-
-    @property
-    def place(self) -> Array | None:
-        """(2,) where most trials left allowed water, or None where none did."""
-        places = self.trials.place[worst_leg(self.trials)]
-        left = ~np.isnan(places[:, 0])
-        return np.median(places[left], axis=0) if left.any() else None
-
-    @property
-    def worst(self) -> str:
-        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
-        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
-        return self.sailed.legs[int(failing.argmax())].name
-
-    def promises(self, name: str, confidence: float) -> bool:
-        """Whether a plan without the runs of a name should be acceptable, by what failed in the rest of this one.
-
-        Some margin is asked for: runs placed anew fail in other places.
-        """
-        left, aborted = self.trials.shares([leg.name != name for leg in self.sailed.legs])
-        return shares_allowed((left / PLAN.promise, aborted / PLAN.promise), confidence)
 
 
 def worth_replanning(

@@ -25,7 +25,7 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
-from expdesign.plan.checked import drawn_lateness_s, drawn_risk, verified
+from expdesign.plan.checked import Refused, drawn_lateness_s, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs_ahead import KnownLegs
@@ -35,7 +35,6 @@ from expdesign.plan.monte_carlo import (
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised
 from expdesign.plan.replanning import (
-    Refused,
     not_again,
     replanning_progress,
     too_risky,

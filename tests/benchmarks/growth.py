@@ -210,7 +210,8 @@ def rows(part: str, unit_s: float) -> None:
     before: tuple[int, float] | None = None
     for size in PARTS[part][1]:
         spent_s, peak_mib = measured(part, size)
-        grown = "-" if before is None else f"{math.log(spent_s / before[1]) / math.log(size / before[0]):.2f}"
+        comparable = before is not None and min(spent_s, before[1]) > 0  # times are counted in hundredths
+        grown = f"{math.log(spent_s / before[1]) / math.log(size / before[0]):.2f}" if comparable else "-"
         print(
             f"| {__version__} ({date.today()}) | {part}: {size:,} | {spent_s:.2f} s | {spent_s / unit_s:.1f} | {grown} "
             f"| {peak_mib:.0f} MiB |",

@@ -8,7 +8,7 @@ from itertools import chain, islice
 from typing import Any
 
 from expdesign.errors import NoPlan
-from expdesign.plan.checked import accepted, promising, verified
+from expdesign.plan.checked import Refused, accepted, promising, verified
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies.changes import (
     ACCEPTED,
@@ -21,7 +21,6 @@ from expdesign.plan.remedies.changes import (
     first_that_passes,
     of_setting,
 )
-from expdesign.plan.replanning import Refused
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 
