@@ -113,7 +113,7 @@ class NoPlan(NoAnswer):
         poses: (k, 3) north m, east m, heading rad of the track as far as it was planned, or None.
         within: the part of the sea area that was planned in, or None where planning did not begin.
         confidence: a lower one that the first plan, which was too risky, would have met; None without any.
-        plan: that plan, with the water that it keeps to, while a remedy is looked for.
+        plan: the first plan that was too risky, while a remedy is looked for.
     """
 
     def __init__(self, obstacle: str, *, what: str = "", which: str = "", place: Any = None, remedy: str = "") -> None:

@@ -76,7 +76,8 @@ FLOORS = {
         ("feasibility",),
         ("assembly", "checked"),
         ("sailing",),
-        ("remedies", "replanning"),
+        ("replanning",),
+        ("remedies",),
         ("solve",),
     ),
     "workflows": (

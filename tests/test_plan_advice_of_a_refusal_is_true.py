@@ -23,7 +23,7 @@ from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies import advised, trials
+from expdesign.plan.remedies import advised, changes, trials
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.tuning import PLAN
@@ -226,17 +226,17 @@ def test_the_forecast_named_where_most_trials_are_aborted_is_one_with_which_the_
 
 def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch, story):
     whole = in_current(story, 1.4)
-    monkeypatch.setattr(trials, "first_sailed", lambda other: ())
+    monkeypatch.setattr(trials, "first_sailed", lambda other, budget: ())
     refused = {"what": "risk", "which": "deceleration"}
 
-    monkeypatch.setattr(trials, "accepted", lambda other: other.repeats["deceleration"] == 0)
+    monkeypatch.setattr(trials, "accepted", lambda other, budget: other.repeats["deceleration"] == 0)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
-    monkeypatch.setattr(trials, "accepted", lambda other: other.environment.current_std_mps < 1.0)
+    monkeypatch.setattr(trials, "accepted", lambda other, budget: other.environment.current_std_mps < 1.0)
     forecast = "environment.current_to.std_mps = 0.7 (a better forecast)"
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f"too risky; with {forecast} drawn trials accept the plan"
-    monkeypatch.setattr(trials, "accepted", lambda other: False)
+    monkeypatch.setattr(trials, "accepted", lambda other, budget: False)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f'too risky; no single change of those tried helps ({forecast}, design.excluded = ["deceleration"])'
     known = in_current(story, 0.0)
@@ -244,36 +244,53 @@ def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch,
     assert text == "too risky; no remedy could be checked"
 
 
-def too_risky(case: PlanProblem, plans: int) -> NoPlan:
+def too_risky(case: PlanProblem, plans: int, *, elsewhere: bool = True) -> NoPlan:
     """A refusal after so many plans, of which the first would have met a lower confidence."""
     error = NoPlan("too risky", what="risk", which="deceleration")
     error.confidence, error.tried = 0.8, ("a plan",) * plans
-    error.plan = leg_water(case, ship_on_legs(case)), "the refused plan"
+    water = leg_water(case, ship_on_legs(case))
+    error.plan = SimpleNamespace(sailed="", water=water, spent_s=PLAN_S, promises=lambda name, confidence: elsewhere)
     return error
 
 
+PLAN_S = 100.0
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """The problems planned in while looking for remedies, none of which are accepted; each takes the refused work."""
+    planned = []
+
+    def first(other, budget):
+        planned.append(other)
+        budget.spent_s += PLAN_S
+        return (), ()
+
+    monkeypatch.setattr(trials, "first_sailed", first)
+    monkeypatch.setattr(trials, "promising", lambda other, water, sailed, budget: False)
+    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: False)
+    return planned
+
+
 @pytest.mark.parametrize("helps", [True, False])
-def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypatch, story, helps):
-    case, made = in_current(story, 1.4), []
-    monkeypatch.setattr(trials, "first_sailed", lambda other: made.append(other.settings.confidence) or ((), ()))
-    monkeypatch.setattr(trials, "accepted", lambda other, *_: helps and other.settings.confidence == 0.8)
+def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypatch, story, made, helps):
+    case = in_current(story, 1.4)
+    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: helps and other.settings.confidence == 0.8)
     text = str(advised(case, too_risky(case, 3)))
-    assert made == [0.8]
+    assert [other.settings.confidence for other in made] == [0.8]
     assert ("with plan.confidence = 0.8 drawn trials accept the plan" in text) == helps
     assert "not tried" not in text
     assert helps or re.search(r"no single change of those tried helps \(.*plan\.confidence = 0\.8", text)
 
 
-def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkeypatch, story):
-    case, made, judged = in_current(story, 1.4), [], []
+def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkeypatch, story, made):
+    case, judged = in_current(story, 1.4), []
 
-    def accepts(other, water, sailed):
-        if sailed == "the refused plan":
-            judged.append((other.environment.current_std_mps, water.environment is other.environment))
+    def likely(other, water, sailed, budget):
+        judged.append((other.environment.current_std_mps, water.environment is other.environment))
         return False
 
-    monkeypatch.setattr(trials, "first_sailed", lambda other: made.append(other) or ((), ()))
-    monkeypatch.setattr(trials, "accepted", accepts)
+    monkeypatch.setattr(trials, "promising", likely)
     text = str(advised(case, too_risky(case, 1)))
     assert judged == [(0.7, True)]
     assert [other.environment.current_std_mps for other in made] == [1.4] * len(made)
@@ -283,12 +300,47 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
 @pytest.mark.parametrize("plans", [1, 2, 3])
 def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_before(monkeypatch, story, plans):
     case, told, said = in_current(story, 1.4), [], []
-    monkeypatch.setattr(trials, "first_sailed", lambda other: said.append(told[-1]) or ((), ()))
-    monkeypatch.setattr(trials, "accepted", lambda other, water, sailed: sailed == "the refused plan")
+    monkeypatch.setattr(trials, "first_sailed", lambda other, budget: said.append(told[-1]) or ((), ()))
+    monkeypatch.setattr(trials, "promising", lambda other, water, sailed, budget: True)
+    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: False)
     advised(case, too_risky(case, plans), lambda activity, share: told.append(activity))
+    assert "too risky" in told[0]
     assert 1 <= len(said) <= max(1, PLAN.replans + 1 - plans)
     assert "std_mps = 0.7" in said[0]
     assert len(set(said)) == len(said)
+
+
+@pytest.mark.parametrize("spent", [0.0, 0.7, 0.8])
+def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(monkeypatch, story, made, spent):
+    """Of `PLAN.remedy_work` times the refused plan, a plan takes one, and drawn trials in a forecast what is spent."""
+    case, refused = in_current(story, 1.4), too_risky(in_current(story, 1.4), 1)
+    refused.confidence = None
+
+    def likely(other, water, sailed, budget):
+        budget.spent_s += spent * PLAN_S
+        return False
+
+    monkeypatch.setattr(trials, "promising", likely)
+    text = str(advised(case, refused))
+    fits = 1.0 + spent <= PLAN.remedy_work
+    assert len(made) == fits
+    assert ("as much work as planning: design.excluded with deceleration" in text) != fits
+
+
+def test_no_design_is_made_without_a_run_where_the_rest_of_the_refused_plan_fails_too(monkeypatch, story, made):
+    monkeypatch.setattr(changes, "solve_durations", lambda task: pytest.fail("a design is made"))
+    case = in_current(story, 0.0)
+    refused = too_risky(case, 1, elsewhere=False)
+    refused.confidence = None
+    text = str(advised(case, refused))
+    assert not made
+    assert "design.excluded with deceleration: too many drawn trials fail elsewhere" in text
+
+
+def test_no_forecast_of_a_wind_that_moves_no_ship_is_asked_for(story, made):
+    case = replace(story, environment=replace(story.environment, current_std_mps=0.0, wind_std_mps=2.0))
+    assert not case.vessel.model.reads_air
+    assert "wind" not in str(advised(case, too_risky(case, 1)))
 
 
 def test_a_thousand_runs_can_be_planned_for_at_the_usual_confidence():

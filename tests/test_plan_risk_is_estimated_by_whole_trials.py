@@ -215,21 +215,36 @@ def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
     assert risk.left == 1.0
 
 
+def outcomes(left: np.ndarray, aborted: np.ndarray) -> Trials:
+    """Trials that end so, (legs, n) each."""
+    blank = np.zeros(left.shape, dtype=int)
+    return Trials(
+        left=left,
+        aborted=aborted,
+        go_arounds=blank,
+        samples=blank,
+        used=np.zeros(left.shape),
+        abort_cause=blank,
+        place=np.where(left[..., None], np.full(2, 10.0), np.nan),
+        within=(tolerances(leg_water(OPEN)),) * len(left),
+    )
+
+
+def test_of_trials_that_no_longer_end_on_a_leg_as_many_end_on_those_after_it():
+    """60 of 100 are aborted on the first leg, 20 of the 40 left leave the water on the second, 10 of 20 are aborted."""
+    left, aborted = np.zeros((2, 3, 100), dtype=bool)
+    aborted[0, :60], left[1, 60:80], aborted[2, 80:90] = True, True, True
+    trials = outcomes(left, aborted)
+    assert trials.shares() == pytest.approx((0.2, 0.7))
+    assert trials.shares([False, True, True]) == pytest.approx((0.5, 0.25))
+    assert trials.shares([True, True, False]) == pytest.approx((0.2, 0.6))
+
+
 def test_the_chance_constraint_holds_or_fails_by_the_share_alone():
     legs = (Leg(kind="reposition", name="a", first=0, last=1), Leg(kind="primitive", name="a", first=1, last=2))
     left = np.zeros((2, 100), dtype=bool)
     left[0, :5] = True
-    blank = np.zeros((2, 100), dtype=int)
-    trials = Trials(
-        left=left,
-        aborted=np.zeros_like(left),
-        go_arounds=blank,
-        samples=blank,
-        used=np.zeros((2, 100)),
-        abort_cause=blank,
-        place=np.where(left[..., None], np.full(2, 10.0), np.nan),
-        within=(tolerances(leg_water(OPEN)),) * 2,
-    )
+    trials = outcomes(left, np.zeros_like(left))
     risk = replace(sailed_risk(), left=0.05, trials=100)
     assert risk.error == pytest.approx(np.sqrt(0.05 * 0.95 / 100))
     sea = leg_water(OPEN).area

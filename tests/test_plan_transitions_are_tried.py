@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
 
+from expdesign.plan import PlanSettings, assembly
 from expdesign.plan.legs import LegTask
 from expdesign.plan.local_planner import TransitionTrials, pairs_of
 from expdesign.plan.values import Placement
@@ -56,6 +59,18 @@ def test_a_tried_transition_is_sailed_as_optimised_and_loses_no_more_than_others
     lost_s = transition.seconds - transition.step[0] / space.planner.times.speed_mps
     others = np.column_stack([[15.0, 30.0, 60.0], np.zeros((3, 2))])
     assert lost_s <= min(leg_s(step) - step[0] / space.planner.times.speed_mps for step in others) + sample_s
+
+
+def test_the_draft_of_a_day_tries_no_transitions_and_every_other_plan_does(space):
+    most = {
+        (draft, day): assembly._most_trials(
+            SimpleNamespace(settings=PlanSettings(draft=draft), expected=day), space.planner
+        )
+        for draft in (False, True)
+        for day in (False, True)
+    }
+    assert most.pop((True, True)) == 0
+    assert all(count == space.planner.transition_trials > 0 for count in most.values())
 
 
 def test_where_it_does_not_matter_where_transitions_lead_the_quickest_counts(water, space):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -109,3 +110,22 @@ def test_a_run_that_cannot_be_sailed_is_not_chosen_again(asked, monkeypatch, wha
         shortest_day(problem, accuracy)
     assert len(tried) == 1 + rounds - costs
     assert min(tried[0]) not in set().union(*tried[1:])
+
+
+def test_a_remedy_is_looked_for_once_when_no_day_is_left(asked, monkeypatch):
+    """Not for each day that is refused, as another may be planned."""
+    problem, accuracy = asked
+    search = alternate._Search(problem=problem, accuracy=accuracy, added=())
+    days = [SimpleNamespace(repeats=problem.design.repeats, draft=number) for number in range(3)]
+    planned, advised = [], []
+
+    def refuse(task, draft, *, progress):
+        planned.append(draft)
+        raise NoPlan(f"day {draft} is too risky")
+
+    monkeypatch.setattr(alternate, "plan_drafted", refuse)
+    monkeypatch.setattr(alternate, "with_advice", lambda task, error, progress: advised.append(str(error)) or error)
+    with pytest.raises(NoPlan, match="day 2"):
+        search.planned(days, days, None, lambda *_: None, good=lambda *_: True)
+    assert planned == [0, 1, 2]
+    assert advised == ["day 2 is too risky"]

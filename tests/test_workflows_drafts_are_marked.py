@@ -65,6 +65,15 @@ def test_it_takes_the_work_of_legs_and_none_of_drawn_trials(draft, made_once):
     assert work.get("samples of few ships", 0) <= total(whole)["samples of few ships"] - drawn
 
 
+def test_it_draws_the_manoeuvres_that_it_runs_and_says_of_the_others_that_they_are_not_drawn(draft):
+    durations = json.loads((draft[0] / "durations.json").read_text("utf-8"))
+    runs = [item["repeats"] for item in durations["primitives"]]
+    page = (draft[0] / "report.html").read_text("utf-8")
+    gallery = page[page.index('id="manoeuvres"') : page.index('id="time"')]
+    assert 0 < len(re.findall(r"<svg", gallery)) == sum(count > 0 for count in runs) < len(runs)
+    assert gallery.count("Not drawn in a draft") == sum(count == 0 for count in runs)
+
+
 def test_plan_page_and_every_figure_say_draft(draft):
     plan = planned(draft[0])
     assert plan["draft"] is True
@@ -72,6 +81,7 @@ def test_plan_page_and_every_figure_say_draft(draft):
     assert "DRAFT" in plan["verdict"]
     assert plan["verification"]["problems"] == []
     assert plan["drawn_trials"] is None
+    assert plan["reposition_bound_s"] is None
     page = (draft[0] / "report.html").read_text("utf-8")
     assert re.search("<title>DRAFT", page)
     assert re.search("<h1>.*DRAFT", page)

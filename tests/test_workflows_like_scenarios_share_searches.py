@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from expdesign.growing import GrowSettings
 from expdesign.growing.search import Measure
+from expdesign.growing.tuning import TUNING
 from expdesign.memory import Memory, remembering
 from expdesign.scenario import load_scenario
-from expdesign.shortest_day import AccuracySettings
+from expdesign.shortest_day import AccuracySettings, values
+from expdesign.shortest_day.tuning import TUNING as DAY_TUNING
 from expdesign.workflows.steps import day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
@@ -47,7 +50,7 @@ def found(case, monkeypatch):
     return added[0]
 
 
-@pytest.mark.parametrize("settings", [{"clearance_m": 35.0}, {"confidence": 0.8}, {"draft": True}])
+@pytest.mark.parametrize("settings", [{"clearance_m": 35.0}, {"confidence": 0.8}])
 def test_other_settings_of_the_plan_take_over_the_search(tmp_path, monkeypatch, evaluated, settings):
     with remembering(Memory(tmp_path)):
         first = found(asking(), monkeypatch)
@@ -57,6 +60,21 @@ def test_other_settings_of_the_plan_take_over_the_search(tmp_path, monkeypatch, 
         case = asking()
         assert found(replace(case, plan=replace(case.plan, **settings)), monkeypatch) == first
     assert not evaluated
+
+
+def test_a_draft_looks_at_fewer_candidates_and_says_so(monkeypatch, evaluated):
+    case = asking()
+    case = replace(case, design=replace(case.design, grow=replace(case.design.grow, pool=4 * POOL)))
+    found(case, monkeypatch)
+    whole = sum(evaluated)
+    evaluated.clear()
+    found(replace(case, plan=replace(case.plan, draft=True)), monkeypatch)
+    steps = TUNING.leaders * TUNING.offspring * len(TUNING.strides)
+    assert 0 < sum(evaluated) <= DAY_TUNING.draft_pool + DAY_TUNING.draft_searches * steps < whole / 2
+    plans = (SimpleNamespace(draft=draft) for draft in (True, False))
+    notes = [values.ShortestDay.note.fget(SimpleNamespace(plan=plan)) for plan in plans]
+    assert f"{DAY_TUNING.draft_pool} candidates of every family" in notes[0]
+    assert notes[1] == ""
 
 
 def test_another_speed_of_legs_is_another_search(tmp_path, monkeypatch, evaluated):

@@ -31,8 +31,9 @@ def run(
         bool,
         typer.Option(
             "--draft",
-            help="Only a quick look: one placing of the runs, checked with the nominal ship; no drawn trials, no bound "
-            "on the day, no route files. Marked DRAFT; goes to runs/<name of the scenario>-draft.",
+            help="Only a quick look: one placing of the runs, checked with the nominal ship; fewer manoeuvres "
+            "searched for, no drawn trials, no bounds, no route files. Marked DRAFT; goes to runs/<name of the "
+            "scenario>-draft.",
         ),
     ] = False,
     out: Out = None,

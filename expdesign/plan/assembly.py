@@ -251,7 +251,9 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
 
 
 def _most_trials(problem: PlanProblem, planner: LocalPlanner) -> int:
-    """Plans whose transitions are tried, at most."""
+    """Plans whose transitions are tried, at most; none in the draft of a day, which has other runs than the day."""
+    if problem.settings.draft and problem.expected:
+        return 0
     return planner.transition_trials if placement_search(problem.settings).tries_transitions else 0
 
 

@@ -2,17 +2,69 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from expdesign.errors import NoPlan
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo import Trials, estimate_risk, failed_chance_constraint, sail_trials, trials_needed
+from expdesign.plan.monte_carlo import (
+    Trials,
+    estimate_risk,
+    failed_chance_constraint,
+    sail_trials,
+    shares_allowed,
+    trials_needed,
+    worst_leg,
+)
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import verify_plan
+from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refused:
+    """A plan that is too risky.
+
+    Attributes:
+        sailed: commands, motion and legs.
+        risk, trials: by drawn trials.
+        failed: why it is refused.
+        water: that legs of it keep to.
+        spent_s: counted work that it took.
+    """
+
+    sailed: SailedTrial
+    risk: RiskEstimate
+    trials: Trials
+    failed: str
+    water: LegWater
+    spent_s: float
+
+    @property
+    def place(self) -> Array | None:
+        """(2,) where most trials left allowed water, or None where none did."""
+        places = self.trials.place[worst_leg(self.trials)]
+        left = ~np.isnan(places[:, 0])
+        return np.median(places[left], axis=0) if left.any() else None
+
+    @property
+    def worst(self) -> str:
+        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
+        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
+        return self.sailed.legs[int(failing.argmax())].name
+
+    def promises(self, name: str, confidence: float) -> bool:
+        """Whether a plan without the runs of a name should be acceptable, by what failed in the rest of this one.
+
+        Some margin is asked for: runs placed anew fail in other places.
+        """
+        left, aborted = self.trials.shares([leg.name != name for leg in self.sailed.legs])
+        return shares_allowed((left / PLAN.promise, aborted / PLAN.promise), confidence)
 
 
 def verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
@@ -67,8 +119,17 @@ def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial)
     return np.asarray(problem.vessel.sample_time_s * trials.samples[:, done].mean(axis=1) - sailed.legs_s)
 
 
-def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> bool:
-    """Whether drawn trials accept a first plan."""
+def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budget: WorkBudget) -> bool:
+    """Whether drawn trials accept a first plan; their work is counted."""
     risk, trials = drawn_risk(problem, water, sailed)
+    budget.sailed(trials.samples_sailed)
     confidence = problem.settings.confidence
     return not failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
+
+
+def promising(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budget: WorkBudget) -> bool:
+    """Whether it is likelier than not that drawn trials would accept a plan, by few of them; their work is counted."""
+    rng = np.random.default_rng((problem.seed, PLAN.trials_stream))
+    trials = sail_trials(water, sailed, draws=PLAN.lateness_trials, rng=rng)
+    budget.sailed(trials.samples_sailed)
+    return shares_allowed(trials.shares(), problem.settings.confidence)

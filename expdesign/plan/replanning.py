@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from expdesign.plan.assembly import (
     footprints,
     search_space,
 )
+from expdesign.plan.checked import Refused
 from expdesign.plan.monte_carlo import (
     Trials,
     failed_chance_constraint,
@@ -23,39 +24,9 @@ from expdesign.plan.monte_carlo import (
 )
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.tuning import PLAN
-from expdesign.plan.values import Leg, RiskEstimate, SailedTrial
+from expdesign.plan.values import Leg, RiskEstimate
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
-from expdesign.values import Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Refused:
-    """A plan that is too risky.
-
-    Attributes:
-        sailed: commands, motion and legs.
-        risk, trials: by drawn trials.
-        failed: why it is refused.
-    """
-
-    sailed: SailedTrial
-    risk: RiskEstimate
-    trials: Trials
-    failed: str
-
-    @property
-    def place(self) -> Array | None:
-        """(2,) where most trials left allowed water, or None where none did."""
-        places = self.trials.place[worst_leg(self.trials)]
-        left = ~np.isnan(places[:, 0])
-        return np.median(places[left], axis=0) if left.any() else None
-
-    @property
-    def worst(self) -> str:
-        """The run that, with the leg to it, leaves the water or is aborted in most trials."""
-        failing = (self.trials.left | self.trials.aborted).mean(axis=1)
-        return self.sailed.legs[int(failing.argmax())].name
 
 
 def worth_replanning(
@@ -79,7 +50,7 @@ def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: 
         error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
         return error
     error.what, error.which, error.confidence = "risk", last.worst, lower
-    error.plan = first.water, made[0].sailed
+    error.plan = made[0]
     return error
 
 

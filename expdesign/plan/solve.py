@@ -25,7 +25,7 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.bounds import reposition_bound_s
 from expdesign.plan.chart import reachable
-from expdesign.plan.checked import drawn_risk, verified
+from expdesign.plan.checked import Refused, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs_ahead import KnownLegs
@@ -35,7 +35,6 @@ from expdesign.plan.monte_carlo import (
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised
 from expdesign.plan.replanning import (
-    Refused,
     not_again,
     replanning_progress,
     too_risky,
@@ -55,24 +54,39 @@ from expdesign.values import Array, seal
 Planned = TypeVar("Planned")
 
 
-def plan_trial(problem: PlanProblem, *, drafted: Draft | None = None, progress: Progress = silent) -> Plan:
+def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Args:
         problem: the trial.
-        drafted: its draft, where there is one already.
         progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
             one key helps, if one of those tried does.
     """
-    reported = never_falling(progress)
     try:
-        return _in_water(problem, reported, _planned) if drafted is None else _checked(problem, drafted, reported)
+        return _in_water(problem, never_falling(progress), _planned)
     except NoPlan as error:
-        within = replace(problem, area=error.within or (drafted or problem).area)
-        raise advised(within, error, progress) from None
+        raise with_advice(problem, error, progress) from None
+
+
+def plan_drafted(problem: PlanProblem, draft: Draft, *, progress: Progress = silent) -> Plan:
+    """The plan of a draft. Its refusal comes without advice, as another draft may do.
+
+    Raises:
+        NoPlan: as of `plan_trial`.
+    """
+    try:
+        return _checked(problem, draft, never_falling(progress))
+    except NoPlan as error:
+        error.within = draft.area
+        raise
+
+
+def with_advice(problem: PlanProblem, refused: NoPlan, progress: Progress = silent) -> NoPlan:
+    """A refusal with which change of one key helps, in the water that was planned in."""
+    return advised(replace(problem, area=refused.within or problem.area), refused, progress)
 
 
 def _in_water(
@@ -107,8 +121,7 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
     problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
     if problem.settings.draft:
         phases_of(problem, room.space.planner, progress).trials("verifying", 0.0)
-        checks = in_order(_check, (whole, water, draft.sailed), ((verified,), (_bound_s,)))
-        return _plan(whole, draft.sailed, verification=next(checks), bound_s=next(checks))
+        return _plan(whole, draft.sailed, verification=verified(whole, water, draft.sailed), bound_s=0.0)
     confidence = problem.settings.confidence
     budget = _budget(problem)
     sailed, before_s, budget.spent_s, reported = draft.sailed, 0.0, draft.spent_s, progress
@@ -128,8 +141,9 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
             return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
-        budget.sailed(int(trials.samples.max(axis=1).sum()))
-        made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed))
+        budget.sailed(trials.samples_sailed)
+        spent_s = budget.spent_s - before_s
+        made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed, water=room.water, spent_s=spent_s))
         if not worth_replanning(problem, risk, budget, attempt=attempt, before_s=before_s):
             break
         try:

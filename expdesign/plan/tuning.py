@@ -28,6 +28,10 @@ class Tuning:
         most_searches: narrow searches for places, each with a quarter of the partial plans, to check remedies.
         most_plans: plans made to check remedies.
         remedy_budget: share of the time budget that such a plan may spend on failures.
+        remedy_work: counted work of looking for remedies where drawn trials fail, in that of the refused plan; half of
+            planning is not counted, and is remembered.
+        promise: share of the limits below which failures in the rest of a refused plan must be for a plan without its
+            worst run to be made.
         lower_confidences: tried as remedies of a refusal, the highest first.
         most_left_out: designs tried as remedies, each without the runs that had no place in the one before.
         turns_deg: from the heading asked for at start and goal, tried as remedies to both sides [deg].
@@ -72,6 +76,8 @@ class Tuning:
     most_searches: int = 8
     most_plans: int = 2
     remedy_budget: float = 0.1
+    remedy_work: float = 1.75
+    promise: float = 0.8
     lower_confidences: tuple[float, ...] = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
     most_left_out: int = 8
     turns_deg: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))

@@ -275,7 +275,8 @@ class Plan:
         trajectory: k + 1 samples.
         legs: in time order, without gaps.
         reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
-            less time [s]; proved except for the quantities that `expdesign.plan.bounds.repositioning` estimates.
+            less time [s]; proved except for the quantities that `expdesign.plan.bounds.repositioning` estimates; 0 of a
+            draft.
         leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
             `risk`, or None if not computed.
         leave_water_by_leg: the same for each leg, or () if not computed.

@@ -15,7 +15,7 @@ import numpy as np
 
 from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import Draft, plan_trial
+from expdesign.plan.solve import Draft, plan_drafted, with_advice
 from expdesign.plan.values import Plan, SailedTrial
 from expdesign.processes import in_order
 from expdesign.progress import Progress, in_phases, never_falling, of_part, silent
@@ -283,14 +283,14 @@ class _Search:
         Raises:
             NoPlan: none is good, and what was planned last was refused.
         """
-        refused = None
+        refused: tuple[PlanProblem, NoPlan] | None = None
         for day in best:
-            design = self.drafting.design(day.repeats)
+            problem = replace(self.problem, design=(design := self.drafting.design(day.repeats)))
             bound = self.bound(day.draft.sailed)
             try:
-                plan = plan_trial(replace(self.problem, design=design), drafted=day.draft, progress=progress)
+                plan = plan_drafted(problem, day.draft, progress=progress)
             except NoPlan as error:  # a longer day may be less risky
-                refused = error
+                refused = problem, error
                 continue
             if good(plan, margin := self.drafting.told_by(plan.sailed)[2]):
                 return ShortestDay(
@@ -304,7 +304,7 @@ class _Search:
                     bound=next(bound if plan.trajectory is day.draft.sailed.trajectory else self.bound(plan), None),
                 )
         if refused is not None:
-            raise refused
+            raise with_advice(*refused, progress)
         return None
 
     def bound(self, day: Plan | SailedTrial) -> Iterator[DayBound]:

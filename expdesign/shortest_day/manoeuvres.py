@@ -56,7 +56,8 @@ def manoeuvres_worth_adding(
     say how long: what tells of one parameter alone is soon told.
 
     Args:
-        problem: gives the dictionary, the limits on runs, and the way from start to goal.
+        problem: gives the dictionary, the limits on runs, and the way from start to goal. Where it asks for a draft,
+            there are fewer candidates and fewer searches.
         accuracy: to be reached.
         settings: of the search; seconds worth take the place of sensitivity.
         day_s: length of a day whose runs tell as much as can be [s], instead of the accuracy.
@@ -69,7 +70,9 @@ def manoeuvres_worth_adding(
     progress("simulating candidates", 0.0)
     offer, transit_mps = offered(problem, first_prices(problem)), ship_on_legs(problem).transit_speed_mps
     limits = _limits(problem, settings, transit_mps)
-    measure, seed = _measure(problem, limits), settings.seed or 0
+    measure, seed, searches = _measure(problem, limits), settings.seed or 0, TUNING.growth_rounds
+    if problem.settings.draft:
+        settings, searches = replace(settings, pool=min(settings.pool, TUNING.draft_pool)), TUNING.draft_searches
     spaces = _spaces(problem, settings, limits)
     archives, rng = recalled(pool_of, spaces, measure, settings.pool, seed), np.random.default_rng(seed)
     given, specs = len(offer.cost_s), list[PrimitiveSpec]()
@@ -89,7 +92,7 @@ def manoeuvres_worth_adding(
         specs += [candidate.spec for candidate in found]
         offer = _with(offer, found, problem, transit_mps)
         shares = cheapest_shares(accuracy, offer, level=level, tangents=shares.tangents)
-        if shares.bound_s > (1 - TUNING.growth_gain) * before_s:
+        if number + 1 == searches or shares.bound_s > (1 - TUNING.growth_gain) * before_s:
             break
     runs = shares.runs[given:]
     most = np.argsort(-runs, kind="stable")[: settings.rounds]

@@ -29,6 +29,7 @@ class Tuning:
         growth_share: information from runs, as a share of what is needed, for which manoeuvres are searched for.
         growth_rounds: searches for manoeuvres that are worth more than they cost.
         growth_gain: share of the cheapest runs' cost that a search must save for another to follow.
+        draft_pool, draft_searches: candidates of every family, and searches, of a draft, at most.
         growth_families: searched in each of them, the most promising; the best of each may be added.
         added_speed: largest surge speed of a manoeuvre that is added, in transit speeds, which leaves some thrust for
             sway, and at which few of the drawn ships are unstable.
@@ -63,6 +64,8 @@ class Tuning:
     growth_share: float = 0.6
     growth_rounds: int = 8
     growth_gain: float = 0.02
+    draft_pool: int = 8
+    draft_searches: int = 1
     growth_families: int = 6
     added_speed: float = 0.93
     used: float = 0.1

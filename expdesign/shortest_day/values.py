@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.durations import DurationDesign
 from expdesign.plan.values import Plan
+from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
 
 
@@ -138,3 +139,14 @@ class ShortestDay:
 
     def __post_init__(self) -> None:
         seal(self, curve="k 2")
+
+    @property
+    def note(self) -> str:
+        """What a draft left out of the search; "" for a whole one."""
+        if not self.plan.draft:
+            return ""
+        return (
+            f"as a draft, it is the first day tried, and manoeuvres to add were searched for {TUNING.draft_searches} "
+            f"time at most, from {TUNING.draft_pool} candidates of every family, and no transitions between runs were "
+            "tried; the whole job searches more, and finds a day that is shorter or tells more"
+        )

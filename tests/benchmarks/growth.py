@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.information import score_primitives
 from expdesign.plan import assembly
 from expdesign.plan.chart import build_goal_distance
+from expdesign.plan.control import Capability
 from expdesign.plan.monte_carlo import estimate_risk
 from expdesign.plan.problem import PlanProblem
 from expdesign.scenario import Scenario, load_scenario
@@ -98,17 +100,38 @@ def loading(corners: int) -> float:
 
 def measuring(corners: int) -> float:
     """Measure the water that the trial can reach: clearance, lines of sight, and the distance to the goal."""
+    near, ship = _near(corners)
+    began = _spent_s()
+    water = assembly.leg_water(near, ship)
+    assert water.safe.area > 0
+    assert build_goal_distance(water.narrowest_graph, water.field, near.goal[:2]) is not None
+    return _spent_s() - began
+
+
+def paths(corners: int, finder: str) -> float:
+    """Find the paths of a leg across the rows of islands; the graph of the distance to the goal is there already."""
+    near, ship = _near(corners)
+    pitch_m = CHART_M / math.ceil(math.sqrt(math.isqrt(corners)))
+    apart = math.ceil(APART_M / pitch_m)
+    ends = near.start[:2], near.start[:2] + pitch_m * np.array([apart, max(1, apart // 2)])
+    water = replace(assembly.leg_water(near, ship), paths=finder)
+    assert water.narrowest_graph.shortest(*ends) is not None
+    began = _spent_s()
+    found = list(water.candidate_paths(*ends))
+    spent_s = _spent_s() - began
+    told = ", ".join(f"{path.length_m:.0f} m by {path.source}" for path in found)
+    print(f"{corners} corners: {told}", file=sys.stderr)
+    return spent_s
+
+
+def _near(corners: int) -> tuple[PlanProblem, Capability]:
+    """A trial in the part of a chart of so many corners that it can reach, and the ship on legs."""
     with tempfile.TemporaryDirectory() as folder:
         problem = _small_problem(load_scenario(archipelago(Path(folder), corners)))
     ship = assembly.ship_on_legs(problem)
     near = next(assembly.waters(problem, ship))
-    began = _spent_s()
-    water = assembly.leg_water(replace(problem, area=near), ship)
-    assert water.safe.area > 0
-    assert build_goal_distance(water.narrowest_graph, water.field, problem.goal[:2]) is not None
-    spent_s = _spent_s() - began
     print(f"{shapely.get_num_coordinates(near.water)} of {corners} corners are within reach", file=sys.stderr)
-    return spent_s
+    return replace(problem, area=near), ship
 
 
 def _small_problem(case: Scenario) -> PlanProblem:
@@ -159,6 +182,8 @@ PARTS: dict[str, tuple[Callable[[int], float], tuple[int, ...]]] = {
     "drawn trials": (draws, (500, 5000, 100_000)),
     "corners of a chart, loading": (loading, (1000, 10_000, 100_000, 1_000_000)),
     "corners of a chart, measuring": (measuring, (1000, 10_000, 100_000, 1_000_000)),
+    "corners of a chart, paths by OMPL": (partial(paths, finder="ompl"), (1000, 10_000, 100_000, 1_000_000)),
+    "corners of a chart, paths by graph": (partial(paths, finder="graph"), (1000, 10_000, 100_000, 1_000_000)),
 }
 
 
@@ -185,7 +210,8 @@ def rows(part: str, unit_s: float) -> None:
     before: tuple[int, float] | None = None
     for size in PARTS[part][1]:
         spent_s, peak_mib = measured(part, size)
-        grown = "-" if before is None else f"{math.log(spent_s / before[1]) / math.log(size / before[0]):.2f}"
+        comparable = before is not None and min(spent_s, before[1]) > 0  # times are counted in hundredths
+        grown = f"{math.log(spent_s / before[1]) / math.log(size / before[0]):.2f}" if comparable else "-"
         print(
             f"| {__version__} ({date.today()}) | {part}: {size:,} | {spent_s:.2f} s | {spent_s / unit_s:.1f} | {grown} "
             f"| {peak_mib:.0f} MiB |",

@@ -5,6 +5,9 @@ own, without remembered results. The phases are those of `counted_work`, after t
 processes of the job, whatever else the machine does meanwhile; work that other processes have begun ahead counts where
 it is done. The last column but two is the sum in multiples of the baseline (`baseline.py`), by which machines compare;
 memory is that of the largest process, and of all together, what they share counted once (Linux).
+
+With ``--calls``, how often the job makes a planner, a simplifier or a space of OMPL, asks a solver of cvxpy, and solves
+a program of CasADi, in one process.
 """
 
 from __future__ import annotations
@@ -18,10 +21,12 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
+from types import SimpleNamespace
 
 from baseline import Baseline, measured_baseline
 
@@ -96,6 +101,35 @@ def measured(scenario: Path) -> MainJob:
     return MainJob(phase_s=dict(spent), peak_mib=max(usage) / 1024, summary=dict(outcome.summary), paths=paths)
 
 
+def calls(scenario: Path) -> Counter[str]:
+    """How often a scenario, run by this process alone, asks each library."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    import cvxpy
+
+    from expdesign import workflows
+    from expdesign.plan.legs import _ompl
+    from expdesign.plan.legs._casadi import Program
+
+    counts: Counter[str] = Counter()
+
+    def counted(name: str, call: Callable[..., object]) -> Callable[..., object]:
+        def count(*arguments: object, **options: object) -> object:
+            counts[name] += 1
+            return call(*arguments, **options)
+
+        return count
+
+    for kind, names in (("og", ("PRMstar", "BITstar", "PathSimplifier")), ("ob", ("DubinsStateSpace",))):
+        module = getattr(_ompl, kind)
+        made = {name: counted(f"OMPL {name}", getattr(module, name)) for name in names}
+        setattr(_ompl, kind, SimpleNamespace(**{**vars(module), **made}))
+    cvxpy.Problem.solve = counted("cvxpy solves", cvxpy.Problem.solve)
+    Program.solve = counted("CasADi solves", Program.solve)
+    with tempfile.TemporaryDirectory() as folder:
+        workflows.run(scenario, Path(folder), jobs=1, cache=False)
+    return counts
+
+
 def processor_s(process: int) -> float:
     """Processor seconds so far of a process and all that it has started, those that ended included (Linux)."""
     ticks = sum(sum(map(int, values[11:15])) for values in family(process).values())
@@ -144,8 +178,14 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenarios", nargs="*", type=Path, default=sorted(SCENARIOS.glob("*.toml")))
     parser.add_argument("--measure", type=Path, help="print the numbers of one scenario, run in this process, as JSON")
+    parser.add_argument("--calls", action="store_true", help="count calls of libraries instead")
     chosen = parser.parse_args()
-    if chosen.measure:
+    if chosen.calls:
+        print("| scenario | calls |\n|---|---|")
+        for scenario in chosen.scenarios:
+            told = ", ".join(f"{name} {count}" for name, count in sorted(calls(scenario).items()))
+            print(f"| {scenario.stem} | {told} |", flush=True)
+    elif chosen.measure:
         print(json.dumps(vars(measured(chosen.measure))))
     else:
         names = (*PHASES, "all [s]", "NumPy + IPOPT [s]", "x baseline", "memory", "together")

@@ -71,7 +71,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "legs": [_leg_entry(plan, index, leg) for index, leg in enumerate(plan.legs)],
             "informative_s": plan.seconds("primitive"),
             "reposition_s": plan.seconds("reposition"),
-            "reposition_bound_s": plan.reposition_bound_s,
+            "reposition_bound_s": None if plan.draft else plan.reposition_bound_s,
             **({} if plan.lattice is None else {"lattice": _lattice_entry(plan.lattice)}),
             "clearance_min_m": check.clearance_min_m,
             "clearance_required_m": clearance_m,

@@ -82,6 +82,7 @@ SUBTRACTION = {
 }
 
 
+NOT_DRAWN = "Not drawn in a draft, as no run of it is planned."
 MORE_THAN_OPTIMAL = " It is more than 100 % because the legs between the runs inform, too."
 
 
@@ -151,15 +152,18 @@ def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
         figures["pareto"] = partial(pareto_figure, content.day)
     if measures_velocity(content):
         figures["uncertainty"] = partial(uncertainty_figure, content, after)
-    primitives: list[Callable[[], str]] = [
-        partial(primitive_figure, item.primitive, content.vessel.hull_b, number=number)
+    primitives: dict[int, Callable[[], str]] = {
+        number: partial(primitive_figure, item.primitive, content.vessel.hull_b, number=number)
         for number, item in enumerate(content.information)
-    ]
-    results: list[str] = drawn([*figures.values(), *primitives])
+        if content.design.repeats[number] or not content.plan.draft
+    }
+    results: list[str] = drawn([*figures.values(), *primitives.values()])
     if content.plan.draft:
         results = [marked(figure, "DRAFT") for figure in results]
     named = dict(zip(figures, results, strict=False))
-    return {"uncertainty": "", "pareto": "", **named, "primitives": results[len(figures) :]}
+    of_runs = dict(zip(primitives, results[len(figures) :], strict=True))
+    gallery = [of_runs.get(number, NOT_DRAWN) for number in range(len(content.information))]
+    return {"uncertainty": "", "pareto": "", **named, "primitives": gallery}
 
 
 def _origin(content: ReportContent) -> str:

@@ -274,6 +274,7 @@ def day_sentences(day: ShortestDay) -> list[str]:
         "their share of the repositioning. No choice of runs from the dictionary costs less than "
         f"{words.duration(day.cost_bound_s)} then.",
         *_bound_sentences(day),
+        *([f"{day.note[0].upper()}{day.note[1:]}."] if day.note else []),
     ]
 
 

@@ -3,6 +3,7 @@
 from expdesign.plan.monte_carlo.risk import (
     estimate_risk,
     failed_chance_constraint,
+    shares_allowed,
     trials_needed,
     violates_chance_constraint,
     worst_leg,
@@ -14,6 +15,7 @@ __all__ = [
     "estimate_risk",
     "failed_chance_constraint",
     "sail_trials",
+    "shares_allowed",
     "trials_needed",
     "violates_chance_constraint",
     "worst_leg",

@@ -99,6 +99,12 @@ def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
     return found.left > 0.0 and found.left + found.error > 1.0 - confidence + 1e-12
 
 
+def shares_allowed(shares: tuple[float, float], confidence: float) -> bool:
+    """Whether shares of trials that leave allowed water, and that are aborted, are acceptable if they are exact."""
+    left, aborted = shares
+    return left <= 1.0 - confidence and aborted < MONTE_CARLO.no_plan_aborted
+
+
 def worst_leg(trials: Trials) -> int:
     """Index of the leg on which most trials leave allowed water."""
     return int(trials.left.mean(axis=1).argmax())

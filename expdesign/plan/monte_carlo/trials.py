@@ -6,6 +6,7 @@ the forecast says.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +55,24 @@ class Trials:
     def completed(self) -> np.ndarray:
         """(n,) trials that reached the goal."""
         return np.asarray(~(self.left | self.aborted).any(axis=0))
+
+    @property
+    def samples_sailed(self) -> int:
+        """Samples until the slowest ship of each leg has sailed it."""
+        return int(self.samples.max(axis=1).sum())
+
+    def shares(self, legs: Sequence[bool] = ()) -> tuple[float, float]:
+        """Shares of trials that leave allowed water, and that are aborted, if these legs alone were sailed; all for ().
+
+        As many fail on each of them as of those that begin it.
+        """
+        failed = np.stack([self.left, self.aborted]).sum(axis=2)  # (2, legs)
+        begun = self.left.shape[1] - np.r_[0, failed.sum(axis=0).cumsum()[:-1]]
+        kept = legs or [True] * len(begun)
+        rates = np.where(kept, failed / np.maximum(begun, 1), 0.0)
+        sailing = np.r_[1.0, np.cumprod(1.0 - rates.sum(axis=0))[:-1]]
+        left, aborted = (rates @ sailing).tolist()
+        return left, aborted
 
 
 def sail_trials(

@@ -23,6 +23,7 @@ def advised(problem: PlanProblem, refused: NoPlan, progress: Progress = silent) 
         refused: by the planner.
         progress: says what is tried.
     """
+    progress(f"there is no plan: {refused.obstacle}", math.nan)
     check = CHECKS.get(refused.what)
     if check is None:
         refused.remedies = refused.remedies or (UNCHECKED,)

@@ -67,14 +67,18 @@ def first_that_passes(
     *,
     tell: Tell,
     most: int = 0,
+    affords: Callable[[], bool] = lambda: True,
 ) -> Iterator[str]:
     """The first change with which a test passes; what was tried, where none of them does.
 
     Changes come with the most promising first. Only so many are tried that this takes no longer than planning: a narrow
-    search for places keeps a quarter of the partial plans.
+    search for places keeps a quarter of the partial plans. Those that work is not left for are told.
     """
-    tried, left = [], most or PLAN.most_searches
+    tried, passed_over, left = [], [], most or PLAN.most_searches
     for change in changes:
+        if change.problem is not None and not affords():
+            passed_over.append(change.words)
+            continue
         if change.problem is not None:
             tell(change.words)
         if change.problem is not None and passes(change.problem):
@@ -84,7 +88,9 @@ def first_that_passes(
         left -= change.problem is not None
         if not left:
             break
-    yield "; ".join(filter(None, (NONE.format(", ".join(tried)) if tried else UNCHECKED, untried)))
+    beyond = f"not tried, as looking for remedies took as much work as planning: {', '.join(passed_over)}"
+    none = NONE.format(", ".join(tried)) if tried else UNCHECKED
+    yield "; ".join(filter(None, (none, beyond if passed_over else "", untried)))
 
 
 def with_settings(problem: PlanProblem, **settings: Any) -> PlanProblem:
@@ -137,12 +143,15 @@ def finds_places(problem: PlanProblem) -> bool:
     return True
 
 
-def first_sailed(problem: PlanProblem) -> tuple[LegWater, SailedTrial] | None:
-    """The first plan, as far as sailing it, with a part of the time budget; None where there is none."""
+def first_sailed(problem: PlanProblem, budget: WorkBudget) -> tuple[LegWater, SailedTrial] | None:
+    """The first plan, as far as sailing it, with a part of the time budget; None where there is none.
+
+    Its work is counted.
+    """
     part = with_settings(problem, time_budget_s=PLAN.remedy_budget * problem.settings.time_budget_s)
     try:
         water, room = roomy_water(part, ship_on_legs(part), silent)
-        return water, sail_all(part, room, silent, stated=water, budget=WorkBudget())
+        return water, sail_all(part, room, silent, stated=water, budget=budget)
     except NoPlan:
         return None
 

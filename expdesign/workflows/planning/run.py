@@ -37,8 +37,8 @@ def run(
 ) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
 
-    A draft is the first day or plan that the whole job tries, without drawn trials and bound on the day. It is written
-    into `out` or runs/<scenario>-draft, without anything that could be sailed.
+    A draft is the first plan that the whole job tries, or a day with fewer manoeuvres searched for, without drawn
+    trials and bounds. It is written into `out` or runs/<scenario>-draft, without anything that could be sailed.
 
     Args:
         scenario: the scenario file.

@@ -224,7 +224,7 @@ def _added(
     """Manoeuvres that would shorten the day; none where the scenario wants none, or the vessel can do none.
 
     The first start takes the seed itself, the others seeds drawn from it. Only the speed and the turns of legs matter
-    of the plan's settings, so that scenarios with others share what is remembered, and so do drafts.
+    of the plan's settings, so that scenarios with others share what is remembered. Drafts search less.
     """
     from expdesign.shortest_day import manoeuvres_worth_adding
 
@@ -235,7 +235,8 @@ def _added(
     seed = seed if settings.seed is None else settings.seed
     settings = replace(settings, seed=int(np.random.default_rng([seed, start]).integers(2**31)) if start else seed)
     plan = case.plan
-    legs = PlanSettings(transit_speed_mps=plan.transit_speed_mps, turning_radius_m=plan.turning_radius_m)
+    speed_mps, radius_m = plan.transit_speed_mps, plan.turning_radius_m
+    legs = PlanSettings(transit_speed_mps=speed_mps, turning_radius_m=radius_m, draft=plan.draft)
     problem = replace(problem, settings=legs, seed=0)
     try:
         day_s = case.design.accuracy.day_s
@@ -258,7 +259,7 @@ def day_files(case: Scenario, day: Day) -> dict[str, str | bytes]:
     if found is None:
         return {}
     content = {
-        **({"draft": True} if found.plan.draft else {}),
+        **({"draft": True, "note_on_draft": found.note} if found.plan.draft else {}),
         "day_s": found.plan.commands.duration_s,
         "day_median_s": finite(found.plan.day.median_s),
         "day_95_s": finite(found.plan.day.most_s),
@@ -345,6 +346,7 @@ def day_summary(day: Day) -> dict[str, object]:
         **_information_bound(found),
         "manoeuvres_added": len(day.added),
         "days_tried": len(found.tried),
+        **({"note_on_draft": found.note} if found.plan.draft else {}),
     }
 
 

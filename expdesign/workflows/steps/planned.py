@@ -127,7 +127,7 @@ def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
         **({} if plan.verified else {"verdict": plan.verdict}),
         "informative_s": plan.seconds("primitive"),
         "repositioning_s": plan.seconds("reposition"),
-        "repositioning_bound_s": plan.reposition_bound_s,
+        **({} if plan.draft else {"repositioning_bound_s": plan.reposition_bound_s}),
         **_lattice_summary(plan.lattice),
         "distance_m": plan.trajectory.distance_m,
         "least_clearance_m": plan.verification.clearance_min_m,
