@@ -146,8 +146,9 @@ def test_a_first_cause_that_shows_nowhere_for_certain_is_a_remark(monkeypatch):
     """A point on average, perhaps none: predictions decide, alone if they gain much; a sure gain decides itself."""
     spread = np.array([[-3.0], [-3.0], [-3.0], [5.0], [5.0], [5.0]])
     for after, predicted, kept in (
-        (70.0 + spread, (0.01, (0.001, 0.02)), True),
-        (70.0 + spread, (0.01, (-0.001, 0.02)), False),
+        (70.0 + spread, (0.02, (0.001, 0.03)), True),
+        (70.0 + spread, (0.02, (-0.001, 0.03)), False),
+        (70.0 + spread, (0.01, (0.001, 0.02)), False),
         (70.0 + spread, (0.3, (-0.1, 0.5)), False),
         (71.0, (0.0, (-0.1, 0.1)), True),
         (70.0, (0.06, (0.01, 0.1)), True),

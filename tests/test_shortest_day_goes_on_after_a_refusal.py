@@ -116,12 +116,14 @@ def test_a_remedy_is_looked_for_once_when_no_day_is_left(asked, monkeypatch):
     """Not for each day that is refused, as another may be planned."""
     problem, accuracy = asked
     search = alternate._Search(problem=problem, accuracy=accuracy, added=())
-    days = [SimpleNamespace(repeats=problem.design.repeats, draft=number) for number in range(3)]
+    days = [
+        SimpleNamespace(repeats=problem.design.repeats, draft=SimpleNamespace(sailed=None, number=k)) for k in range(3)
+    ]
     planned, advised = [], []
 
     def refuse(task, draft, *, progress):
-        planned.append(draft)
-        raise NoPlan(f"day {draft} is too risky")
+        planned.append(draft.number)
+        raise NoPlan(f"day {draft.number} is too risky")
 
     monkeypatch.setattr(alternate, "plan_drafted", refuse)
     monkeypatch.setattr(alternate, "with_advice", lambda task, error, progress: advised.append(str(error)) or error)

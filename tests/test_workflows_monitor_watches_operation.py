@@ -38,6 +38,11 @@ def monitored(folder: Path, *words: object) -> dict[str, object]:
     return content
 
 
+def ten_digits(content: object) -> object:
+    """Sums over stretches depend on which are simulated together, in their last digits."""
+    return json.loads(json.dumps(content), parse_float=lambda text: f"{float(text):.10g}")
+
+
 def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path, voyages["same"], voyages["changed"], "--reference", voyages["reference"])
     assert told["judged_h"] == pytest.approx(1.75, abs=0.05)
@@ -104,7 +109,7 @@ def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
     whole = told_in(watched)
     monitored(tmp_path / "parts", first, "--reference", voyages["reference"])
     parts = monitored(tmp_path / "parts", second, "--resume")
-    assert {**parts, "history": [], "notes": []} == {**whole, "history": [], "notes": []}
+    assert ten_digits({**parts, "history": [], "notes": []}) == ten_digits({**whole, "history": [], "notes": []})
     states = [json.loads((folder / "monitor-state.json").read_text()) for folder in (watched, tmp_path / "parts")]
     assert agree(states[0]["phase"]["state"], states[1]["phase"]["state"])
     assert states[0]["reading"]["pending"] == states[1]["reading"]["pending"]
