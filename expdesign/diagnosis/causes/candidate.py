@@ -72,10 +72,12 @@ class Cause:
 
     Attributes:
         name: in the vocabulary of diagnosis.json.
+        summary: what is wrong, in a few words.
         candidates: for a situation; none if the data cannot show the cause.
         explain: one or two sentences for a person, from the estimates and the model they are of.
     """
 
     name: str
+    summary: str
     candidates: Callable[[Situation], tuple[Candidate, ...]]
     explain: Callable[[Values, ExtendedModel], str]

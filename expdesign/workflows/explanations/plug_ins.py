@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 
 from expdesign.workflows.explanations.values import Explained, Section, Topic
@@ -33,14 +32,11 @@ def families_topic() -> Topic:
 
 
 def causes_topic() -> Topic:
-    """Causes that a diagnosis looks for; each is described where it is defined."""
+    """Causes that a diagnosis looks for."""
     from expdesign.diagnosis.causes import CAUSES
 
-    entries = []
-    for cause in CAUSES:
-        words = inspect.getdoc(inspect.getmodule(cause.candidates)) or ""
-        entries.append(Explained(name=cause.name, meaning=words.partition("\n\n")[0].replace("\n", " ").rstrip(".")))
-    return _list("causes", "Causes that expdesign diagnose can name", tuple(entries))
+    entries = tuple(Explained(name=cause.name, meaning=cause.summary) for cause in CAUSES)
+    return _list("causes", "Causes that expdesign diagnose can name", entries)
 
 
 def methods_topic() -> Topic:

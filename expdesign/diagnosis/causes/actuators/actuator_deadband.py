@@ -46,4 +46,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"Commands of {key.split(':')[1]} smaller than {rounded(value, std)} have no effect: a dead band."
 
 
-ACTUATOR_DEADBAND = Cause(name="actuator_deadband", candidates=_candidates, explain=_explain)
+ACTUATOR_DEADBAND = Cause(
+    name="actuator_deadband",
+    summary="actuators that do not answer small commands",
+    candidates=_candidates,
+    explain=_explain,
+)

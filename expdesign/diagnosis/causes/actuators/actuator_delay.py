@@ -20,4 +20,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-ACTUATOR_DELAY = Cause(name="actuator_delay", candidates=_candidates, explain=_explain)
+ACTUATOR_DELAY = Cause(
+    name="actuator_delay",
+    summary="actuators that follow their commands after a dead time",
+    candidates=_candidates,
+    explain=_explain,
+)

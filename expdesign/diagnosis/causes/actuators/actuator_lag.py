@@ -47,7 +47,12 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-ACTUATOR_LAG = Cause(name="actuator_lag", candidates=_candidates, explain=_explain)
+ACTUATOR_LAG = Cause(
+    name="actuator_lag",
+    summary="actuators that follow their commands with a first-order lag",
+    candidates=_candidates,
+    explain=_explain,
+)
 
 
 def _slewing(situation: Situation) -> tuple[Candidate, ...]:
@@ -66,4 +71,9 @@ def _explain_slew(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-ACTUATOR_SLEW = Cause(name="actuator_slew", candidates=_slewing, explain=_explain_slew)
+ACTUATOR_SLEW = Cause(
+    name="actuator_slew",
+    summary="actuators that move at another rate than stated",
+    candidates=_slewing,
+    explain=_explain_slew,
+)

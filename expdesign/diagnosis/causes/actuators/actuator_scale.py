@@ -25,4 +25,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-ACTUATOR_SCALE = Cause(name="actuator_scale", candidates=_candidates, explain=_explain)
+ACTUATOR_SCALE = Cause(
+    name="actuator_scale",
+    summary="rudders that turn by a share of the ordered angle: a wrong scale of the recorded orders or of the linkage",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -24,4 +24,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-THRUST_ADVANCE_LOSS = Cause(name="thrust_advance_loss", candidates=_candidates, explain=_explain)
+THRUST_ADVANCE_LOSS = Cause(
+    name="thrust_advance_loss",
+    summary="thrust that falls with the speed of advance",
+    candidates=_candidates,
+    explain=_explain,
+)

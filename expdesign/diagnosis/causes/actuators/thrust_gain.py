@@ -27,4 +27,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-THRUST_GAIN = Cause(name="thrust_gain", candidates=_candidates, explain=_explain)
+THRUST_GAIN = Cause(
+    name="thrust_gain",
+    summary="thrust too weak or too strong by one factor in every regime",
+    candidates=_candidates,
+    explain=_explain,
+)

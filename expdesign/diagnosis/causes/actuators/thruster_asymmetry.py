@@ -41,4 +41,9 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     return f"The angle of {key.split(':')[1]} is off by {size} degrees: the ship turns when it is commanded straight."
 
 
-THRUSTER_ASYMMETRY = Cause(name="thruster_asymmetry", candidates=_candidates, explain=_explain)
+THRUSTER_ASYMMETRY = Cause(
+    name="thruster_asymmetry",
+    summary="a ship that turns at zero angle: thrust off the centre line, or wrong angles",
+    candidates=_candidates,
+    explain=_explain,
+)

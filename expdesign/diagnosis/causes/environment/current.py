@@ -25,4 +25,4 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-CURRENT = Cause(name="current", candidates=_candidates, explain=_explain)
+CURRENT = Cause(name="current", summary="a steady current", candidates=_candidates, explain=_explain)

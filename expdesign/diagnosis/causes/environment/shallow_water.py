@@ -29,4 +29,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"The motion depends on the water depth. A depth of twice the draught increases {half}."
 
 
-SHALLOW_WATER = Cause(name="shallow_water", candidates=_candidates, explain=_explain)
+SHALLOW_WATER = Cause(
+    name="shallow_water",
+    summary="shallow water: damping and inertia grow with draught over depth",
+    candidates=_candidates,
+    explain=_explain,
+)

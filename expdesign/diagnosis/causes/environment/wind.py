@@ -112,4 +112,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"The error grows with the relative wind. The model lacks air drag of the hull ({listed(values)})."
 
 
-WIND = Cause(name="wind", candidates=_candidates, explain=_explain)
+WIND = Cause(
+    name="wind",
+    summary="wind: drag of the air on hull and superstructure, with measured wind or with an unknown mean one",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -48,4 +48,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"The model is correct until {rounded(time, std)} s. After that the data show changes: {words}."
 
 
-CHANGE_POINT = Cause(name="change_point", candidates=_candidates, explain=_explain)
+CHANGE_POINT = Cause(
+    name="change_point",
+    summary="a change of parameters during a run; between separate runs much else may differ",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -26,4 +26,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"Damping and thrust are wrong by the same factor, so the inertia differs from the model's: {parts}."
 
 
-LOAD_CHANGE = Cause(name="load_change", candidates=_candidates, explain=_explain)
+LOAD_CHANGE = Cause(
+    name="load_change",
+    summary="inertia that differs from the model's: other accelerations, the same steady speeds",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -30,4 +30,9 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     return f"The error is correlated with a regressor that the model lacks: {term}."
 
 
-MISSING_TERM = Cause(name="missing_term", candidates=_candidates, explain=_explain)
+MISSING_TERM = Cause(
+    name="missing_term",
+    summary="a term of the library that the model lacks: linear, a product or modulus of speeds, or cubic damping",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -23,4 +23,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"The model structure explains the data with other parameter values. Changes: {changes}."
 
 
-PARAMETERS = Cause(name="parameters", candidates=_candidates, explain=_explain)
+PARAMETERS = Cause(
+    name="parameters",
+    summary="parameter values that are wrong by more than their stated standard deviations",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -45,4 +45,9 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-ROLL_COUPLING = Cause(name="roll_coupling", candidates=_candidates, explain=_explain)
+ROLL_COUPLING = Cause(
+    name="roll_coupling",
+    summary="roll that shows in sway and yaw: a lightly damped mode driven by the side acceleration",
+    candidates=_candidates,
+    explain=_explain,
+)

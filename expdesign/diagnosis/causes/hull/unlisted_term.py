@@ -18,4 +18,9 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     )
 
 
-UNLISTED_TERM = Cause(name="unlisted_term", candidates=lambda _situation: (), explain=_explain)
+UNLISTED_TERM = Cause(
+    name="unlisted_term",
+    summary="a term that no cause of the catalogue is: found by regression on products of motion and inputs",
+    candidates=lambda _situation: (),
+    explain=_explain,
+)

@@ -30,4 +30,9 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     )
 
 
-HEADING_BIAS = Cause(name="heading_bias", candidates=_candidates, explain=_explain)
+HEADING_BIAS = Cause(
+    name="heading_bias",
+    summary="a misaligned compass or velocity sensor: surge speed leaks into measured sway",
+    candidates=_candidates,
+    explain=_explain,
+)

@@ -28,4 +28,9 @@ def _explain(values: Values, ship: ExtendedModel) -> str:
     )
 
 
-LEVER_ARM = Cause(name="lever_arm", candidates=_candidates, explain=_explain)
+LEVER_ARM = Cause(
+    name="lever_arm",
+    summary="an antenna or velocity sensor away from the point that the model describes",
+    candidates=_candidates,
+    explain=_explain,
+)

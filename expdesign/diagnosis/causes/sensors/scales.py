@@ -33,6 +33,14 @@ def _shows(sensor: str, motion: str) -> Callable[[Values, ExtendedModel], str]:
 
 
 GYRO_SCALE = Cause(
-    name="gyro_scale", candidates=_of_gyro, explain=_shows("The yaw rate sensor", "yaw rate that heading and motion")
+    name="gyro_scale",
+    summary="a rate gyro with a wrong scale, by heading and motion",
+    candidates=_of_gyro,
+    explain=_shows("The yaw rate sensor", "yaw rate that heading and motion"),
 )
-LOG_SCALE = Cause(name="log_scale", candidates=_of_log, explain=_shows("The log", "speed that inputs and turns"))
+LOG_SCALE = Cause(
+    name="log_scale",
+    summary="a log with a wrong scale, where no positions tell it",
+    candidates=_of_log,
+    explain=_shows("The log", "speed that inputs and turns"),
+)

@@ -39,4 +39,6 @@ def _explain(values: Values, _ship: ExtendedModel) -> str:
     return f"Signals are not synchronous: {parts}."
 
 
-SENSOR_DELAY = Cause(name="sensor_delay", candidates=_candidates, explain=_explain)
+SENSOR_DELAY = Cause(
+    name="sensor_delay", summary="one measured signal late against the others", candidates=_candidates, explain=_explain
+)
