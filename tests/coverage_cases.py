@@ -9,9 +9,9 @@ import numpy as np
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, truth
 from expdesign.errors import NoAnswer
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.values import Estimate
 from expdesign.processes import in_order
 from expdesign.records import central_difference

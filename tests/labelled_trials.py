@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.dictionary import Primitive
-from expdesign.export.files.record_file import record_csv
+from expdesign.export.files.text import record_csv
 from expdesign.rehearsal.validation import heading_rad
 from expdesign.signals import Batch
 from expdesign.simulation import CALM, Environment, simulate_ensemble

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions
-from expdesign.assessment.prior import with_prior
+from expdesign.assessment.values import with_prior
 from expdesign.errors import InputError
 from expdesign.vessel import Term, VesselModel
 

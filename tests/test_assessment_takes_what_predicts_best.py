@@ -10,10 +10,10 @@ import pytest
 from expdesign.assessment import EstimateOptions, assess
 from expdesign.assessment.held_out import Ahead, HeldOut, folds, ranked
 from expdesign.cli import main
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.output_error import minimise
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.settings import Settings
 from expdesign.records import load_records
 from expdesign.reduction import averaged, samples_of_a_mean
 from expdesign.scenario import load_vessel

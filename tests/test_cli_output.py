@@ -11,7 +11,7 @@ import pytest
 
 import expdesign
 from expdesign.cli import main
-from expdesign.cli.arguments import repeat_option
+from expdesign.cli.options import repeat_option
 from short_examples import copied
 
 SUMMARY = {

@@ -10,7 +10,7 @@ import hidden_effects as sea
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
-from expdesign.diagnosis.conclusions.notes import note_on_unconverged, notes_on_rejected
+from expdesign.diagnosis.conclusions.findings import note_on_unconverged, notes_on_rejected
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.cross_validation import CrossValidation, _fitted
 from expdesign.diagnosis.fit.fit import Fit
@@ -24,14 +24,14 @@ from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_fo
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
+    Work,
     _best_on_held_out,
     selection_round,
     simplest,
+    starting_points,
 )
-from expdesign.diagnosis.select.shortlist import starting_points
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import Estimated, silent
 from held_out_cases import POSSIBLE, errors, steps_of

@@ -22,7 +22,7 @@ from expdesign.progress import silent
 from expdesign.signals import Record
 
 BIAS_RAD = 0.3
-selecting = import_module("expdesign.diagnosis.selected")
+selecting = import_module("expdesign.diagnosis.diagnose")
 judging = import_module("expdesign.diagnosis.judgement")
 
 

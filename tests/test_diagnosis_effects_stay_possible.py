@@ -15,7 +15,7 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import after_step, best_step, step_bounds
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
-from expdesign.diagnosis.select.profile_likelihood import _limits
+from expdesign.diagnosis.select.fitted_candidate import _limits
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import NoAnswer
 from expdesign.signals import Record

@@ -9,20 +9,19 @@ import pytest
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES, Estimate, Finding
 from expdesign.diagnosis import diagnose as diagnose_record
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.accuracy import accuracy
 from expdesign.diagnosis.motion.equations_of_motion import state_rates
-from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.diagnosis.motion.inputs import ExogenousInputs
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.shallow_water import in_shallow_water
-from expdesign.diagnosis.vessel_file.writing import extend
+from expdesign.diagnosis.vessel_file.writing import extend, in_shallow_water
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.tables import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
-from expdesign.estimation.settings import Settings
 from expdesign.export import vessel_toml
 from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
 from expdesign.information import score_primitives

@@ -10,8 +10,7 @@ import hidden_effects as sea
 from clean_trials import SHIP_50M, at_rate, clean_trial
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows, fastest_rate
-from expdesign.diagnosis.motion.delivered_inputs import delivered_inputs
-from expdesign.diagnosis.motion.exogenous_inputs import _averaged
+from expdesign.diagnosis.motion.inputs import _averaged, delivered_inputs
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from diagnosis_case import vessel_of
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy
-from expdesign.diagnosis.data.measured_channels import derived_outputs
+from expdesign.diagnosis.accuracy import accuracy
+from expdesign.diagnosis.data.sampled_batch import derived_outputs
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.motion.sensors import sensor_outputs
-from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.result_names import public_name
+from expdesign.diagnosis.motion.linearisation import sensor_outputs
+from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.records import load_records
 from expdesign.signals import Commands

@@ -96,7 +96,7 @@ def test_the_generator_and_the_package_agree_on_calm_water():
 
     The first state comes from a straight line through five samples, so that its error is 0.77 of one sample's noise.
     """
-    from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+    from expdesign.diagnosis.accuracy import accuracy
     from expdesign.diagnosis.vessel_file.reading import extended_model
 
     calm = sea.Weather(current_std=0.0, wind_std=0.0)

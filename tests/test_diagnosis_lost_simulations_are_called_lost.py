@@ -8,8 +8,7 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy, clipped
-from expdesign.diagnosis.accuracy.tuning import TUNING
+from expdesign.diagnosis.accuracy import TUNING, accuracy, clipped
 from expdesign.diagnosis.conclusions import note_on_divergence
 from expdesign.diagnosis.data import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model

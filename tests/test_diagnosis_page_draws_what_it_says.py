@@ -8,13 +8,12 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import Estimate, Finding, diagnose
-from expdesign.diagnosis.accuracy.residuals import Residuals, _slopes, dependence, mean_residual, one_step_residuals
+from expdesign.diagnosis.accuracy import Residuals, _slopes, dependence, mean_residual, one_step_residuals
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.result_names import public_name
+from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
 from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
 from expdesign.export.diagnosis_page import figures as diagnosis_figures
-from expdesign.export.diagnosis_page.suspects import has_sign, is_force, suspected, suspected_force
+from expdesign.export.diagnosis_page.figures import has_sign, is_force, suspected, suspected_force
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
 

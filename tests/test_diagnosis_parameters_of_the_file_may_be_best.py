@@ -6,8 +6,7 @@ import pytest
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.held_out import HeldOut
-from expdesign.diagnosis.fit.prediction import prediction_gain
+from expdesign.diagnosis.fit.held_out import HeldOut, prediction_gain
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.vessel_file.reading import extended_model

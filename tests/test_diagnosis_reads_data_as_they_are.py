@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from diagnosis_case import Told, from_pose, hidden_record, hidden_records, vessel_of
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.accuracy import accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Situation
-from expdesign.diagnosis.conclusions.notes import notes_on_data
+from expdesign.diagnosis.conclusions.findings import notes_on_data
 from expdesign.diagnosis.data.sampled_batch import wind_held_over_gaps
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows

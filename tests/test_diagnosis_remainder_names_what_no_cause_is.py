@@ -12,9 +12,8 @@ from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.fit import CrossValidation, Fit, continuing, fit, linear_model
 from expdesign.diagnosis.motion import initial_states, stable_windows
 from expdesign.diagnosis.remainder import missing_effects, with_unlisted_terms
-from expdesign.diagnosis.remainder.additions import UNLISTED
-from expdesign.diagnosis.remainder.stability_selection import UnitInformation, greedy, stable_selection
-from expdesign.diagnosis.remainder.term_dictionary import term_dictionary
+from expdesign.diagnosis.remainder.search import UNLISTED
+from expdesign.diagnosis.remainder.stability_selection import UnitInformation, greedy, stable_selection, term_dictionary
 from expdesign.diagnosis.select import Selection, fit_nuisance, open_candidates, score_tests
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.signals import Record

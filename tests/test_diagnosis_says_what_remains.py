@@ -7,18 +7,17 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import Lead, Unexplained, diagnose
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.accuracy import accuracy
 from expdesign.diagnosis.conclusions.verdict import remarks, verdict
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import CrossValidation
-from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
+from expdesign.diagnosis.fit.fit import unmeasured_force_share
 from expdesign.diagnosis.motion import linearise
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
 from expdesign.diagnosis.select import forward_selection
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
-from expdesign.diagnosis.select.selection_round import selection_round
+from expdesign.diagnosis.select.selection_round import Work, selection_round
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.diagnosis.select.work import Work
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import Estimated, silent
 from expdesign.signals import Record

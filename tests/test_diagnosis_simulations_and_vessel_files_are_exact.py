@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
-from expdesign.diagnosis.motion.integration import propagated
+from expdesign.diagnosis.motion.equations_of_motion import propagated
+from expdesign.diagnosis.motion.inputs import exogenous_inputs
 from expdesign.diagnosis.motion.linearisation import disturbance_of, linearise, responses, term_disturbances
 from expdesign.diagnosis.motion.simulation import (
     _newton_from_measured,

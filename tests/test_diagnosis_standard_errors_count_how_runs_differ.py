@@ -22,14 +22,12 @@ from expdesign.diagnosis.fit.between_runs import (
     tail,
 )
 from expdesign.diagnosis.fit.fit import Fit
-from expdesign.diagnosis.fit.gram_matrices import gram_matrices, marginalised
-from expdesign.diagnosis.fit.linear_model import Sensitivities
+from expdesign.diagnosis.fit.linear_model import Sensitivities, gram_matrices, marginalised
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import score_tests
 from expdesign.diagnosis.select.selection import _equivalent
-from expdesign.diagnosis.select.selection_round import _alternatives, open_candidates
-from expdesign.diagnosis.select.shortlist import _shortlist
+from expdesign.diagnosis.select.selection_round import _alternatives, _shortlist, open_candidates
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
 from hidden_effects import Weather

@@ -23,8 +23,7 @@ from expdesign.diagnosis.fit.fit import (
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.motion.simulation import initial_states
-from expdesign.diagnosis.motion.window_length import stable_windows
+from expdesign.diagnosis.motion.simulation import initial_states, stable_windows
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import ScoreTest, _effective_tests, score_tests

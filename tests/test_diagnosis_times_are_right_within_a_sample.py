@@ -9,8 +9,7 @@ from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_windows
-from expdesign.diagnosis.select.fitted_candidate import fit_candidate
-from expdesign.diagnosis.select.profile_likelihood import profile_estimate, with_profile_estimate
+from expdesign.diagnosis.select.fitted_candidate import fit_candidate, profile_estimate, with_profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.vessel_file.reading import extended_model

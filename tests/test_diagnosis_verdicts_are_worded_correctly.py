@@ -8,9 +8,8 @@ import pytest
 
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import CAUSES
-from expdesign.diagnosis.accuracy.simulated_fit import Accuracy
-from expdesign.diagnosis.conclusions.findings import error_reductions_of
-from expdesign.diagnosis.conclusions.notes import note_on_random_current
+from expdesign.diagnosis.accuracy import Accuracy
+from expdesign.diagnosis.conclusions.findings import error_reductions_of, note_on_random_current
 from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, remarks, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.held_out import HeldOut

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from diagnosis_case import from_pose, hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
-from expdesign.diagnosis.accuracy.simulated_fit import accuracy
+from expdesign.diagnosis.accuracy import accuracy
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
 from expdesign.diagnosis.data.windows import cut_windows

@@ -10,7 +10,7 @@ from expdesign.dictionary import FAMILIES, PrimitiveSpec, build_primitive, compl
 from expdesign.dictionary.trim import lost
 from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError
-from expdesign.export.files.dictionary_file import dictionary_files
+from expdesign.export.files.design_files import dictionary_files
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
 from expdesign.simulation import Conduct, simulate, steady_ahead, zigzag

@@ -7,9 +7,9 @@ import pytest
 
 from design_case import SCENARIOS, WIND, example_dictionary, spec, vessel, with_limit
 from expdesign.dictionary import build_dictionary, build_primitive, family
-from expdesign.dictionary.desired import desired_motion, deviating, deviation
+from expdesign.dictionary.build import desired_motion, deviating, deviation
 from expdesign.dictionary.tuning import TUNING
-from expdesign.growing.optimal_design import optimum
+from expdesign.growing.loop import optimum
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
 from expdesign.vessel import Limit

@@ -9,8 +9,7 @@ import pytest
 
 from design_case import spec
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
-from expdesign.dictionary.families.step_trials.hold_times import SETTLED, hold_times
-from expdesign.dictionary.families.step_trials.staircase import steady_turn
+from expdesign.dictionary.families.step_trials import SETTLED, hold_times, steady_turn
 from expdesign.errors import InputError
 from expdesign.scenario import load_vessel
 from expdesign.simulation import Environment, simulate, steady_ahead

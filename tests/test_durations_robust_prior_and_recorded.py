@@ -19,7 +19,7 @@ from expdesign.durations import (
     optimal_shares,
     solve_durations,
 )
-from expdesign.durations.asymmetric import log_abs_det
+from expdesign.durations.solve import log_abs_det
 from expdesign.durations.tuning import Tuning
 from expdesign.errors import InputError, NotInformative
 from expdesign.information import score_models, score_primitives

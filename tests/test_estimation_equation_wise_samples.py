@@ -7,11 +7,10 @@ import pytest
 
 from estimation_case import NOMINAL, QUIET, TRUE, commands, measured, record, truth
 from expdesign.errors import InputError, NotInformative
-from expdesign.estimation.equation_wise import EQUATION_WISE
-from expdesign.estimation.excitation import WorstCase, worst_case
+from expdesign.estimation.excitation import EQUATION_WISE, WorstCase, worst_case
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import Regression
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting, solve_iv
 from expdesign.vessel import Sensors
 

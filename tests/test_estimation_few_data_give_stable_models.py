@@ -15,9 +15,9 @@ from estimation_case import (
     truth,
 )
 from expdesign.errors import Diverged
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay import simulate_batch
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Prior
 from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch

@@ -21,11 +21,11 @@ from estimation_case import (
     many_short_batches,
     measured,
 )
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.noise.timeline import timeline
-from expdesign.estimation.noise.whitening import Colour, fitted_colour, innovations, white_parts
+from expdesign.estimation.noise.components import timeline
+from expdesign.estimation.noise.covariance import Colour, fitted_colour, innovations, white_parts
 from expdesign.estimation.regression.regression import single_output
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve.solution import Weighting, solve_iv
 from expdesign.signals import Record
 

@@ -6,12 +6,17 @@ import scipy
 
 from estimation_case import CALM_CURRENT, NOMINAL, TRUE, commands, measured, record
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.noise.components import Components, Fitted, fit_components
+from expdesign.estimation.noise.components import (
+    Components,
+    Fitted,
+    Slow,
+    expected_periodogram,
+    filtered,
+    fit_components,
+    stretches,
+)
 from expdesign.estimation.noise.coupled import Coupled, coupled_covariance, fit_coupled
-from expdesign.estimation.noise.parts import Slow, filtered
-from expdesign.estimation.noise.periodograms import expected_periodogram
-from expdesign.estimation.noise.score_covariance import score_covariance
-from expdesign.estimation.noise.timeline import stretches
+from expdesign.estimation.noise.covariance import score_covariance
 from expdesign.estimation.regression import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start

@@ -10,12 +10,12 @@ from scipy.optimize import least_squares
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import current_moments
-from expdesign.estimation.fit import fit_percent
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.output_error import gauss_newton, minimise
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
-from expdesign.estimation.settings import Settings
+from expdesign.estimation.values import fit_percent
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Environment, Variation, motion_rates, simulate
 from expdesign.vessel import VesselModel

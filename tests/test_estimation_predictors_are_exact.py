@@ -8,9 +8,9 @@ import pytest
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.estimation.disturbance import READINGS, current_moments
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import METHODS, estimate
 from expdesign.estimation.regression import build_layout, build_regression
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve.solution import Weighting
 from expdesign.signals import Batch
 from expdesign.simulation import Environment, Variation

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, record
-from expdesign.assessment.limits import Limits
+from expdesign.assessment.misfit import Limits
 from expdesign.errors import Diverged
 from expdesign.estimation.excitation import WorstCase, check_excitation, worst_case
-from expdesign.estimation.fit import fit_percent
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration, simulate_batch
-from expdesign.estimation.settings import Settings
+from expdesign.estimation.values import fit_percent
 from expdesign.export.files.estimates import limit_entries
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, Variation, simulate, simulate_ensemble

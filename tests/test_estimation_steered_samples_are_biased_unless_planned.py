@@ -9,9 +9,9 @@ import pytest
 
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.feedback import feedback_in
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import Regression
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
 from expdesign.vessel import Term

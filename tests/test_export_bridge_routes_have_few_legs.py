@@ -20,7 +20,7 @@ from expdesign.errors import InputError
 from expdesign.export import PlannedTrack, Route, Waypoint, build_bridge_route, build_route, find_format, route_files
 from expdesign.export.formats.check import check_rtz
 from expdesign.export.routes import read_plan
-from expdesign.export.routes.corridor import corridor, corridor_in_water, sides_needed
+from expdesign.export.routes.chords import corridor, corridor_in_water, sides_needed
 from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory

@@ -14,8 +14,7 @@ from expdesign.conventions import to_n_frame
 from expdesign.errors import NoPlan
 from expdesign.export.cards import cards_html
 from expdesign.export.cards.card import card_groups, run_orders, steady_s
-from expdesign.export.cards.danger import look_out
-from expdesign.export.cards.orders import condensed
+from expdesign.export.cards.orders import condensed, look_out
 from expdesign.export.report.content import primitive_runs
 from expdesign.export.tuning import TUNING
 

@@ -15,8 +15,8 @@ from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export import words
 from expdesign.export.cards import cards_html
 from expdesign.export.cards.orders import heading_rows, order_rows, orders_notes, starboard_helm
-from expdesign.export.report.criteria import short_of_optimum
-from expdesign.export.report.figures.chart import chart_legend, deep_from, safety_contour
+from expdesign.export.report.chart import chart_legend, deep_from, safety_contour
+from expdesign.export.report.design import short_of_optimum
 from expdesign.export.report.tables import agenda, setting, shown_name, shown_names
 from expdesign.plan.values import Leg
 from expdesign.sea_area import SeaArea, as_multipolygon

@@ -24,7 +24,7 @@ from expdesign.export import FORMATS, build_bridge_route, build_route, plan_json
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.formats.mission import NAV_WAYPOINT
 from expdesign.export.routes import read_plan
-from expdesign.export.routes.corridor import corridor, sides_needed
+from expdesign.export.routes.chords import corridor, sides_needed
 from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.signals import Trajectory

@@ -18,13 +18,12 @@ from expdesign.export import build_route, words
 from expdesign.export.pages.figures import new_figure, round_ticks
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
+from expdesign.export.report.chart import footprints, nice_step, place_labels
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
-from expdesign.export.report.figures.chart import footprints, place_labels
-from expdesign.export.report.figures.position_axes import nice_step
+from expdesign.export.report.design import chain
 from expdesign.export.report.parameters import expected, parameter_rows
-from expdesign.export.report.trust import chain
-from expdesign.growing.values import GrowRound, Growth
+from expdesign.growing.space import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM
 from expdesign.vessel import Sensors

@@ -9,8 +9,7 @@ import pytest
 
 from design_case import example_dictionary, vessel
 from expdesign.estimation.methods import METHODS
-from expdesign.export.validation_page import ValidationContent, judgements
-from expdesign.export.validation_page.content import biased, off_theory, surely_biased
+from expdesign.export.validation_page import ValidationContent, biased, judgements, off_theory, surely_biased
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
 from expdesign.vessel import Sensors, Vessel

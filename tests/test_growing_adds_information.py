@@ -8,14 +8,12 @@ import pytest
 
 from design_case import WIND, example_dictionary, scored_example, spec, vessel
 from expdesign.dictionary import FAMILIES, build_primitive, family
-from expdesign.dictionary.batch import excite_many
+from expdesign.dictionary.build import excite_many
 from expdesign.durations import bordered, build_durations, solve_durations
 from expdesign.errors import InputError, UnknownName
-from expdesign.growing.loop import grow_dictionary, motion_limits
-from expdesign.growing.optimal_design import optimum, sensitivity
+from expdesign.growing.loop import grow_dictionary, motion_limits, optimum, sensitivity
 from expdesign.growing.search import Measure, Worth, pool_of, refined, violation
-from expdesign.growing.space import family_spaces
-from expdesign.growing.values import GrowSettings, Growth
+from expdesign.growing.space import GrowSettings, Growth, family_spaces
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
 from expdesign.information.many import bordered_runs
 from expdesign.simulation import CALM, Environment

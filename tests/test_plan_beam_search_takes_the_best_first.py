@@ -12,7 +12,7 @@ from expdesign.plan.chart import GoalDistance
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search import place_runs
 from expdesign.plan.search.beam import _in_order
-from expdesign.plan.search.successors import clear_successors, runs_clear
+from expdesign.plan.search.local_search import clear_successors, runs_clear
 from expdesign.plan.search.tuning import SEARCH
 from plan_case import leg_water, primitive, space_of
 

@@ -9,8 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.bounds.branch_and_bound import GoalTimes, goal_times, grown_times, time_saved_s
-from expdesign.plan.bounds.displacement import Headway, displacement_of
-from expdesign.plan.bounds.track import track_of
+from expdesign.plan.bounds.displacement import Headway, displacement_of, track_of
 from expdesign.plan.chart.visibility_graph import build_visibility_graph
 from expdesign.simulation import Environment
 from plan_case import primitive, random_path, ship

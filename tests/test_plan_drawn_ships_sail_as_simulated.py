@@ -11,10 +11,10 @@ import shapely
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control.capability import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.procedure import steady_states
 from expdesign.plan.monte_carlo.return_paths import build_return_paths
 from expdesign.plan.monte_carlo.risk import upper_limit
+from expdesign.plan.monte_carlo.trials import CollisionCheck
 from expdesign.plan.runs.dispersion import draw_truths
 from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.plan.runs.tuning import RUNS

@@ -7,7 +7,7 @@ import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.monte_carlo.go_around import GoAroundPaths
+from expdesign.plan.monte_carlo.return_paths import GoAroundPaths
 
 RADIUS, SPACING = 40.0, 5.0
 GOAL = np.array([0.0, 0.0, 0.7])

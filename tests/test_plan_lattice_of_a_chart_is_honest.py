@@ -9,9 +9,8 @@ from expdesign.plan.chart.goal_distance import build_goal_distance
 from expdesign.plan.local_planner import LegEnds, SearchSpace, local_planner
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
-from expdesign.plan.search.lattice_grid import Lattice
-from expdesign.plan.search.lattice_moves import Departure, build_lattice
-from expdesign.plan.search.lattice_search import LatticeSearch
+from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice
+from expdesign.plan.search.planners import LatticeSearch
 from plan_case import leg_water
 
 SPACING_M = 60.0

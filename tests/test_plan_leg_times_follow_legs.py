@@ -12,7 +12,7 @@ from scipy.stats import binom
 from expdesign.dictionary.build import trim
 from expdesign.plan.control.acceleration_limits import leg_end, to_work_s
 from expdesign.plan.legs import LegTask
-from expdesign.plan.local_planner.agile_times import (
+from expdesign.plan.local_planner.transitions import (
     COURSES,
     DIRECTIONS,
     GOING_ON,

@@ -8,8 +8,8 @@ import pytest
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.legs import LegTask
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.local_planner.dubins_length import dubins_m
-from expdesign.plan.local_planner.helm_times import helm_times
+from expdesign.plan.local_planner.dubins import dubins_m
+from expdesign.plan.local_planner.helm import helm_times
 from expdesign.simulation import steady_ahead
 from helm_case import coaster, open_water
 from plan_case import find_leg

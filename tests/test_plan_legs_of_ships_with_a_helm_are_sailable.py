@@ -9,8 +9,7 @@ import pytest
 
 from expdesign.plan.control import CONTROL
 from expdesign.plan.legs import LegTask
-from expdesign.plan.legs.helm import _shortest_first
-from expdesign.plan.legs.recovery import displaced, recover
+from expdesign.plan.legs.helm import _shortest_first, displaced, recover
 from expdesign.signals import Commands
 from expdesign.simulation import simulate, steady_ahead
 from helm_case import catamaran, coaster, open_water

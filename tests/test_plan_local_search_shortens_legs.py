@@ -10,8 +10,7 @@ import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.local_planner import SearchSpace, TriedTransition, run_ends
-from expdesign.plan.search.local_search import ChainEnds, measured_s, polished
-from expdesign.plan.search.successors import runs_clear
+from expdesign.plan.search.local_search import ChainEnds, measured_s, polished, runs_clear
 from plan_case import leg_water, primitive, space_of
 
 ISLAND = shapely.box(-60, -200, 60, 40)

@@ -15,11 +15,10 @@ from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
 from expdesign.plan.monte_carlo import trials
-from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import Guidance
 from expdesign.plan.monte_carlo.procedure import tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
-from expdesign.plan.monte_carlo.trials import Trials, sail_trials
+from expdesign.plan.monte_carlo.trials import CollisionCheck, Trials, sail_trials
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs.dispersion import Truths, draw_truths
 from expdesign.plan.runs.ensemble import Fleet

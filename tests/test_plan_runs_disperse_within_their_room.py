@@ -9,8 +9,8 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.plan.control.capability import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.monte_carlo.collision import CollisionCheck
 from expdesign.plan.monte_carlo.guidance import open_loop
+from expdesign.plan.monte_carlo.trials import CollisionCheck
 from expdesign.plan.runs.dispersion import dispersion_m, draw_truths
 from expdesign.plan.runs.ensemble import Fleet
 from expdesign.plan.values import PlanSettings

@@ -13,7 +13,7 @@ from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.control import CONTROL, HelmShip
 from expdesign.plan.control.capability import capability, needs_helm
-from expdesign.plan.control.steady_turns import steady_turns
+from expdesign.plan.control.helm_capability import steady_turns
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Conduct, simulate, steady_ahead, stopping, turning_circle

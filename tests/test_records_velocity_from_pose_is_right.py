@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from expdesign.records import central_difference, load_records, smoothed_velocity
-from expdesign.records.pose.smoother import WEIGHT, smooth
-from expdesign.records.pose.smoother import _likeliest_ratio as likeliest_ratio
+from expdesign.records.pose.motion import WEIGHT, smooth
+from expdesign.records.pose.motion import _likeliest_ratio as likeliest_ratio
 from record_files import SAMPLE_TIME_S, motion, write_trial
 
 STEP = 0.5

@@ -8,12 +8,12 @@ import pytest
 
 from estimation_case import MERGED, NOMINAL, TRUE
 from expdesign.errors import InputError
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.regression.vane import unbiased_value
+from expdesign.estimation.regression.nuisance import unbiased_value
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.settings import Settings
 from expdesign.reduction import at_reference_point, reduced, with_reduced_wind
-from expdesign.reduction.readings import readings
+from expdesign.reduction.sensors import readings
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import CALM, Environment, deliver, measure, simulate, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS

@@ -10,8 +10,8 @@ from expdesign.errors import NoAnswer, NoPlan, NoRoom
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, alternate, drafting, shortest_day, stated_accuracy
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_problem
+from expdesign.workflows.steps.scored import ready
 
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 

@@ -13,7 +13,7 @@ from expdesign.information import regressor_rows
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import Accuracy
 from expdesign.shortest_day.bounds import Motions, day, fewest_samples, richest_sample, speed_changes
-from expdesign.shortest_day.bounds.affine import AFFINE, over_boxes
+from expdesign.shortest_day.bounds.motions import AFFINE, over_boxes
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.vessel import NUMPY, Limit, Term, VesselModel

@@ -10,7 +10,7 @@ from expdesign.errors import FileError, NoAnswer
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, alternate, check_way_fits, fullest_day, stated_accuracy
 from expdesign.shortest_day.cheapest import cheapest_shares, fullest_level
-from expdesign.shortest_day.offer import Offer
+from expdesign.shortest_day.prices import Offer
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored

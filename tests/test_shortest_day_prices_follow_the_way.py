@@ -9,7 +9,7 @@ from expdesign.plan.values import Leg, SailedTrial
 from expdesign.plan.verify import track_information
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, stated_accuracy
-from expdesign.shortest_day.along_way import courses_of, runs_along, straight_courses
+from expdesign.shortest_day.prices import courses_of, runs_along, straight_courses
 from expdesign.signals import Trajectory
 from expdesign.simulation import simulate
 from expdesign.workflows.steps.design_problem import designed

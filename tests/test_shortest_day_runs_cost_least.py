@@ -12,7 +12,7 @@ from expdesign.errors import NoAnswer
 from expdesign.shortest_day import Accuracy, cheapest_runs
 from expdesign.shortest_day.alternate import promised_at_zero
 from expdesign.shortest_day.cheapest import cheapest_shares
-from expdesign.shortest_day.offer import Offer
+from expdesign.shortest_day.prices import Offer
 
 PARAMETERS = ("X_u", "Y_v", "N_r")
 SAMPLES = 100.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from expdesign.step_trials.comparisons import Comparison, comparisons
 from expdesign.step_trials.holds import Hold
 from expdesign.step_trials.regression import Sampled, ridge
 from expdesign.step_trials.responses import Transient, first_order, fit_first_order
 from expdesign.step_trials.samples import Plateau, StepSample
+from expdesign.step_trials.surfaces import Comparison, comparisons
 from expdesign.step_trials.tuning import TUNING
 
 CONSTANT_S = 4.0

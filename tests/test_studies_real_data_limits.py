@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess, check_run, decomposed, sentence
-from expdesign.assessment.limits import Limits
-from expdesign.assessment.runs import RunCheck
+from expdesign.assessment.misfit import Limits, RunCheck
 from expdesign.assessment.tuning import TUNING
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration

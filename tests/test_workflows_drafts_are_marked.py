@@ -16,7 +16,7 @@ from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
 from expdesign.export.routes import read_plan
-from expdesign.workflows.steps.trial_files import SAILED_BY
+from expdesign.workflows.steps.planned import SAILED_BY
 from short_examples import SHORTER, copied, example_run, example_work
 
 NAME = "story"

@@ -11,9 +11,9 @@ import pytest
 from expdesign import workflows
 from expdesign.assessment import EstimateOptions, assess, check_run
 from expdesign.assessment.assess import preferred
-from expdesign.assessment.residuals import autocorrelation
+from expdesign.assessment.misfit import autocorrelation
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.records import load_records
 from expdesign.reduction import reduced

@@ -11,7 +11,7 @@ from design_case import SCENARIOS, example_dictionary, random_matrices, vessel
 from expdesign.cli import main
 from expdesign.durations import best_subset
 from expdesign.errors import InputError
-from expdesign.export.files.record_file import record_csv
+from expdesign.export.files.text import record_csv
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record

@@ -10,8 +10,8 @@ import pytest
 from design_case import SCENARIOS, example_dictionary, vessel
 from expdesign.cli import main
 from expdesign.durations import pool_gains
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.export import vessel_toml
 from expdesign.information import regressor_rows

@@ -2,11 +2,8 @@
 
 from expdesign.assessment.assess import NO_TESTS, assess, default_methods, settled
 from expdesign.assessment.held_out import HeldOut
-from expdesign.assessment.limits import Limits, decomposed, sentence
-from expdesign.assessment.options import INSTRUMENTS, EstimateOptions
-from expdesign.assessment.residuals import OneStep, one_step
-from expdesign.assessment.runs import RunCheck, check_run
-from expdesign.assessment.values import Assessed, Assessment, Disturbances
+from expdesign.assessment.misfit import Limits, OneStep, RunCheck, check_run, decomposed, one_step, sentence
+from expdesign.assessment.values import INSTRUMENTS, Assessed, Assessment, Disturbances, EstimateOptions
 
 __all__ = [
     "INSTRUMENTS",

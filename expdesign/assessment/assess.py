@@ -12,11 +12,7 @@ from expdesign.assessment.actuator_times import (
     with_times_noted,
 )
 from expdesign.assessment.held_out import HeldOut, ranked
-from expdesign.assessment.limits import Limits, decomposed
-from expdesign.assessment.options import CONTINUOUS, HELD_OUT, EstimateOptions
-from expdesign.assessment.prior import PARAMETER_STD, check_prior, with_prior
-from expdesign.assessment.residuals import one_step
-from expdesign.assessment.runs import ESTIMATION, TEST, check_run
+from expdesign.assessment.misfit import ESTIMATION, TEST, Limits, check_run, decomposed, one_step
 from expdesign.assessment.trials import (
     USES_WIND,
     Trial,
@@ -29,11 +25,20 @@ from expdesign.assessment.trials import (
     tried,
 )
 from expdesign.assessment.tuning import TUNING
-from expdesign.assessment.values import Assessed, Assessment, Disturbances
+from expdesign.assessment.values import (
+    CONTINUOUS,
+    HELD_OUT,
+    PARAMETER_STD,
+    Assessed,
+    Assessment,
+    Disturbances,
+    EstimateOptions,
+    check_prior,
+    with_prior,
+)
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import combined_moments, current_moments, measured_wind, tells_current
-from expdesign.estimation.equation_wise import EQUATION_WISE
-from expdesign.estimation.excitation import check_excitation, worst_case
+from expdesign.estimation.excitation import EQUATION_WISE, check_excitation, worst_case
 from expdesign.estimation.methods import Method, method_named
 from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.regression import CURRENT, PREDICTORS

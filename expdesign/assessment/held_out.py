@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.assessment.limits import whole
+from expdesign.assessment.misfit import whole
 from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NoAnswer

@@ -8,15 +8,14 @@ from functools import cached_property
 
 from expdesign.assessment.actuator_times import considered, known_times
 from expdesign.assessment.held_out import Candidate, HeldOut, held_out
-from expdesign.assessment.options import AUTO, CONTINUOUS, HELD_OUT, EstimateOptions
-from expdesign.assessment.prior import NONE, PARAMETER_STD, with_prior
 from expdesign.assessment.tuning import TUNING
+from expdesign.assessment.values import AUTO, CONTINUOUS, HELD_OUT, NONE, PARAMETER_STD, EstimateOptions, with_prior
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative
 from expdesign.estimation.excitation import worst_case
+from expdesign.estimation.instrumental import STARTS, Settings
 from expdesign.estimation.methods import Method, estimate, method_named
 from expdesign.estimation.output_error import ActuatorTime, Begun
 from expdesign.estimation.regression import PREDICTORS
-from expdesign.estimation.settings import STARTS, Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent

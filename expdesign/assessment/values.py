@@ -1,21 +1,42 @@
-"""Estimates with their diagnostics."""
+"""Options and results of an estimation, and what the vessel file knew before the data.
+
+An estimate together with what the vessel file knew before the data.
+
+Values and covariances of both, independent of each other, are joined by their information; in gain form, for nuisance
+parameters too:
+
+    K = C_: (C + P)^-1          x + K (theta_0 - theta)          C_:: - K C_:'
+
+with the estimate theta and covariance C of the parameters, all numbers x and their covariance C_::, columns C_: of the
+parameters, and the prior theta_0 with P.
+
+Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
 
 from expdesign.assessment.held_out import HeldOut, reason
-from expdesign.assessment.limits import Limits
-from expdesign.assessment.residuals import OneStep
-from expdesign.assessment.runs import RunCheck
-from expdesign.errors import InputError, NoAnswer
+from expdesign.assessment.misfit import Limits, OneStep, RunCheck
+from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.estimation.disturbance import MeasuredWind, Moments
-from expdesign.estimation.excitation import Breach
+from expdesign.estimation.excitation import ALL, SAMPLES, Breach
+from expdesign.estimation.instrumental import STARTS
 from expdesign.estimation.methods import Method
+from expdesign.estimation.regression import MEANS
+from expdesign.estimation.replay import STEERED, Integration
+from expdesign.estimation.solve import BLOCKS
 from expdesign.estimation.values import Estimate
 from expdesign.signals import Record
+from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import VesselModel
+
+# Estimates with their diagnostics.
 
 INSTRUMENTAL = "iv"
 """How the names of methods with instruments begin."""
@@ -129,3 +150,134 @@ class Assessment:
     def best(self) -> Assessed:
         """The estimate that goes into the vessel file."""
         return self.methods[self.chosen]
+
+
+# An estimate together with what the vessel file knew before the data.
+
+NONE, PARAMETER_STD = "none", "parameter_std"
+PRIORS = (NONE, PARAMETER_STD)
+CONTRADICTED = 0.01
+"""Probability of the distance between prior and estimate below which a warning says that they contradict each other."""
+
+
+def check_prior(model: VesselModel, name: str) -> None:
+    """Raise where a vessel file knows nothing before.
+
+    Raises:
+        InputError: it states no standard deviations.
+    """
+    if not model.parameter_std.any():
+        raise InputError(
+            f"vessel {name!r} states no [model.parameter_std], so it has no prior to join with: leave --prior out, or "
+            "state how well each parameter is known"
+        )
+
+
+def with_prior(found: Estimate, model: VesselModel) -> Estimate:
+    """An estimate joined with the normal prior of a model; parameters without standard deviation count as known."""
+    places, count = [model.names.index(name) for name in found.names], len(found.names)
+    prior = model.parameter_covariance[np.ix_(places, places)]
+    apart = model.parameters[places] - found.values
+    gain = np.linalg.solve(found.covariance + prior, found.joint_covariance[:count]).T
+    joint = found.joint_covariance - gain @ found.joint_covariance[:count]
+    joint = (joint + joint.T) / 2
+    distance = float(apart @ np.linalg.solve(found.covariance + prior, apart))
+    chance = float(scipy.stats.chi2.sf(distance, count))
+    warnings = found.warnings
+    if chance < CONTRADICTED:
+        scores = np.abs(apart) / np.sqrt(np.diag(found.covariance + prior))
+        worst = int(scores.argmax())
+        warnings = (
+            *warnings,
+            f"The data contradict the prior of the vessel file (chance {chance:.1g}), most in {found.names[worst]}: "
+            f"{scores[worst]:.1f} standard deviations. Estimates without --prior do not depend on it.",
+        )
+    values = np.concatenate([found.values, found.nuisance_values]) + gain @ apart
+    return replace(
+        found,
+        values=values[:count],
+        covariance=joint[:count, :count],
+        nuisance_values=values[count:],
+        joint_covariance=joint,
+        warnings=warnings,
+    )
+
+
+# Options of an estimation.
+
+AUTO = "auto"
+CONTINUOUS, EULER = "continuous", "euler"
+MOTIONS = (CONTINUOUS, EULER)
+HELD_OUT, INSTRUMENTS = "held-out", "instruments"
+CHOICES = (HELD_OUT, INSTRUMENTS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimateOptions:
+    """Options of an estimation.
+
+    Attributes:
+        methods: names in `estimation.methods.METHODS`; empty for those that suit the data.
+        fixed: parameters held at the vessel's values.
+        mean: subtracted from the instruments: "none", "batch" or "complete".
+        blocks: of instruments: "one" for all runs, or one for each "batch" (4.45).
+        start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
+            for the vessel's values unless they are all zero or fail.
+        motion: "continuous" for parameters of the continuous-time motion, which plans use; "euler" for those of Euler's
+            map at the sample time.
+        horizon_s: simulation horizon of output error [s], None for whole runs.
+        constant: whether output error gives every run a constant force of its own.
+        steered: what becomes of samples marked as steered, one of `estimation.replay.STEERED`.
+        samples: "all", or "equation-wise": for each equation those that meet the excitation condition.
+        offset_mps: strongest current, and wind where it is not measured, that velocities inside an absolute value must
+            exceed in equation-wise samples, beside the sensors' noise [m/s].
+        prior: "parameter_std" to join estimates with what the vessel file knew before, or "none".
+        choice: of the best estimate: "held-out" for that which predicts best, see `held_out`; "instruments" for the
+            first stable one with instruments, and without output error unless that is among the methods.
+    """
+
+    methods: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
+    mean: str = "complete"
+    blocks: str = "one"
+    start: str = AUTO
+    motion: str = CONTINUOUS
+    horizon_s: float | None = None
+    constant: bool = False
+    steered: str = AUTO
+    samples: str = ALL
+    offset_mps: float = 0.0
+    prior: str = NONE
+    choice: str = HELD_OUT
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("instrument mean", self.mean, MEANS),
+            ("instrument blocks", self.blocks, BLOCKS),
+            ("start", self.start, (AUTO, *STARTS)),
+            ("motion", self.motion, MOTIONS),
+            ("treatment of steered samples", self.steered, STEERED),
+            ("choice of samples", self.samples, SAMPLES),
+            ("prior", self.prior, PRIORS),
+            ("choice", self.choice, CHOICES),
+        ):
+            if value not in known:
+                raise UnknownName(what, value, known=known)
+        if self.prior == PARAMETER_STD and self.motion != CONTINUOUS:
+            raise InputError(
+                f"--prior {PARAMETER_STD} is of the continuous motion, expected it without --motion {EULER}"
+            )
+        if not 0 <= self.offset_mps < float("inf"):
+            raise InputError(f"offset is {self.offset_mps:g} m/s, expected 0 or more")
+        if self.horizon_s is not None and not 0 < self.horizon_s < float("inf"):
+            raise InputError(f"horizon is {self.horizon_s:g} s, expected more than 0")
+
+    @property
+    def integration(self) -> Integration:
+        """Integrator of the models."""
+        return Integration("rk4", SUBSTEPS) if self.motion == CONTINUOUS else Integration()
+
+    @property
+    def quadrature(self) -> str:
+        """Quadrature of the regressors over a sample interval."""
+        return "trapezoid" if self.motion == CONTINUOUS else "euler"

@@ -19,8 +19,8 @@ from rich.markup import escape
 from typer.main import get_command
 
 from expdesign.cli.app import BUG
-from expdesign.cli.arguments import repeat_option
 from expdesign.cli.commands import app
+from expdesign.cli.options import repeat_option
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
 

@@ -1,9 +1,9 @@
 """The dictionary: manoeuvre families and the primitives made from them."""
 
-from expdesign.dictionary.build import build_dictionary, build_primitive, family, trim
+from expdesign.dictionary.build import build_dictionary, build_primitive, family
 from expdesign.dictionary.families import FAMILIES
-from expdesign.dictionary.primitive import Primitive
-from expdesign.dictionary.spec import Family, PrimitiveSpec, Setting, complete_settings
+from expdesign.dictionary.spec import Family, Primitive, PrimitiveSpec, Setting, complete_settings
+from expdesign.dictionary.trim import trim
 
 __all__ = [
     "FAMILIES",

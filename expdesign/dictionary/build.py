@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 
 from expdesign.dictionary.families import FAMILIES
-from expdesign.dictionary.primitive import Primitive
-from expdesign.dictionary.spec import Excitation, Family, PrimitiveSpec
-from expdesign.dictionary.trim import drift, lost, motion_text, reach_text, trim
+from expdesign.dictionary.spec import Excitation, Family, Primitive, PrimitiveSpec
+from expdesign.dictionary.trim import lost, motion_text, reach_text, trim
 from expdesign.dictionary.tuning import TUNING
-from expdesign.errors import InputError, SpeedOutOfReach, UnknownName, Unreachable
+from expdesign.errors import InputError, NoAnswer, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
-from expdesign.values import Array
-from expdesign.vessel import (
-    NUMPY,
-    Vessel,
-    allocate,
-    direct_terms,
-    generalised_force,
-    required_force,
-    within_limits,
-)
-
-__all__ = ["build_dictionary", "build_primitive", "drift", "excitation", "family", "follow", "trim"]
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, generalised_force, required_force, within_limits
 
 
 def family(name: str) -> Family:
@@ -200,3 +190,93 @@ def _not_held(vessel: Vessel, velocity: Array) -> str:
         f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}: "
         f"needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
     )
+
+
+# Commands and entry states of many specifications of one duration, without building primitives.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExcitedRuns:
+    """Commands and entry states of specifications of one duration.
+
+    Attributes:
+        possible: (n,) 1 where the settings are consistent and the vessel can hold the entry state, else 0.
+        velocity: (n, 3) entry u, v, r through water.
+        entry_inputs: (n, m) commands before the run.
+        commands: (n, k, m) within limits and rates.
+    """
+
+    possible: Array
+    velocity: Array
+    entry_inputs: Array
+    commands: Array
+
+    def __post_init__(self) -> None:
+        seal(self, possible="n", velocity="n 3", entry_inputs="n m", commands="n k m")
+
+
+def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
+    """Commands of many specifications; impossible ones are marked instead of raising.
+
+    Args:
+        vessel: nominal.
+        specs: of the same duration.
+    """
+    samples = round(specs[0].settings["duration_s"] / vessel.sample_time_s)
+    possible, velocity = np.zeros(len(specs)), np.zeros((len(specs), 3))
+    entry = np.zeros((len(specs), len(vessel.limits)))
+    commands = np.zeros((len(specs), samples, len(vessel.limits)))
+    desired: dict[int, Array] = {}
+    for index, spec in enumerate(specs):
+        try:
+            if family(spec.family).reference is not None:
+                desired[index] = desired_velocities(vessel, spec)
+                continue
+            found = desired_commands(vessel, spec)
+        except (InputError, NoAnswer):
+            continue
+        if len(found.commands) == samples:
+            possible[index], velocity[index], entry[index] = 1.0, found.velocity, found.inputs
+            commands[index] = found.commands
+    ordered = np.flatnonzero(possible)
+    commands[ordered] = within_limits(
+        vessel.actuators, commands[ordered], sample_time_s=vessel.sample_time_s, before=entry[ordered]
+    )
+    if desired:
+        rows = np.array(list(desired))
+        references = np.array(list(desired.values()))
+        before, followed = follow(vessel, references)
+        possible[rows] = lost(vessel, references[:, 0], before) <= TUNING.steady_change
+        velocity[rows], entry[rows], commands[rows] = references[:, 0], before, followed
+    return ExcitedRuns(possible=possible, velocity=velocity, entry_inputs=entry, commands=commands)
+
+
+# Deviation of the simulated motion from the desired one; designs use the simulated motion.
+
+
+def desired_motion(primitive: Primitive) -> Array | None:
+    """(k + 1, 3) desired u, v, r, or None where the family gives commands instead."""
+    try:
+        reference = family(primitive.family).reference
+    except InputError:
+        return None
+    return None if reference is None else reference(primitive.settings, primitive.trajectory.time_s)
+
+
+def deviation(primitive: Primitive) -> float:
+    """Largest deviation from the desired motion: of u and v per largest desired speed, of r per largest yaw rate.
+
+    Zero for families without desired velocities.
+    """
+    desired = desired_motion(primitive)
+    if desired is None:
+        return 0.0
+    apart = np.abs(primitive.trajectory.velocity - desired).max(axis=0)
+    speed = max(float(np.hypot(*desired[:, :2].T).max()), 1e-9)
+    turn = float(np.abs(desired[:, 2]).max()) or speed
+    return float(max(apart[0] / speed, apart[1] / speed, apart[2] / turn))
+
+
+def deviating(primitives: Sequence[Primitive]) -> tuple[Primitive, ...]:
+    """Primitives that deviate from the desired motion by more than `Tuning.reported_deviation`."""
+    return tuple(item for item in primitives if deviation(item) > TUNING.reported_deviation)

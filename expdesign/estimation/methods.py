@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.errors import InputError, UnknownName
-from expdesign.estimation.equation_wise import EQUATION_WISE, sample_notes, with_strata
+from expdesign.estimation.excitation import EQUATION_WISE, sample_notes, with_strata
 from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
-from expdesign.estimation.instrumental import instrumental_estimate, least_squares, quick_least_squares
+from expdesign.estimation.instrumental import Settings, instrumental_estimate, least_squares, quick_least_squares
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
     PREDICTORS,
@@ -32,7 +32,6 @@ from expdesign.estimation.replay import (
     open_loop,
     treatment_of,
 )
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import NullSpace, Refined, Solution
 from expdesign.estimation.values import Estimate, Residuals
 from expdesign.progress import Progress, silent

@@ -21,7 +21,6 @@ it is drawn: effects are estimated without each fold of the runs, by the informa
 Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
 """
 
-from expdesign.foresight.background import Background, background
 from expdesign.foresight.effects import Direction, HiddenEffect
 from expdesign.foresight.foresee import foresee
 from expdesign.foresight.operation import (
@@ -41,7 +40,15 @@ from expdesign.foresight.sizes import (
     standard_trials,
     with_effect,
 )
-from expdesign.foresight.trial import TrialRun, design_runs, run_of, simulated_record, weather_without_causes
+from expdesign.foresight.trial import (
+    Background,
+    TrialRun,
+    background,
+    design_runs,
+    run_of,
+    simulated_record,
+    weather_without_causes,
+)
 from expdesign.foresight.tuning import TUNING
 from expdesign.foresight.values import AddedRuns, Confusion, Foreseen, Foresight
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from expdesign.diagnosis.fit import Fit
 from expdesign.diagnosis.motion import linearise, simulate_from_measured, stable_windows
 from expdesign.dictionary import Primitive
-from expdesign.foresight.background import Background
 from expdesign.foresight.effects import Direction, disturbance_at, lasting
 from expdesign.foresight.information import JointInformation, allowed_by_prior, batch_information, beside_nuisance
 from expdesign.foresight.power import needed_noncentrality, power
-from expdesign.foresight.trial import exact_record, run_of, weather_without_causes
+from expdesign.foresight.trial import Background, exact_record, run_of, weather_without_causes
 from expdesign.foresight.tuning import TUNING
 from expdesign.foresight.values import AddedRuns, Foreseen
 from expdesign.simulation import Environment, simulate

@@ -16,7 +16,6 @@ from expdesign.diagnosis.select import (
 )
 from expdesign.dictionary import Primitive
 from expdesign.foresight.added import with_added_runs
-from expdesign.foresight.background import UNSEEN, Background, background
 from expdesign.foresight.effects import HiddenEffect, described, disturbance_at, hidden_effects, joined
 from expdesign.foresight.information import (
     JointInformation,
@@ -37,7 +36,7 @@ from expdesign.foresight.power import (
     share_shown,
 )
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
-from expdesign.foresight.trial import TrialRun
+from expdesign.foresight.trial import UNSEEN, Background, TrialRun, background
 from expdesign.foresight.tuning import TUNING
 from expdesign.foresight.values import Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent

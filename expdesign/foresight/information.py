@@ -22,9 +22,9 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, Motion
 from expdesign.diagnosis.select import candidate_disturbances
-from expdesign.foresight.background import Background
 from expdesign.foresight.effects import Direction, HiddenEffect, disturbance_at
 from expdesign.foresight.sizes import Size
+from expdesign.foresight.trial import Background
 from expdesign.values import Array
 
 

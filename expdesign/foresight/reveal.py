@@ -24,12 +24,11 @@ from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoAnswer
 from expdesign.foresight.added import ENDLESS, information_of_runs
-from expdesign.foresight.background import UNSEEN, Background, background
 from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
 from expdesign.foresight.foresee import effect_name, sizes_of
 from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
-from expdesign.foresight.trial import design_runs
+from expdesign.foresight.trial import UNSEEN, Background, background, design_runs
 from expdesign.foresight.tuning import TUNING
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import Environment

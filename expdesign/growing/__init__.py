@@ -5,11 +5,9 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.growing.loop import grow_dictionary, motion_limits, searched_spaces
-    from expdesign.growing.optimal_design import optimum, shared
+    from expdesign.growing.loop import grow_dictionary, motion_limits, optimum, searched_spaces, shared
     from expdesign.growing.search import Archive, Candidate, Measure, Worth, pool_of, refined
-    from expdesign.growing.space import FamilySpace
-    from expdesign.growing.values import GrowRound, GrowSettings, Growth
+    from expdesign.growing.space import FamilySpace, GrowRound, GrowSettings, Growth
 
 __all__ = [
     "Archive",
@@ -33,10 +31,26 @@ if not TYPE_CHECKING:
     __getattr__ = load_on_use(
         __name__,
         {
-            "loop": ("grow_dictionary", "motion_limits", "searched_spaces"),
-            "optimal_design": ("optimum", "shared"),
-            "search": ("Archive", "Candidate", "Measure", "Worth", "pool_of", "refined"),
-            "space": ("FamilySpace",),
-            "values": ("GrowRound", "GrowSettings", "Growth"),
+            "loop": (
+                "grow_dictionary",
+                "motion_limits",
+                "optimum",
+                "searched_spaces",
+                "shared",
+            ),
+            "search": (
+                "Archive",
+                "Candidate",
+                "Measure",
+                "Worth",
+                "pool_of",
+                "refined",
+            ),
+            "space": (
+                "FamilySpace",
+                "GrowRound",
+                "GrowSettings",
+                "Growth",
+            ),
         },
     )

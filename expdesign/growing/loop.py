@@ -15,18 +15,68 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primitive, family
+from expdesign.durations import bordered, d_optimal, log_det, rows_of, whitened
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing._casadi import FreeForm, optimise_commands
-from expdesign.growing.optimal_design import Optimum, optimum, sensitivity
 from expdesign.growing.search import Measure, Worth, best_of, pool_of, refined, violation
-from expdesign.growing.space import FamilySpace, family_spaces
+from expdesign.growing.space import FamilySpace, GrowRound, GrowSettings, Growth, family_spaces
 from expdesign.growing.tuning import TUNING
-from expdesign.growing.values import GrowRound, GrowSettings, Growth
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import CALM, Environment
-from expdesign.values import Array
+from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+# The D-optimal shares of a dictionary, and the sensitivity of one more run.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """Shares of the time, the optimal ones or others, and their information.
+
+    Attributes:
+        fractions: (q,) time fractions.
+        log_det: in physical scale.
+        inverse: (d, d) B^-1 in physical scale.
+    """
+
+    fractions: Array
+    log_det: float
+    inverse: Array
+
+    def __post_init__(self) -> None:
+        seal(self, fractions="q", inverse="d d")
+
+    @property
+    def dimension(self) -> int:
+        """Size of B."""
+        return len(self.inverse)
+
+
+def optimum(information: Sequence[PrimitiveInformation], mean_subtraction: str) -> Optimum:
+    """D-optimal time fractions of a dictionary that informs about every parameter."""
+    white, _ = whitened(np.array([bordered(item, mean_subtraction) for item in information]))
+    rows = rows_of(white)
+    assert rows is not None  # simulated runs have positive semidefinite information
+    return shared(information, d_optimal(rows, tolerance=1e-10).fractions, mean_subtraction)
+
+
+def shared(
+    information: Sequence[PrimitiveInformation], fractions: Array, mean_subtraction: str = "complete"
+) -> Optimum:
+    """The information of given time fractions (q,)."""
+    matrices = np.array([bordered(item, mean_subtraction) for item in information])
+    white, offset = whitened(matrices)
+    total = np.tensordot(fractions, matrices, axes=1)
+    scale = np.sqrt(np.diag(total))
+    inverse = np.linalg.inv(total / np.outer(scale, scale)) / np.outer(scale, scale)
+    return Optimum(fractions=fractions, log_det=log_det(white, fractions) + offset, inverse=inverse)
+
+
+def sensitivity(best: Optimum, item: PrimitiveInformation, mean_subtraction: str) -> float:
+    """d = trace(B(w)^-1 B) of one run."""
+    return float(np.sum(best.inverse * bordered(item, mean_subtraction)))
+
 
 OUTPUT_KEYS = ("u_mps", "v_mps", "r_radps")
 

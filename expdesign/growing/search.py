@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec
-from expdesign.dictionary.batch import excite_many
+from expdesign.dictionary.build import excite_many
 from expdesign.growing.space import FamilySpace
 from expdesign.growing.tuning import TUNING
 from expdesign.information.many import bordered_runs

@@ -4,17 +4,20 @@ Advance, transfer and tactical diameter are those of the midship point, the orig
 rudder order along and across the heading of the approach. SI units and radians; sides are "starboard" and "port".
 """
 
-from expdesign.indices.admissibility import (
+from expdesign.indices.criteria import (
     BEAUFORT_MPS,
     DEPTH_BY_DRAUGHT,
     HIGHEST_SEA,
     STRONGEST_WIND,
     Condition,
     Conditions,
+    Criterion,
+    Verdict,
     admissibility,
     beaufort,
+    criteria,
+    judge,
 )
-from expdesign.indices.criteria import Criterion, Verdict, criteria, judge
 from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
 from expdesign.indices.steered_run import SteeredRun, steered_run

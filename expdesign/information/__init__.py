@@ -3,13 +3,13 @@
 from expdesign.information.excitation import EXCITATIONS, excitation_condition, excitation_refusal
 from expdesign.information.moments import (
     MEAN_SUBTRACTIONS,
+    PrimitiveInformation,
     check_informative,
     estimated_parameters,
     log_det_or_none,
     moments,
     regressor_rows,
 )
-from expdesign.information.primitive_information import PrimitiveInformation
 from expdesign.information.scoring import score_models, score_primitives
 
 __all__ = [

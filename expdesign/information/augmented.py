@@ -17,8 +17,7 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import Diverged
 from expdesign.estimation.regression import Layout, batch_signs, build_layout, measured_table, model_for
-from expdesign.information.moments import log_det_or_none
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.moments import PrimitiveInformation, log_det_or_none
 from expdesign.information.scoring import score_primitives
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Batch, Record

@@ -24,8 +24,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.information.moments import signals_of
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.moments import PrimitiveInformation, signals_of
 from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment

@@ -9,8 +9,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
-from expdesign.information.moments import estimated_parameters
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.moments import PrimitiveInformation, estimated_parameters
 from expdesign.information.scoring import score_models
 from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment

@@ -26,12 +26,13 @@ from expdesign.information.excitation import (
 )
 from expdesign.information.moments import (
     MEAN_SUBTRACTIONS,
+    PrimitiveInformation,
     estimated_parameters,
     log_det_or_none,
+    over_shares,
     rows_of,
     signals_of,
 )
-from expdesign.information.primitive_information import PrimitiveInformation, over_shares
 from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, step_shares, to_body
 from expdesign.simulation.motion import begun

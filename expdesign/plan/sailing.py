@@ -1,19 +1,25 @@
-"""Sailing a trial run by run; where a leg or a run fails, the remaining runs are placed again."""
+"""Sailing a trial run by run; where a leg or a run fails, the remaining runs are placed again.
+
+Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
+
+So the legs of a placement do not wait for each other, and processes share them.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from expdesign.conventions import whole_turns
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
+from expdesign.memory import in_order, recalled
 from expdesign.plan.assembly import PlanRoom, phases_of
-from expdesign.plan.legs import FoundLeg, LegTask, LegWater, last_state, nearest_turns
-from expdesign.plan.legs_ahead import KnownLegs, LegAhead, leg_found, legs_ahead, remember
+from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
@@ -23,6 +29,80 @@ from expdesign.plan.values import Placement, Placements, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 from expdesign.values import Array
+
+# Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegAhead:
+    """A leg found ahead.
+
+    Attributes:
+        task: as it was expected.
+        commands: (k, m), or None where there is no leg.
+        source: what found its path.
+        spent_s: work that it took.
+    """
+
+    task: LegTask
+    commands: Array | None
+    source: str
+    spent_s: float
+
+    def fitted(self, task: LegTask, water: LegWater) -> Array | None:
+        """The commands for the task as it has become, azimuths shifted by whole turns; None where they miss its end."""
+        if self.commands is None or np.array_equal(task.start, self.task.start):
+            return self.commands
+        expected = self.task.start_inputs
+        values = self.commands + nearest_turns(water.vessel, expected, task.start_inputs) - expected
+        heading = water.states(task.start, values, task.past)[-1, 2]
+        end = np.r_[task.end[:2], task.end[2] + whole_turns(heading - task.end[2]), task.end[3:]]
+        return values if acceptable(task.start, end, water, values, task.past) else None
+
+
+KnownLegs = dict[tuple[bytes, ...], LegAhead]
+"""Legs found before, by all that decides them but chance."""
+
+
+def legs_ahead(
+    planner: LocalPlanner, water: LegWater, tasks: Iterable[LegTask], known: KnownLegs | None = None
+) -> Iterator[LegAhead]:
+    """The legs of tasks, in order; those known are not sought again, and those found become known."""
+    if known is None:
+        return in_order(_found, (planner, water), ((task,) for task in tasks))
+    listed = list(tasks)
+    fresh = [task for task in listed if _place(task) not in known]
+    if len(fresh) == 1:  # found here before another process has the water
+        remember(known, leg_found(planner, water, fresh[0]))
+    else:
+        known |= zip(map(_place, fresh), in_order(_found, (planner, water), ((task,) for task in fresh)), strict=True)
+    return (known[_place(task)] for task in listed)
+
+
+def remember(known: KnownLegs, ahead: LegAhead) -> None:
+    """Make a leg known."""
+    known[_place(ahead.task)] = ahead
+
+
+def _place(task: LegTask) -> tuple[bytes, ...]:
+    ends = task.start, task.end, task.start_inputs, task.end_inputs, task.past
+    return tuple(np.asarray(part, dtype=float).tobytes() for part in ends)
+
+
+def leg_found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
+    """The leg of a task."""
+    return recalled(_found, planner, water, task)
+
+
+def _found(planner: LocalPlanner, water: LegWater, task: LegTask) -> LegAhead:
+    leg = planner.leg(task, water)
+    return LegAhead(
+        task=task,
+        commands=None if leg is None else leg.commands,
+        source="" if leg is None else leg.source,
+        spent_s=task.budget.spent_s,
+    )
+
 
 GOAL = "goal"
 

@@ -28,7 +28,6 @@ from expdesign.plan.chart import reachable
 from expdesign.plan.checked import Refused, drawn_risk, verified
 from expdesign.plan.control import Capability
 from expdesign.plan.legs import LegWater
-from expdesign.plan.legs_ahead import KnownLegs
 from expdesign.plan.monte_carlo import (
     failed_chance_constraint,
 )
@@ -42,7 +41,7 @@ from expdesign.plan.replanning import (
     worth_replanning,
 )
 from expdesign.plan.runs import draws_for
-from expdesign.plan.sailing import sail_all, sail_placed
+from expdesign.plan.sailing import KnownLegs, sail_all, sail_placed
 from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Placement, Plan, RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import realised_efficiencies

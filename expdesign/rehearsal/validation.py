@@ -22,11 +22,10 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
-from expdesign.estimation.equation_wise import EQUATION_WISE
-from expdesign.estimation.excitation import worst_case
+from expdesign.estimation.excitation import EQUATION_WISE, worst_case
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.information.excitation import FREE, SIGMAS
 from expdesign.information.expected import TrialPart, expected_covariance

@@ -20,13 +20,13 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.roll.feedback import chance_of_answers
-from expdesign.roll.instruments import Weighted, folds, weighted_equations
+from expdesign.roll.instruments import Weighted, chance_of_answers, folds, weighted_equations
 from expdesign.roll.model import PARAMETERS, discrete, named, parameters, relative_sensitivity, roll_frequency
 from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
 from expdesign.roll.runs import Case
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
+from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, first_moment
 
 METHODS = ("iv", "ls")
@@ -367,3 +367,27 @@ def _strength(
     information, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
     regular = seeming + 1e-12 * np.trace(seeming) * np.eye(len(seeming))
     return float(scipy.linalg.eigh(information, regular, eigvals_only=True)[0])
+
+
+# An estimate as the roll pendulum of a vessel.
+
+
+def fitted_pendulum(estimate: RollEstimate) -> RollPendulum:
+    """The ship without load, with the estimate's uncertainty; parameters that were held or given count as known.
+
+    Raises:
+        InputError: the estimate is no pendulum, as its inertia is not positive.
+    """
+    stds = {name: std for name, std in estimate.std.items() if name in ROLL_PARAMETERS and std > 0}
+    place = estimate.problem.free.index
+    return RollPendulum(
+        body=estimate.problem.body,
+        parameters={name: estimate.values[name] for name in ROLL_PARAMETERS},
+        parameter_std=stds,
+        parameter_correlation={
+            (one, other): float(estimate.covariance[place(one), place(other)] / (stds[one] * stds[other]))
+            for one in stds
+            for other in stds
+            if place(other) < place(one)
+        },
+    )

@@ -1,9 +1,23 @@
-"""Runs at one load each, and their preparation: low-pass filter, fewer samples, differences."""
+"""Runs at one load each, and their preparation: low-pass filter, fewer samples, differences.
+
+Low-pass filter and thinning out of runs, which must pass the roll mode.
+
+All signals of a run pass the same symmetric filter, so that the equations between them stay as they are and nothing is
+late.
+
+Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing (2010), 7.5, for windowed filters.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+import scipy
+
+from expdesign.errors import InputError, NotInformative
+from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import Load
 
@@ -47,3 +61,119 @@ class Case:
     name: str
     load: Load | None
     runs: tuple[Run, ...]
+
+
+# Low-pass filter and thinning out of runs, which must pass the roll mode.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LowPass:
+    """The filter and what it does.
+
+    Attributes:
+        taps: (n,) symmetric, n odd; a single one where nothing is filtered.
+        every: samples out of which one is kept.
+        roll_hz: frequency of roll, roughly.
+        passed: gain at that frequency.
+        bandwidth_hz: at which the gain is 1 / sqrt 2; half the sample rate where it is never as low.
+        step_s: between the samples that are kept [s].
+    """
+
+    taps: Array
+    every: int
+    roll_hz: float
+    passed: float
+    bandwidth_hz: float
+    step_s: float
+
+    def __post_init__(self) -> None:
+        seal(self, taps="n")
+
+    def gain(self, frequency_hz: float) -> float:
+        """Gain at a frequency."""
+        return _gain(self.taps, frequency_hz, self.step_s / self.every)
+
+    @property
+    def least_samples(self) -> int:
+        """Fewest samples of a run that can be filtered."""
+        return len(self.taps) + self.every * (TUNING.left_out_samples + TUNING.least_samples)
+
+    @property
+    def samples_per_period(self) -> float:
+        """Samples in one period of roll, after the filter."""
+        return 1.0 / (self.roll_hz * self.step_s)
+
+
+def low_pass(cases: Sequence[Case], *, roll_hz: float, cutoff_hz: float | None = None) -> LowPass:
+    """The filter for load cases.
+
+    Args:
+        cases: of one sample time.
+        roll_hz: frequency of roll, roughly.
+        cutoff_hz: at which half is left; None for one as low as thinning out needs, if it does.
+
+    Raises:
+        InputError: the cut-off is not below half the sample rate, or takes from the roll mode.
+        NotInformative: there are too few samples in a period of roll.
+    """
+    step_s = cases[0].runs[0].step_s
+    if 1.0 / (roll_hz * step_s) < TUNING.least_samples_per_period:
+        raise NotInformative(
+            f"roll has about {roll_hz:.3g} Hz and the data have {1.0 / step_s:.3g} samples in a second, "
+            f"expected {TUNING.least_samples_per_period:g} or more in a period; record faster"
+        )
+    every = max(1, int(1.0 / (roll_hz * step_s) / TUNING.samples_per_period))
+    if cutoff_hz is None and every == 1:
+        return LowPass(taps=np.ones(1), every=1, roll_hz=roll_hz, passed=1.0, bandwidth_hz=0.5 / step_s, step_s=step_s)
+    wanted = TUNING.cutoff_share / (every * step_s) if cutoff_hz is None else cutoff_hz
+    if not 0 < wanted < 0.5 / step_s:
+        raise InputError(f"the cut-off is {wanted:g} Hz, expected less than half the sample rate, {0.5 / step_s:g} Hz")
+    every = every if cutoff_hz is None else max(1, min(every, int(TUNING.cutoff_share / (wanted * step_s))))
+    taps = scipy.signal.firwin(2 * int(TUNING.taps_per_period / (wanted * step_s)) + 1, wanted, fs=1.0 / step_s)
+    found = LowPass(
+        taps=taps, every=every, roll_hz=roll_hz, passed=_gain(taps, roll_hz, step_s),
+        bandwidth_hz=_bandwidth(taps, step_s), step_s=every * step_s,
+    )  # fmt: skip
+    if found.passed < TUNING.passed_gain:
+        raise InputError(
+            f"the low-pass filter of {wanted:g} Hz leaves {100 * found.passed:.0f} % of the roll at {roll_hz:.3g} Hz, "
+            f"expected {100 * TUNING.passed_gain:.0f} % or more; leave it out, or set it to {3 * roll_hz:.2g} Hz"
+        )
+    return found
+
+
+def prepared(cases: Sequence[Case], filter_: LowPass) -> tuple[Case, ...]:
+    """Filtered and thinned-out cases.
+
+    Raises:
+        NotInformative: a run is too short.
+    """
+    return tuple(replace(case, runs=tuple(_prepared(run, filter_, case.name) for run in case.runs)) for case in cases)
+
+
+def _prepared(run: Run, filter_: LowPass, name: str) -> Run:
+    if len(run.signals) < filter_.least_samples:
+        raise NotInformative(
+            f"{name} has a run of {len(run.signals)} samples, expected {filter_.least_samples} or more"
+        )
+    exact = min(TUNING.unwarped_periods * 2.0 / filter_.samples_per_period, TUNING.most_unwarped)
+    if len(filter_.taps) == 1:
+        return replace(run, unwarped=exact)
+    planned = None if run.planned is None else _passed(run.planned[:, None], filter_)[:, 0]
+    return Run(step_s=filter_.step_s, signals=_passed(run.signals, filter_), planned=planned, unwarped=exact)
+
+
+def _passed(signals: Array, filter_: LowPass) -> Array:
+    """(k, ...) filtered and thinned out."""
+    kept = scipy.signal.oaconvolve(signals, filter_.taps[:, None], mode="valid", axes=0)[:: filter_.every]
+    return np.asarray(kept)
+
+
+def _gain(taps: Array, frequency_hz: float, step_s: float) -> float:
+    return float(np.abs(scipy.signal.freqz(taps, worN=[frequency_hz], fs=1.0 / step_s)[1][0]))
+
+
+def _bandwidth(taps: Array, step_s: float) -> float:
+    frequencies, response = scipy.signal.freqz(taps, worN=4096, fs=1.0 / step_s)
+    low = np.abs(response) < np.sqrt(0.5)
+    return float(frequencies[np.argmax(low)]) if low.any() else 0.5 / step_s

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from expdesign.indices import OUTCOMES
-from expdesign.scenario.design_tables import LONGEST_TOTAL_S, AccuracyTable, BudgetTable, DesignTable
-from expdesign.scenario.grow_table import build_grow
+from expdesign.scenario.design_tables import LONGEST_TOTAL_S, AccuracyTable, BudgetTable, DesignTable, build_grow
 from expdesign.scenario.tables import Entry, shown
 from expdesign.scenario.values import BudgetSettings, DesignSettings
 from expdesign.shortest_day import AccuracySettings

@@ -31,10 +31,26 @@ if not TYPE_CHECKING:
     __getattr__ = load_on_use(
         __name__,
         {
-            "accuracy": ("Accuracy", "stated_accuracy"),
-            "alternate": ("check_way_fits", "fullest_day", "shortest_day"),
-            "cheapest": ("Choice", "cheapest_runs"),
+            "accuracy": (
+                "Accuracy",
+                "stated_accuracy",
+            ),
+            "alternate": (
+                "check_way_fits",
+                "fullest_day",
+                "shortest_day",
+            ),
+            "cheapest": (
+                "Choice",
+                "cheapest_runs",
+            ),
             "manoeuvres": ("manoeuvres_worth_adding",),
-            "values": ("AccuracySettings", "DayBound", "DayParts", "DayTried", "ShortestDay"),
+            "values": (
+                "AccuracySettings",
+                "DayBound",
+                "DayParts",
+                "DayTried",
+                "ShortestDay",
+            ),
         },
     )

@@ -23,8 +23,7 @@ from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds import day_bound, fastest_mps, way_bound_s
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_costs_s
 from expdesign.shortest_day.drafting import Drafting
-from expdesign.shortest_day.offer import Offer
-from expdesign.shortest_day.prices import DraftedDay, Prices, first_prices, learnt_prices, near_day, offered
+from expdesign.shortest_day.prices import DraftedDay, Offer, Prices, first_prices, learnt_prices, near_day, offered
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayBound, DayParts, DayTried, ShortestDay
 from expdesign.values import Array

@@ -33,10 +33,8 @@ from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.progress import Progress, silent
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.along_way import straight_courses
 from expdesign.shortest_day.cheapest import Relaxed, cheapest_shares, fullest_level
-from expdesign.shortest_day.offer import Offer
-from expdesign.shortest_day.prices import first_prices, offered
+from expdesign.shortest_day.prices import Offer, first_prices, offered, straight_courses
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array
 

@@ -15,13 +15,91 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.dictionary import Primitive
+from expdesign.information.many import bordered_runs
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
-from expdesign.shortest_day.along_way import courses_of, runs_along, straight_courses
-from expdesign.shortest_day.offer import Offer
 from expdesign.shortest_day.tuning import TUNING
+from expdesign.signals import Trajectory
 from expdesign.values import Array, seal
+
+# What runs tell that make way good from start to goal: their headings follow from the way.
+
+
+def runs_along(problem: PlanProblem, courses: Array) -> Array:
+    """(q, d, d) information of one whole run of each primitive, on average over courses (c,) that it makes good [rad].
+
+    Sums over samples. (q, d + 2, d + 2) where the forecast leaves a steady current unknown.
+    """
+    durations, runs = problem.design.problem, problem.primitives
+    lengths, found = np.array([len(run.commands) for run in runs]), dict[int, Array]()
+    for length in np.unique(lengths):
+        some: Sequence[int] = np.flatnonzero(lengths == length).tolist()
+        matrices, _ = bordered_runs(
+            problem.vessel,
+            np.array([runs[index].commands.values for index in some]),
+            np.array([runs[index].entry_velocity for index in some]),
+            durations.parameters,
+            environment=problem.environment,
+            mean_subtraction=durations.mean_subtraction,
+            standing=np.array([runs[index].entry_inputs for index in some]),
+            courses=courses,
+        )
+        found |= dict(zip(some, length * matrices, strict=True))
+    return np.array([found[index] for index in range(len(runs))])
+
+
+def straight_courses(problem: PlanProblem) -> Array:
+    """(c,) near the straight line to the goal [rad]; of all directions where runs last longer than the way."""
+    away = problem.goal[:2] - problem.start[:2]
+    longest_m = max(float(np.hypot(*item.displacement[:2])) for item in problem.primitives)
+    if np.hypot(*away) <= longest_m:
+        return np.asarray(2 * np.pi * np.arange(TUNING.courses) / TUNING.courses)
+    spread = np.linspace(-1.0, 1.0, TUNING.courses)
+    return np.asarray(np.arctan2(away[1], away[0]) + TUNING.course_spread_rad * spread)
+
+
+def courses_of(track: Trajectory) -> Array:
+    """(c,) of equally long parts of a track [rad]."""
+    places = track.pose[np.linspace(0, len(track) - 1, TUNING.courses + 1).round().astype(int), :2]
+    away = np.diff(places, axis=0)
+    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
+
+
+# Runs to choose from, what they cost, save and tell.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Offer:
+    """Runs to choose from.
+
+    Attributes:
+        matrices: (q, d, d) information of one whole run, summed over its samples.
+        cost_s: (q,) of one whole run.
+        saved_s: (q,) time of transit that its way made good saves.
+        way_s: most that all runs save together.
+        known: (d, d) information without runs.
+        fewest, most: (q,) limits on runs.
+    """
+
+    matrices: Array
+    cost_s: Array
+    saved_s: Array
+    way_s: float
+    known: Array
+    fewest: Array
+    most: Array
+
+    def __post_init__(self) -> None:
+        seal(self, matrices="q d d", cost_s="q", saved_s="q", known="d d", fewest="q", most="q")
+
+    def information(self, runs: Array) -> Array:
+        """(d, d) of runs (q,), and what is known."""
+        return np.asarray(self.known + np.tensordot(runs, self.matrices, axes=1))
+
+    def total_s(self, runs: Array) -> float:
+        """Cost of runs (q,), less what they save."""
+        return float(runs @ self.cost_s) - min(float(runs @ self.saved_s), self.way_s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -27,8 +27,7 @@ from expdesign.simulation.environment import (
 )
 from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
-from expdesign.simulation.rolling import in_waves, rudder_angle, steering_signals
-from expdesign.simulation.run import integrate_motion, simulate, simulate_many
+from expdesign.simulation.run import in_waves, integrate_motion, rudder_angle, simulate, simulate_many, steering_signals
 from expdesign.simulation.sensors import measure
 from expdesign.simulation.standard_trials import Conduct, pull_out, stopping, turning_circle, zigzag
 

@@ -10,14 +10,21 @@ import numpy as np
 from expdesign.errors import NotInformative
 from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
-from expdesign.step_trials.comparisons import Comparison, comparisons
 from expdesign.step_trials.dead_times import samples_and_delays
 from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed
 from expdesign.step_trials.model import TwoDofModel
 from expdesign.step_trials.samples import Delays, StepSample
-from expdesign.step_trials.steady_holds import calibrated_tests, steady_from
-from expdesign.step_trials.steady_state import RatioTest
-from expdesign.step_trials.surfaces import EVEN, ODD, WITH_BIAS, Surface, fitted_surface, validity_region
+from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, steady_from
+from expdesign.step_trials.surfaces import (
+    EVEN,
+    ODD,
+    WITH_BIAS,
+    Comparison,
+    Surface,
+    comparisons,
+    fitted_surface,
+    validity_region,
+)
 from expdesign.values import Array
 
 LEAST_SAMPLES = 3

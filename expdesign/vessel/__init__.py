@@ -15,7 +15,6 @@ from expdesign.vessel.actuators import (
 )
 from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
 from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
-from expdesign.vessel.inertia import NOT_SUPPORTED, Inertia
 from expdesign.vessel.inverse import (
     Allocator,
     allocate,
@@ -25,7 +24,7 @@ from expdesign.vessel.inverse import (
     within_limits,
 )
 from expdesign.vessel.masses import NOMINAL, Body, Load
-from expdesign.vessel.model import VesselModel
+from expdesign.vessel.model import NOT_SUPPORTED, Inertia, VesselModel
 from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms

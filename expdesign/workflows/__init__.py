@@ -12,16 +12,15 @@ from expdesign.lazy import load_on_use
 if TYPE_CHECKING:
     from expdesign.workflows.data.diagnose import diagnose
     from expdesign.workflows.data.estimate import estimate
+    from expdesign.workflows.data.identify_steps import identify_steps
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.data.monitor import monitor
-    from expdesign.workflows.data.step_trials.identify_steps import identify_steps
-    from expdesign.workflows.data.step_trials.watch_steps import watch_steps
+    from expdesign.workflows.data.watch_steps import watch_steps
     from expdesign.workflows.explanations.explain import explain
     from expdesign.workflows.outcome import Outcome, TextTable
-    from expdesign.workflows.planning.check_routes import check_routes
     from expdesign.workflows.planning.durations import durations
-    from expdesign.workflows.planning.export import export
+    from expdesign.workflows.planning.export import check_routes, export
     from expdesign.workflows.planning.plan import plan
     from expdesign.workflows.planning.roll_plan import roll_plan
     from expdesign.workflows.planning.run import run
@@ -77,24 +76,35 @@ if not TYPE_CHECKING:
         {
             "data.diagnose": ("diagnose",),
             "data.estimate": ("estimate",),
-            "data.step_trials.identify_steps": ("identify_steps",),
+            "data.identify_steps": ("identify_steps",),
             "data.indices": ("indices",),
             "data.mine": ("mine",),
             "data.monitor": ("monitor",),
-            "data.step_trials.watch_steps": ("watch_steps",),
+            "data.watch_steps": ("watch_steps",),
             "explanations.explain": ("explain",),
-            "outcome": ("Outcome", "TextTable"),
-            "planning.check_routes": ("check_routes",),
+            "outcome": (
+                "Outcome",
+                "TextTable",
+            ),
             "planning.durations": ("durations",),
-            "planning.export": ("export",),
+            "planning.export": (
+                "check_routes",
+                "export",
+            ),
             "planning.plan": ("plan",),
             "planning.roll_plan": ("roll_plan",),
             "planning.run": ("run",),
             "planning.score": ("score",),
             "planning.whatif": ("whatif",),
-            "steps.design_problem": ("designed", "duration_problem"),
+            "steps.design_problem": (
+                "designed",
+                "duration_problem",
+            ),
             "steps.measured": ("measured",),
-            "steps.planned": ("plan_problem", "planned"),
+            "steps.planned": (
+                "plan_problem",
+                "planned",
+            ),
             "steps.scored": ("scored",),
             "trials.foresee": ("foresee",),
             "trials.incline": ("incline",),

@@ -17,8 +17,8 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
-from expdesign.workflows.steps.trial_files import built_route, report_content
+from expdesign.workflows.steps.planned import built_route, report_content
+from expdesign.workflows.steps.scored import ready
 
 FRAME_HEIGHT_PX = 700
 

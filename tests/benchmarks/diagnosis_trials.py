@@ -17,7 +17,7 @@ import hidden_effects as sea
 from beyond_catalogue import CASES, SAYS
 from diagnosis_case import Told, drawn_parameters, from_pose, hidden_records, vessel_of
 from expdesign.diagnosis import CAUSES, diagnose
-from expdesign.diagnosis.accuracy.simulated_fit import WHOLE_S, pooled_fit
+from expdesign.diagnosis.accuracy import WHOLE_S, pooled_fit
 from expdesign.diagnosis.causes.candidate import Situation
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured

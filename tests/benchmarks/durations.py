@@ -47,7 +47,7 @@ from expdesign.signals import Commands
 from expdesign.values import Array
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import duration_problem as stated_problem
-from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.scored import ready
 
 COUNT, PARAMETERS, OUTPUTS = 1000, 18, 3
 PATIENCE_S = 20.0

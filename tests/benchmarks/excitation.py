@@ -18,7 +18,7 @@ import numpy as np
 from expdesign.dictionary import build_dictionary
 from expdesign.durations import build_durations, solve_durations
 from expdesign.durations.criteria import Aim
-from expdesign.export.validation_page.content import surely_biased
+from expdesign.export.validation_page import surely_biased
 from expdesign.information import estimated_parameters, score_primitives
 from expdesign.rehearsal import Rehearsal, Validated, validate
 from expdesign.scenario import load_vessel

@@ -26,7 +26,7 @@ from expdesign import workflows
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import leg_water, search_space, ship_on_legs
 from expdesign.plan.local_planner import local_planner
-from expdesign.plan.search.lattice_search import LatticeSearch
+from expdesign.plan.search.planners import LatticeSearch
 from expdesign.plan.values import PathsName
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem

@@ -10,7 +10,7 @@ from expdesign.diagnosis.causes.actuators import (
     THRUST_GAIN,
     THRUSTER_ASYMMETRY,
 )
-from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, rounded
 from expdesign.diagnosis.causes.environment import CURRENT, SHALLOW_WATER, WIND, wind_can_be_told
 from expdesign.diagnosis.causes.hull import (
     CHANGE_POINT,
@@ -21,7 +21,6 @@ from expdesign.diagnosis.causes.hull import (
     UNLISTED_TERM,
 )
 from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, LOG_SCALE, SENSOR_DELAY
-from expdesign.diagnosis.causes.words import rounded
 
 CAUSES: tuple[Cause, ...] = (
     PARAMETERS,

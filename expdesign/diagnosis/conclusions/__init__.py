@@ -1,7 +1,8 @@
 """Conclusions of a diagnosis: findings, verdict and notes."""
 
-from expdesign.diagnosis.conclusions.findings import error_reductions_of, finding_of
-from expdesign.diagnosis.conclusions.notes import (
+from expdesign.diagnosis.conclusions.findings import (
+    error_reductions_of,
+    finding_of,
     note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,

@@ -1,17 +1,29 @@
-"""Selected causes as findings: estimates, held-out gains, alternatives, explanations."""
+"""Findings of a diagnosis with their estimates and alternatives, and notes on what was not measured or not tested."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values
-from expdesign.diagnosis.conclusions.verdict import effect_in_words
-from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit import Fit, HeldOut, held_out_gain, prediction_gain
+from expdesign.diagnosis.accuracy import Accuracy
+from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values, rounded, wind_can_be_told
+from expdesign.diagnosis.conclusions.verdict import effect_in_words, has_diverged, missing_effect
+from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
+from expdesign.diagnosis.fit import AHEAD_S, Fit, HeldOut, held_out_gain, prediction_gain
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select import Step, certain_reductions
+from expdesign.diagnosis.select import (
+    SELECTION_TUNING,
+    Selection,
+    Step,
+    certain_reductions,
+    p_value_between_runs,
+    same_effects_as_any,
+)
 from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding
 from expdesign.diagnosis.vessel_file import public_name, stated_values
+from expdesign.signals import Record
+from expdesign.vessel import Vessel
+
+# Selected causes as findings: estimates, held-out gains, alternatives, explanations.
 
 CHANGED = "change:time"
 
@@ -99,3 +111,216 @@ def error_reductions_of(
     """Reductions of the simulated error of held-out units, with 95 % intervals by the bootstrap."""
     rows = zip(outputs, *(item.tolist() for item in certain_reductions(before, after, seed)), strict=True)
     return tuple(ErrorReduction(output=name, share=share, low=low, high=high) for name, share, low, high in rows)
+
+
+# Notes of a diagnosis: quantities not measured, causes not tested or left out.
+
+FEW = 0.002
+"""Share of missing samples that needs no note."""
+
+
+def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Sequence[str]) -> tuple[str, ...]:
+    """Effects that the data cannot show.
+
+    Args:
+        vessel: the model in use.
+        record: the data.
+        windows: the data as compared.
+        constant: inputs that never change.
+    """
+    notes = []
+    if not windows.has_heading:
+        notes.append("No heading is measured. Current and wind cannot be distinguished from the ship's own motion.")
+        weather = vessel.environment
+        if weather.current_to.any() or (weather.wind_to.any() and not windows.has_wind):
+            notes.append("The current and wind of the vessel file were left out, because they need a heading.")
+    elif not (windows.has_wind or vessel.environment.wind_to.any() or wind_can_be_told(windows)):
+        notes.append(
+            "All headings are within 45 degrees of their mean. A wind that nobody measured was not tested: on such "
+            "courses it is a constant force and moment, as several causes with fewer numbers are."
+        )
+    missing = missing_wind_share(record)
+    if windows.has_wind and missing > FEW:
+        notes.append(f"The wind is missing in {100 * missing:.0f} % of the samples. Its last value was used there.")
+    if not windows.has_wind and any(batch.wind is not None for batch in record.batches):
+        notes.append("The wind is not measured in every run. The measured wind of the other runs was not used.")
+    if not windows.has_depth:
+        notes.append("No depth is measured. Shallow water was not tested.")
+    if "r" in windows.derived:
+        notes.append("The yaw rate is derived from the heading. The scale of a rate gyro was not tested.")
+    if constant:
+        verb, them = ("changes", "it") if len(constant) == 1 else ("change", "them")
+        notes.append(f"{', '.join(constant)} never {verb}. Faults that act only through {them} cannot be seen.")
+    if not (vessel.model.parameter_std > 0).any():
+        notes.append("The vessel file has no parameter_std. Its parameters count as known.")
+    return tuple(notes)
+
+
+def note_on_divergence(before: Accuracy, windows: Windows, *, re_estimated: bool, uncertain: bool) -> tuple[str, ...]:
+    """What is done about a model that cannot be simulated over whole runs.
+
+    Args:
+        before: accuracy of the model in use.
+        windows: the data as compared.
+        re_estimated: the search began with the model re-estimated, instead of as it is.
+        uncertain: something in the vessel file has a standard deviation.
+    """
+    if not has_diverged(before):
+        return ()
+    begin = "as it is"
+    if re_estimated:
+        begin = "re-estimated within its standard deviations in windows that grow"
+    elif windows.steps * windows.step_s < AHEAD_S:
+        begin += (
+            ", because its parameters re-estimated within their standard deviations diverge too"
+            if uncertain
+            else ", because nothing in the vessel file has a standard deviation to re-estimate it within"
+        )
+    return (
+        "Simulated over whole runs, the model in use diverges from the ship. So data and simulation are compared in "
+        f"windows of {windows.steps * windows.step_s:.0f} s, each simulated from its first measured state, and the "
+        f"search for causes begins with the model {begin}.",
+    )
+
+
+def note_on_random_current(noise: Noise) -> tuple[str, ...]:
+    """A varying current that the tests allow for; the catalogue has no such cause."""
+    if noise.current_std_mps < SELECTION_TUNING.large_current_mps:
+        return ()
+    return (
+        f"Part of the error looks like a current that varies by {noise.current_std_mps:.2g} m/s with a correlation "
+        f"time of {noise.current_time_s:.0f} s. The tests allow for it. It is not in the catalogue of causes, and it "
+        "is not written to the vessel file.",
+    )
+
+
+def notes_on_rejected(found: Selection, kept: Selection, unit: str) -> tuple[str, ...]:
+    """Causes that were significant in a test and are no findings.
+
+    Args:
+        found: by forward selection.
+        kept: what backward elimination left of it.
+        unit: what gains are measured on.
+    """
+    named = [step.chosen.candidate for step in kept.steps]
+    rejected = [step for step in found.steps if not same_effects_as_any(step.chosen.candidate, named)]
+    return tuple(
+        f"The data show a sign of {missing_effect(step.chosen.candidate.cause, step.chosen.parameters)} (p = "
+        f"{p_value:.1g}). It is not a finding: on {unit} held out of the fit it takes less than 1 % off every error, "
+        "or its gain or its size may be zero."
+        for step in rejected
+        if (p_value := _p_value_left(step, kept)) <= SELECTION_TUNING.level
+    )
+
+
+def _p_value_left(step: Step, kept: Selection) -> float:
+    """p-value of a rejected cause beside the findings, if it is tested beside them."""
+    left = [item.adjusted for item in kept.last_tests if same_effects_as_any(item.candidate, [step.chosen.candidate])]
+    return min(left) if left else p_value_between_runs(step.chosen, None, kept.dispersion)
+
+
+def note_on_work(found: Selection) -> tuple[str, ...]:
+    """What the search left untried at its limit of work."""
+    if not found.untried:
+        return ()
+    return (
+        f"The search ended at its limit of {SELECTION_TUNING.most_simulations} simulations of all data in fits of "
+        f"candidates. Left untried: {', '.join(found.untried)}.",
+    )
+
+
+def notes_on_found_again(kept: Selection) -> tuple[str, ...]:
+    """What the vessel file states with a standard deviation, beside what both it and the data say."""
+    last = kept.last
+    named = {key for step in kept.steps for key in step.chosen.keys}
+    notes = []
+    for key, std in last.ship.stated_std.items():
+        if key in last.keys and key not in named:
+            name, factor, offset, unit = public_name(key, last.ship)
+            values = ((last.ship.stated[key], std), (last.value(key), last.std(key)))
+            before, after = (rounded(offset + factor * value, abs(factor) * error) for value, error in values)
+            notes.append(f"Found again and refined: {name}, {before} {unit} in the vessel file, is {after} {unit}.")
+    return tuple(notes)
+
+
+def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str, ...]:
+    """Gain from uncertain parameters alone, which belongs to no cause.
+
+    Args:
+        unfitted: errors of the model in use.
+        fitted: with its uncertain parameters fitted.
+        seed: of the interval.
+    """
+    gain, _ = held_out_gain(unfitted, fitted, seed)
+    if not abs(gain) >= SELECTION_TUNING.least_gain_points:
+        return ()
+    return (
+        f"Fitting the parameters within their stated standard deviations changes the fit on held-out runs by "
+        f"{gain:+.1f} points. The gains of causes come on top of that.",
+    )
+
+
+def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -> tuple[str, ...]:
+    """Gains that are not those of whole runs."""
+    if not held[0].in_stretches:
+        return ()
+    if beside_stated:
+        return (
+            "Parameters re-estimated within their stated standard deviations simulate held-out runs worse than those "
+            "of the vessel file. So causes are fitted beside the parameters of the file, and gains are measured, in "
+            f"stretches of {AHEAD_S:g} s, each simulated from its first measured state.",
+        )
+    return (
+        "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
+        f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state, a fifth of every "
+        "run held out at a time. In a stretch an error counts as no larger than that of the run's mean.",
+    )
+
+
+def note_on_predictions(
+    as_stated: HeldOut, found: HeldOut, kept: Selection, replaced: Sequence[Step], seed: int
+) -> tuple[str, ...]:
+    """How a cause was found that a search by likelihood did not find, and its gain on the model in use as it is.
+
+    Args:
+        as_stated: errors of the model in use as its file states it, in stretches.
+        found: those with the cause, held out.
+        kept: the cause.
+        replaced: what the search had found.
+        seed: of the interval.
+    """
+    gain, (low, high) = held_out_gain(as_stated, found, seed)
+    names = " and ".join(missing_effect(step.chosen.candidate.cause) for step in replaced)
+    left = (
+        f"found {names}, which leaves much unexplained or may imitate other causes"
+        if names
+        else "found no certain cause"
+    )
+    return (
+        f"The search by likelihoods {left}. So causes were compared by predictions in stretches of {AHEAD_S:g} s, a "
+        "fifth of every run held out at a time, each with the same model re-estimated without it: the parameters of "
+        "the vessel file may have been fitted to these data too. "
+        f"{f'The model with {names} predicts worse for certain. ' if names else ''}"
+        f"On the model as its file states it, the gain of {missing_effect(kept.steps[0].chosen.candidate.cause)} with "
+        f"all parameters re-estimated is {gain:+.1f} points ({low:.1f} to {high:.1f}).",
+    )
+
+
+def note_beside_the_same_fit(kept: Selection) -> tuple[str, ...]:
+    """What the gain of the first cause is relative to, where it is not the model in use."""
+    return (
+        "The parameters of the vessel file may have been fitted to these data too. So the gain of "
+        f"{missing_effect(kept.steps[0].chosen.candidate.cause)} is that on the model re-estimated without it as it is "
+        "with it.",
+    )
+
+
+def note_on_unconverged(held: Sequence[HeldOut]) -> tuple[str, ...]:
+    """Gains that are measured only partly on held-out data."""
+    folds = sum(item.unconverged for item in held)
+    if not folds:
+        return ()
+    return (
+        f"{folds} fits of the cross-validation did not improve on the fit to all runs. They used its estimates, so "
+        "part of the gains is measured on runs that were used in the fit.",
+    )

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
-from expdesign.diagnosis.causes import sensors
+from expdesign.diagnosis.causes import Cause, sensors
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
@@ -62,7 +62,7 @@ LITTLE_FIT = 50.0
 """Fit [%] of an output below which data are not called free of error, whatever noise there is."""
 MOST_NAMED = 3
 """Parameters, or equivalent causes, in a sentence."""
-SENSORS = tuple(getattr(sensors, name).name for name in sensors.__all__)
+SENSORS = tuple(cause.name for cause in vars(sensors).values() if isinstance(cause, Cause))
 WEATHER = ("current", "wind")
 
 

@@ -1,6 +1,5 @@
 """Measured batches for a diagnosis: windows, measured channels and noise."""
 
-from expdesign.diagnosis.data.measured_channels import derived_outputs, has_heading, missing_wind_share
 from expdesign.diagnosis.data.noise import (
     Noise,
     before_windows,
@@ -11,7 +10,12 @@ from expdesign.diagnosis.data.noise import (
     white_noise,
     whitened,
 )
-from expdesign.diagnosis.data.sampled_batch import averaging_half_width
+from expdesign.diagnosis.data.sampled_batch import (
+    averaging_half_width,
+    derived_outputs,
+    has_heading,
+    missing_wind_share,
+)
 from expdesign.diagnosis.data.windows import Windows, cut_windows
 
 __all__ = [

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.diagnosis.data.measured_channels import (
+from expdesign.diagnosis.data.sampled_batch import (
+    SampledBatch,
     air_velocity,
     derived_outputs,
     has_depth,
     has_heading,
     has_position,
 )
-from expdesign.diagnosis.data.sampled_batch import SampledBatch
 from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.estimation.regression import inputs_of

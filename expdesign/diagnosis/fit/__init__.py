@@ -33,16 +33,10 @@ from expdesign.diagnosis.fit.fit import (
     log_likelihood_gain,
     profile_cost,
     uncertain_keys,
+    unmeasured_force_share,
     within_stated_std,
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.gram_matrices import (
-    MarginalInformation,
-    gram_matrices,
-    information,
-    marginalised,
-    window_information,
-)
 from expdesign.diagnosis.fit.held_out import (
     HeldOut,
     bootstrap_sums,
@@ -50,18 +44,22 @@ from expdesign.diagnosis.fit.held_out import (
     judged,
     leads_away,
     on_common_units,
+    prediction_gain,
 )
 from expdesign.diagnosis.fit.linear_model import (
+    MarginalInformation,
     build_sensitivities,
     difference_step,
     effect_disturbances,
+    gram_matrices,
     in_groups,
+    information,
+    marginalised,
     sensitivities_to,
+    window_information,
 )
 from expdesign.diagnosis.fit.output_error import fit_ahead, fit_output_error, with_longer_windows
-from expdesign.diagnosis.fit.prediction import prediction_gain
 from expdesign.diagnosis.fit.tuning import TUNING
-from expdesign.diagnosis.fit.unmeasured_force import unmeasured_force_share
 
 AHEAD_S = TUNING.ahead_s
 """Length of the stretches that held-out data are also simulated in [s]."""

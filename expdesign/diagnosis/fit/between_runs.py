@@ -22,7 +22,7 @@ import scipy
 
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit.fit import Fit
-from expdesign.diagnosis.fit.gram_matrices import window_information
+from expdesign.diagnosis.fit.linear_model import window_information
 from expdesign.values import Array
 
 FEWEST, MOST_FREEDOM = 0.3, 1e5

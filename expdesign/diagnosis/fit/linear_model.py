@@ -1,18 +1,26 @@
-"""The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
+"""The joint linear model of a fit, and the Gram matrices of its whitened sensitivities.
+
+The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
 
 Rows are errors, columns are sensitivities. Initial states have a flat prior, uncertain parameters their Gaussian prior,
 and the random current is a random effect with piecewise linear basis functions of time.
+
+Gram matrices of whitened sensitivities, with initial states projected out and the random current integrated out.
+
+These small matrices suffice for steps, covariances, score tests and likelihoods.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.diagnosis.data import linear_basis
+from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.data import Noise, before_windows, linear_basis, random_current_precision, whitened
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
@@ -25,6 +33,8 @@ from expdesign.diagnosis.motion import (
     term_disturbances,
 )
 from expdesign.values import Array
+
+# The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,3 +166,180 @@ def _parameter_scale(ship: ExtendedModel, key: str) -> float:
     if name in ship.model.names:
         return abs(float(ship.model.parameters[ship.model.names.index(name)])) + 1e-6
     return 1e-2
+
+
+# Gram matrices of whitened sensitivities, with initial states projected out and the random current integrated out.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GramMatrices:
+    """Inner products of whitened sensitivities, per window, initial states projected out.
+
+    Attributes:
+        XX: (w, c, c); Xe: (w, c); ee: (w,).
+        effect_starts: (w, n, c) what windows begin with that imitates each sensitivity best.
+        error_starts: (w, n) what imitates the error best.
+        log_det: (w,) of the covariance of the noise before the windows, beside that of white noise in them.
+    """
+
+    XX: Array
+    Xe: Array
+    ee: Array
+    effect_starts: Array
+    error_starts: Array
+    log_det: Array
+
+    def selected(self, keep: NDArray[np.bool_]) -> GramMatrices:
+        """Only some of the windows, by a mask (w,)."""
+        return GramMatrices(**{item.name: getattr(self, item.name)[keep] for item in fields(self)})
+
+    def initial_state_steps(self, effects: Array) -> Array:
+        """(w, 3) change of the initial velocities that explains most of the error left by steps (w, z) of effects."""
+        return self.start_steps(effects)[:, : len(OUTPUTS)]
+
+    def start_steps(self, effects: Array) -> Array:
+        """(w, n) the same of all that windows begin with, as in `start_columns`."""
+        imitated = self.effect_starts[..., : effects.shape[1]]
+        return np.asarray(self.error_starts - np.einsum("wnz,wz->wn", imitated, effects))
+
+
+def gram_matrices(found: Sensitivities, noise: Noise) -> GramMatrices:
+    """Whiten, leave out samples that are not measured, project the initial states out."""
+    e, seen = whitened_error(found.error, noise)
+    starts = start_columns(found, noise)
+    n, c, states = len(starts), len(found.values), len(found.starts)
+    rows = np.empty((4, n + c + 1, *e.shape[:2]))
+    whitened(starts, noise, out=rows[:, :n])
+    whitened(found.values, noise, out=rows[:, n:-1])
+    rows[:, -1] = np.moveaxis(e, -1, 0)
+    if not seen.all():
+        rows *= np.moveaxis(seen, -1, 0)[:, None]
+    G = _gram(rows)
+    own = np.diagonal(G[:, :states, :states], axis1=1, axis2=2)
+    ridge = np.ones((len(G), n))
+    ridge[:, :states] = 1e-9 * own.mean(axis=1, keepdims=True) + 1e-12
+    SS = G[:, :n, :n] + ridge[:, :, None] * np.eye(n)
+    half = np.asarray(np.linalg.solve(SS, G[:, :n, n:]), dtype=float)
+    rest = G[:, n:, n:] - np.swapaxes(G[:, :n, n:], 1, 2) @ half
+    return GramMatrices(
+        XX=rest[:, :-1, :-1],
+        Xe=rest[:, :-1, -1],
+        ee=rest[:, -1, -1],
+        effect_starts=half[..., :-1],
+        error_starts=half[..., -1],
+        log_det=np.linalg.slogdet(SS[:, states:, states:])[1],
+    )
+
+
+def start_columns(found: Sensitivities, noise: Noise) -> Array:
+    """(n, w, s, 4) sensitivities to what windows begin with: velocities, and earlier noise where it goes on in them."""
+    return np.concatenate([found.starts, before_windows(found.error, noise)])
+
+
+def whitened_error(error: Array, noise: Noise) -> tuple[Array, NDArray[np.bool_]]:
+    """(w, s, 4) whitened error, zero where nothing is measured, and whether it is measured."""
+    rows = whitened(error, noise)
+    seen = np.isfinite(rows)
+    return np.where(seen, rows, 0.0), seen
+
+
+def _gram(rows: Array) -> Array:
+    """(w, m, m) inner products of (4, m, w, s), in blocks small enough for one thread: on busy cores threads only wait.
+
+    A matrix times its own transpose would take threads at any size, so one of the two is a copy.
+    """
+    m, w, s = rows.shape[1:]
+    result = np.zeros((w, m, m))
+    tiles = [slice(low, low + TUNING.tile) for low in range(0, m, TUNING.tile)]
+    for channel, low in itertools.product(range(len(rows)), range(0, s, TUNING.tile)):
+        block = np.swapaxes(rows[channel, :, :, low : low + TUNING.tile], 0, 1)
+        other = np.swapaxes(block, 1, 2).copy()
+        for number, tile in enumerate(tiles):
+            for earlier in tiles[: number + 1]:
+                result[:, tile, earlier] += block[:, tile] @ other[..., earlier]
+    for tile, earlier in itertools.combinations(reversed(tiles), 2):
+        result[:, earlier, tile] = np.swapaxes(result[:, tile, earlier], 1, 2)
+    return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MarginalInformation:
+    """Information about the estimated effects once the random current is integrated out.
+
+    Attributes:
+        A: (c, c) information matrix.
+        s: (c,) scores.
+        each: (w, c) scores per window.
+        quadratic: e' V^-1 e.
+        log_det: of V beyond the white part.
+    """
+
+    A: Array
+    s: Array
+    each: Array
+    quadratic: float
+    log_det: float
+
+
+def window_information(grams: GramMatrices, found: Sensitivities, noise: Noise) -> tuple[Array, Array]:
+    """(w, c, c) and (w, c) information and scores of every window once the random current is integrated out."""
+    c = found.numbers
+    A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
+    if noise.current_std_mps == 0.0 or found.knot_count == 0:
+        return A, s
+    ZZ = grams.XX[:, c:, c:] + current_precision(found, noise)[0]
+    solved = np.linalg.solve(ZZ, np.concatenate([grams.XX[:, c:, :c], grams.Xe[:, c:, None]], axis=2))
+    ZX = np.swapaxes(grams.XX[:, c:, :c], 1, 2)
+    return A - ZX @ solved[..., :-1], s - (ZX @ solved[..., -1:])[..., 0]
+
+
+def marginalised(grams: GramMatrices, found: Sensitivities, noise: Noise) -> MarginalInformation:
+    """Integrate the random current out."""
+    if noise.current_std_mps == 0.0 or found.knot_count == 0:
+        c = found.numbers
+        A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
+        return MarginalInformation(
+            A=A.sum(axis=0),
+            s=s.sum(axis=0),
+            each=s,
+            quadratic=float(grams.ee.sum()),
+            log_det=float(grams.log_det.sum()),
+        )
+    return marginalised_under(grams, found, [noise])[0]
+
+
+def marginalised_under(grams: GramMatrices, found: Sensitivities, noises: Sequence[Noise]) -> list[MarginalInformation]:
+    """The same under several random currents, none of them zero, with the same whitening."""
+    c = found.numbers
+    A, s = grams.XX[:, :c, :c], grams.Xe[:, :c]
+    precisions, sizes = zip(*(current_precision(found, noise) for noise in noises), strict=True)
+    ZX, Ze = grams.XX[:, c:, :c], grams.Xe[:, c:]
+    ZZ = grams.XX[:, c:, c:] + np.stack(precisions)[:, None]
+    solved = np.linalg.solve(ZZ, np.concatenate([ZX, Ze[..., None]], axis=2))
+    log_dets = np.linalg.slogdet(ZZ)[1].sum(axis=1) + len(A) * np.array(sizes)
+    each = s - np.einsum("wzc,twz->twc", ZX, solved[..., -1])
+    known = np.swapaxes(ZX, 1, 2) @ solved[..., :-1]
+    return [
+        MarginalInformation(
+            A=(A - known[place]).sum(axis=0),
+            s=each[place].sum(axis=0),
+            each=each[place],
+            quadratic=float(grams.ee.sum() - np.einsum("wz,wz->", Ze, solved[place, ..., -1])),
+            log_det=float(log_det + grams.log_det.sum()),
+        )
+        for place, log_det in enumerate(log_dets)
+    ]
+
+
+def current_precision(found: Sensitivities, noise: Noise) -> tuple[Array, float]:
+    """(z, z) inverse covariance of the random current at its knots, north before east [s^2/m^2].
+
+    Beside it the log determinant of the covariance.
+    """
+    unit, size = random_current_precision(found.knot_count, found.spacing_s, noise.current_time_s)
+    return unit / noise.current_std_mps**2, size + 2.0 * len(unit) * float(np.log(noise.current_std_mps))
+
+
+def information(found: Sensitivities, noise: Noise) -> MarginalInformation:
+    """Marginal information of sensitivities under some noise."""
+    return marginalised(gram_matrices(found, noise), found, noise)

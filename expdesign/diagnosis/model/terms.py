@@ -1,7 +1,8 @@
-"""The terms of an extended model, with their factors and kinds."""
+"""The terms of an extended model, the library of terms that may be added, and groups of inputs."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,9 +13,11 @@ import numpy as np
 from expdesign.estimation.regression import Polynomial, lift, symbol
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
-from expdesign.vessel import Operators, Term, VesselModel, stem
+from expdesign.vessel import NUMPY, TERMS, Operators, Term, VesselModel, stem
 from expdesign.vessel.expressions import FUNCTIONS, Expression, parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+# The terms of an extended model, with their factors and kinds.
 
 Effects = Mapping[str, float]
 AIR_SIGNALS = frozenset({"u_q", "v_q"})
@@ -286,3 +289,145 @@ def resisting(model: VesselModel) -> Mapping[str, float]:
 def is_damping(term: Term, expression: Expression, model: VesselModel) -> bool:
     """It resists: neither an input, nor air, nor Coriolis."""
     return not (is_thrust(expression, model) or is_coriolis(term) or AIR_SIGNALS & set(expression.signals))
+
+
+# Terms that may be added to a model, and its own terms of air drag and advance loss.
+
+MORE_TERMS = (
+    Term("u", "X_vv", "v*v"),
+    Term("u", "X_rr", "r*r"),
+    Term("v", "Y_r", "r"),
+    Term("v", "Y_uv", "u*v"),
+    Term("v", "Y_abs_r_r", "abs(r)*r"),
+    Term("r", "N_v", "v"),
+    Term("r", "N_ur", "u*r"),
+    Term("r", "N_abs_r_r", "abs(r)*r"),
+    Term("u", "X_uuu", "u*u*u"),
+    Term("v", "Y_vvv", "v*v*v"),
+    Term("r", "N_rrr", "r*r*r"),
+)
+"""Second-order modulus terms that manoeuvring models often have beside the built-in ones, and cubic damping.
+
+Source: M. A. Abkowitz, Lectures on ship hydrodynamics (1964), for the cubic terms.
+"""
+ADVANCE_LOSS = ("X_kappa", "X_un", "X_unn")
+"""Terms of the thrust loss with advance speed."""
+AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
+"""Library terms of the air."""
+
+
+def term_library(model: VesselModel) -> Mapping[str, Term]:
+    """Every term that may be added to a model: those of its equations whose regressor it does not have."""
+    rng = np.random.default_rng(0)
+    names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
+    table = {name: rng.standard_normal(12) for name in names}
+    own = [
+        (term.equation, expression.evaluate(table, NUMPY))
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+    ]
+    found = {}
+    for term in (*TERMS.values(), *MORE_TERMS, *_advance(model)):
+        if term.name in model.names or term.equation not in model.outputs:
+            continue
+        if not _readable(term, model):
+            continue
+        values = parse_expression(term.expression, signals=names).evaluate(table, NUMPY)
+        if not any(term.equation == equation and _parallel(values, other) for equation, other in own):
+            found[term.name] = term
+    return found
+
+
+def _advance(model: VesselModel) -> tuple[Term, ...]:
+    """Advance loss of propellers that drive the model by their speeds, not through tau_x.
+
+    Thrust rho n^2 D^4 K_T(J) with K_T linear in J = u / (n D) has a term in u |n|; if the wake slows with
+    the thrust, it is u n |n|.
+
+    Source: A. F. Molland, S. R. Turnock, D. A. Hudson, Ship Resistance and Propulsion (2011), ch. 12, for K_T(J).
+    """
+    read = {name for term, e in zip(model.terms, model.expressions, strict=True) if term.equation == "u"
+            for name in e.signals}  # fmt: skip
+    speeds = [name for name in model.inputs if stem(name) == "n" and name in read]
+    if not speeds:
+        return ()
+    return (
+        Term("u", "X_un", " + ".join(f"u*abs({name})" for name in speeds)),
+        Term("u", "X_unn", " + ".join(f"u*abs({name})*{name}" for name in speeds)),
+    )
+
+
+def own_advance_terms(model: VesselModel) -> list[str]:
+    """Names of the model's terms that are an advance loss."""
+    rng = np.random.default_rng(0)
+    names = (*MOTION_SIGNALS, *dict.fromkeys((*FORCE_SIGNALS, *model.inputs)))
+    table = {name: rng.standard_normal(12) for name in names}
+    losses = [
+        parse_expression(term.expression, signals=names).evaluate(table, NUMPY)
+        for term in (TERMS["X_kappa"], *_advance(model))
+    ]
+    return [
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if term.equation == "u" and any(_parallel(expression.evaluate(table, NUMPY), loss) for loss in losses)
+    ]
+
+
+def own_air_terms(model: VesselModel) -> list[str]:
+    """Names of the model's terms that read the relative wind."""
+    return [
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if AIR_SIGNALS & set(expression.signals)
+    ]
+
+
+def _readable(term: Term, model: VesselModel) -> bool:
+    """Whether the model is driven by the generalised forces that a term reads."""
+    through_force = any(set(expression.signals) & set(FORCE_SIGNALS) for expression in model.expressions)
+    return through_force or not any(name in term.expression for name in FORCE_SIGNALS)
+
+
+def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(abs(abs(a @ b) - np.linalg.norm(a) * np.linalg.norm(b)) < 1e-9 * np.linalg.norm(a) * np.linalg.norm(b))
+
+
+# Groups of inputs that share an actuator fault: all, those of one stem, single ones.
+
+RESPONSES = {"slew": "rate", "deadband": "deadband", "delay": "delay_s", "lag": "lag_s", "offset": "offset"}
+"""Kind of effect of a group of inputs -> field of `vessel.Response`, in the order in which they act.
+
+The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.
+"""
+
+
+def response_effect(kind: str, value: float) -> float:
+    """From a field of `vessel.Response` to the effect or back: the inverse of a slew rate, else the same."""
+    return (1.0 / value if value else math.inf) if kind == "slew" else value
+
+
+def group_columns(group: str, inputs: tuple[str, ...]) -> list[int]:
+    """Columns of the inputs that belong to a group."""
+    return [index for index, name in enumerate(inputs) if group in ("all", name) or stem(name) == group]
+
+
+def input_groups(inputs: tuple[str, ...]) -> list[str]:
+    """All inputs, those of one stem, single ones; of groups with the same members the first."""
+    stems = sorted({stem(name) for name in inputs})
+    groups = ["all", *(stems if len(stems) > 1 else []), *inputs]
+    taken: dict[tuple[int, ...], str] = {}
+    for group in groups:
+        taken.setdefault(tuple(group_columns(group, inputs)), group)
+    return list(taken.values())
+
+
+def values_by_group(values: Mapping[str, float], inputs: tuple[str, ...]) -> dict[str, float]:
+    """Nonzero values of single inputs, by stem where all inputs of a stem have the same."""
+    left, found = list(inputs), dict[str, float]()
+    several = len({stem(name) for name in inputs}) > 1
+    for group in input_groups(inputs)[several:]:
+        names = [inputs[column] for column in group_columns(group, inputs)]
+        shared = {values.get(name, 0.0) for name in names}
+        if set(names) <= set(left) and len(shared) == 1:
+            found[group] = shared.pop()
+            left = [name for name in left if name not in names]
+    return {group: value for group, value in found.items() if value}

@@ -1,9 +1,11 @@
 """Simulation of the extended model over all windows, and its linearisation."""
 
-from expdesign.diagnosis.motion.exogenous_inputs import exogenous_inputs
-from expdesign.diagnosis.motion.integration import stacked_rates
+from expdesign.diagnosis.motion.equations_of_motion import stacked_rates
+from expdesign.diagnosis.motion.inputs import exogenous_inputs
 from expdesign.diagnosis.motion.linearisation import (
     Disturbance,
+    LinearisedMotion,
+    Motion,
     channels_apart,
     disturbance_of,
     linearise,
@@ -12,15 +14,15 @@ from expdesign.diagnosis.motion.linearisation import (
     start_responses,
     term_disturbances,
 )
-from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
 from expdesign.diagnosis.motion.simulation import (
     fitted_start,
     initial_states,
+    longest_windows,
     simulate_from_measured,
     simulate_nearby,
     simulate_windows,
+    stable_windows,
 )
-from expdesign.diagnosis.motion.window_length import longest_windows, stable_windows
 
 __all__ = [
     "Disturbance",

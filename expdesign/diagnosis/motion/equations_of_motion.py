@@ -1,18 +1,23 @@
-"""Equations of motion of an extended model."""
+"""Equations of motion of an extended model, one integrator step of them, and its derivatives by the state."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
-from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs
+from expdesign.diagnosis.motion.inputs import ExogenousInputs
+from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.simulation.motion import rates_over_ground
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel.structures import SHOAL
+
+# Equations of motion of an extended model.
 
 
 def state_rates(ship: ExtendedModel, state: tuple[Array, ...], exogenous: ExogenousInputs) -> tuple[Array, ...]:
@@ -89,3 +94,100 @@ def _varying(ship: ExtendedModel, part: ScaledTerm, exogenous: ExogenousInputs) 
 def _heavier(ship: ExtendedModel, exogenous: ExogenousInputs) -> Array | float:
     """Factor of inertia by the depth."""
     return 1 + ship.get("shallow:inertia") * exogenous[SHOAL] if SHOAL in exogenous else 1.0
+
+
+# One integrator step of an extended model, and its derivatives by the state.
+
+
+def runge_kutta_step(
+    ship: ExtendedModel, x: tuple[Array, ...], exogenous: ExogenousInputs, h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """The state after one step, and the change of heading; fast roll is integrated in parts of the step."""
+    parts = parts_of_step(ship, h)
+    heading_gain: Array | float = 0.0
+    end = exogenous.at_fraction(-0.5)
+    for part in range(parts):
+        begin, middle, end = end, *(exogenous.at_fraction((part + share) / parts - 0.5) for share in (0.5, 1.0))
+        x, more = _rk4_part(ship, x, (begin, middle, end), h / parts)
+        heading_gain = heading_gain + more
+    return x, np.asarray(heading_gain)
+
+
+def parts_of_step(ship: ExtendedModel, h: float) -> int:
+    """How many parts a step has, so that roll turns little in each."""
+    turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
+    return min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
+
+
+def _rk4_part(
+    ship: ExtendedModel, x: tuple[Array, ...], exogenous: Sequence[ExogenousInputs], h: float
+) -> tuple[tuple[Array, ...], Array]:
+    """One Runge-Kutta step, with exogenous signals at its beginning, middle and end."""
+    begin, middle, end = exogenous
+
+    def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
+        return tuple(np.minimum(np.maximum(a + share * h * b, -1e3), 1e3) for a, b in zip(x, slope, strict=True))
+
+    k1 = state_rates(ship, x, begin)
+    k2 = state_rates(ship, x2 := ahead(k1, 0.5), middle)
+    k3 = state_rates(ship, x3 := ahead(k2, 0.5), middle)
+    k4 = state_rates(ship, x4 := ahead(k3, 1.0), end)
+    transition = tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
+    return transition, h / 6 * (x[2] + 2 * x2[2] + 2 * x3[2] + x4[2])
+
+
+def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
+    """(..., n, n) derivatives of the rates, by central differences; as many at once as keep memory small."""
+    n = ship.states
+    columns = np.moveaxis(states, -1, 0)[:, None]
+    moves = TUNING.difference * np.concatenate([np.eye(n), -np.eye(n)]).reshape(2 * n, n, *[1] * (states.ndim - 1))
+    at_once = max(1, TUNING.samples_at_once // max(1, states[..., 0].size))
+    rates = np.empty((2 * n, n, *states.shape[:-1]))
+    for low in range(0, 2 * n, at_once):
+        part = moves[low : low + at_once]
+        moved = tuple(column + part[:, axis] for axis, column in enumerate(columns))
+        for column, rate in enumerate(state_rates(ship, moved, exogenous)):
+            rates[low : low + at_once, column] = rate
+    jacobian = (rates[:n] - rates[n:]) / (2 * TUNING.difference)
+    return np.ascontiguousarray(np.moveaxis(jacobian, (0, 1), (-1, -2)))
+
+
+def transition_matrices(jacobian: Array, h: float, parts: int = 1) -> tuple[Array, Array]:
+    """Transition over a step, and the effect of a constant acceleration over it, to fourth order.
+
+    Of a step with parts they are put together from those of equal parts, at least as many, by doubling.
+    """
+    doublings = math.ceil(math.log2(parts))
+    part_s = h / 2**doublings
+    A = jacobian * part_s
+    eye = np.eye(A.shape[-1])
+    A2 = A @ A
+    A3 = A2 @ A
+    transition, forcing = eye + A + A2 / 2 + A3 / 6 + A3 @ A / 24, part_s * (eye + A / 2 + A2 / 6 + A3 / 24)
+    for _ in range(doublings):
+        transition, forcing = transition @ transition, forcing + transition @ forcing
+    return transition, forcing
+
+
+def propagated(transition: Array, first: Array, missed: Array) -> Array:
+    """(w, k, n) changes of the states by gaps at the start (w, n) and between steps (w, k - 1, n).
+
+    All steps of all windows are one lower triangular band matrix. Where a motion overflows, so may those of other
+    windows.
+    """
+    w, n = first.shape
+    band = np.zeros((w, missed.shape[1] + 1, n, 2 * n))  # (column, diagonal) of the matrix, from the main one down
+    for column in range(n):
+        band[:, :-1, column, n - column : 2 * n - column] = -transition[..., column]
+    gaps = np.concatenate([first[:, None], missed], axis=1)
+    found, _ = dtbtrs(band.reshape(-1, 2 * n).T, gaps.reshape(-1, 1), uplo="L", diag="U")
+    return np.asarray(found.reshape(gaps.shape))
+
+
+def stacked_rates(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:
+    """(..., n) rates of states (..., n)."""
+    found = state_rates(ship, tuple(np.moveaxis(states, -1, 0)), exogenous)
+    result = np.empty(states.shape)
+    for column, part in enumerate(found):
+        result[..., column] = part
+    return result

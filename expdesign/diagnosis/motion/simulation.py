@@ -1,25 +1,33 @@
-"""Simulation of all windows at once."""
+"""Simulation of all windows at once, and how long windows of unstable models may be."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.data import Windows, channel_std, cut_windows
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.motion.exogenous_inputs import ExogenousInputs, exogenous_inputs
-from expdesign.diagnosis.motion.integration import (
+from expdesign.diagnosis.motion.equations_of_motion import (
     parts_of_step,
     propagated,
     runge_kutta_step,
     state_jacobian,
     transition_matrices,
 )
-from expdesign.diagnosis.motion.linearisation import start_responses
-from expdesign.diagnosis.motion.motion import LinearisedMotion, Motion
-from expdesign.diagnosis.motion.sensors import sensor_outputs, ship_velocities
+from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
+from expdesign.diagnosis.motion.linearisation import (
+    LinearisedMotion,
+    Motion,
+    linearise,
+    sensor_outputs,
+    ship_velocities,
+    start_responses,
+)
 from expdesign.diagnosis.motion.tuning import TUNING
+from expdesign.signals import Record
 from expdesign.values import Array
+
+# Simulation of all windows at once.
 
 
 def simulate_windows(
@@ -223,3 +231,42 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
     start = line[:, 0].copy()
     start[:, :3] += (np.linalg.pinv(table) @ missed)[..., 0]
     return start
+
+
+# Window lengths for unstable models: errors of initial states must not grow too much in a window.
+
+
+def stable_windows(ship: ExtendedModel, record: Record) -> Windows:
+    """Windows of a record: as long as possible, but at least a few, and short enough for an unstable model."""
+    windows = longest_windows(ship, record)
+    for _ in range(TUNING.window_rounds):
+        stable_s = _stable_time(ship, windows)
+        if stable_s >= windows.steps * windows.step_s:
+            break
+        windows = cut_windows(ship.model, record, longest_s=stable_s)
+    return windows
+
+
+def longest_windows(ship: ExtendedModel, record: Record) -> Windows:
+    """Windows of a record for a stable model."""
+    windows = cut_windows(ship.model, record)
+    if len(windows.batch) >= TUNING.fewest_windows:
+        return windows
+    total_s = sum(len(batch) * batch.sample_time_s for batch in record.batches)
+    return cut_windows(ship.model, record, longest_s=total_s / TUNING.fewest_windows)
+
+
+def _stable_time(ship: ExtendedModel, windows: Windows) -> float:
+    """Time until an error of an initial velocity, in measured standard deviations, grows too much [s]."""
+    motion = simulate_from_measured(ship, windows)
+    if motion.diverged:
+        return windows.steps * windows.step_s / 2
+    size = channel_std(windows.measured[..., :3])
+    scale = np.where(size > 0, size, 1.0)
+    by_start = start_responses(motion, linearise(motion).transition)
+    answers = np.moveaxis(by_start[..., :3], 0, -1) * scale / scale[:, None]
+    growth = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
+    unstable = (growth > TUNING.largest_growth).any(axis=0)
+    if not unstable.any():
+        return windows.steps * windows.step_s
+    return max(int(np.argmax(unstable)), TUNING.fewest_window_samples) * windows.sample_s

@@ -3,7 +3,6 @@
 `missing_effects` finds a sparse sum of them by stability selection; `with_unlisted_terms` adds terms to a selection.
 """
 
-from expdesign.diagnosis.remainder.additions import Remainder, with_unlisted_terms
-from expdesign.diagnosis.remainder.search import Missing, missing_effects
+from expdesign.diagnosis.remainder.search import Missing, Remainder, missing_effects, with_unlisted_terms
 
 __all__ = ["Missing", "Remainder", "missing_effects", "with_unlisted_terms"]

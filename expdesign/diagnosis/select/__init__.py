@@ -9,10 +9,9 @@ from expdesign.diagnosis.select.backward_elimination import (
     shows_for_certain,
     simulates_better,
 )
-from expdesign.diagnosis.select.candidate_disturbances import candidate_disturbances
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
-from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
+from expdesign.diagnosis.select.score_tests import ScoreTest, candidate_disturbances, score_tests
 from expdesign.diagnosis.select.selection import (
     Selection,
     Step,

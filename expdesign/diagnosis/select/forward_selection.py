@@ -22,21 +22,20 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
 )
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.diagnosis.select.fitted_candidate import FittedCandidate
-from expdesign.diagnosis.select.profile_likelihood import profile_estimate
+from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, profile_estimate
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import (
     FURTHER,
+    Work,
     best_step,
     has_rivals,
+    listed_causes,
     round_tests,
     same_effects_as_any,
     selection_round,
 )
-from expdesign.diagnosis.select.shortlist import listed_causes
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.diagnosis.select.work import Work
 from expdesign.progress import Estimated
 from expdesign.values import Array
 

@@ -1,7 +1,6 @@
 """From a vessel file to an extended model and back."""
 
-from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.result_names import public_name, stated_values
+from expdesign.diagnosis.vessel_file.reading import extended_model, public_name, stated_values
 from expdesign.diagnosis.vessel_file.writing import extend
 
 __all__ = [

@@ -1,20 +1,103 @@
-"""The extended model of a vessel file and a record."""
+"""The extended model of a vessel file and a record, with stated standard deviations and the names of effects."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from expdesign.diagnosis.data import derived_outputs, has_heading
-from expdesign.diagnosis.model import RESPONSES, ROLL, ExtendedModel, response_effect, term_library, values_by_group
-from expdesign.diagnosis.vessel_file.stated_std import stated_std
+from expdesign.diagnosis.model import (
+    RESPONSES,
+    ROLL,
+    Effects,
+    ExtendedModel,
+    ahead_force_text,
+    group_columns,
+    response_effect,
+    term_library,
+    turns_by_force,
+    values_by_group,
+)
 from expdesign.errors import InputError
 from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
 from expdesign.simulation import acting_response
-from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, VesselModel
+from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, VesselModel, column_name
 from expdesign.vessel.structures import SHOAL
+
+# Standard deviations of what a vessel file states of water, air, actuators and sensors: read and written alike.
+
+SEARCHED = ("deadband",)
+"""Kinds of effects that are found by trying values; fits have no derivative by them, so their values count as known."""
+
+
+def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...], stated: Effects) -> dict[str, float]:
+    """Standard deviation of every stated effect that has one.
+
+    Args:
+        vessel: its file.
+        inputs: of the model.
+        derived: velocities that come from the pose.
+        stated: effects.
+    """
+    weather = vessel.environment
+    flows = {"current": weather.current_std_mps, "wind": weather.wind_std_mps}
+    found = {}
+    for key in stated:
+        kind = key.split(":")[0]
+        given = (vessel.std.get(name, 0.0) for name in _file_keys(key, inputs, derived))
+        found[key] = flows[kind] if kind in flows else max(given, default=0.0) * _slope(key, stated[key])
+    return {key: std for key, std in found.items() if std > 0 and key.split(":")[0] not in SEARCHED}
+
+
+def found_std(vessel: Vessel, ship: ExtendedModel, std: Mapping[str, float], known: Sequence[str]) -> dict[str, float]:
+    """`Vessel.std` with the standard errors of effects; `known` are the keys that the vessel's file may have."""
+    named = {
+        name: value / _slope(key, ship.get(key))
+        for key, value in std.items()
+        for name in _file_keys(key, ship.model.inputs, ship.derived)
+    }
+    return {name: value for name, value in {**vessel.std, **named}.items() if name in known and value > 0}
+
+
+def _slope(key: str, effect: float) -> float:
+    """Change of an effect by that of the number which the vessel file states."""
+    return effect**2 if key.startswith("slew:") and effect else 1.0
+
+
+def with_std(weather: Environment, std: Mapping[str, float]) -> Environment:
+    """Current and wind with the standard errors of their estimates, the larger one of their two components."""
+
+    def largest(name: str, known: float) -> float:
+        return max((std[key] for key in (f"{name}:north", f"{name}:east") if key in std), default=known)
+
+    return replace(
+        weather,
+        current_std_mps=largest("current", weather.current_std_mps),
+        wind_std_mps=largest("wind", weather.wind_std_mps),
+    )
+
+
+def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> tuple[str, ...]:
+    """Keys of `Vessel.std` that an effect belongs to."""
+    kind, _, rest = key.partition(":")
+    if kind in RESPONSES:
+        return tuple(f"{inputs[column]}_{RESPONSES[kind]}" for column in group_columns(rest, inputs))
+    from_pose = "u" in derived
+    place = "position" if from_pose else "velocity"
+    late = {"u": "velocity", "v": "velocity", "r": "yaw_rate", "psi": "heading", "position": "position"}
+    if kind == "late":
+        return (f"{late[rest]}_delay_s",)
+    if kind == "lever":
+        return (f"{place}_{rest}_m",)
+    names = {"heading_bias": "heading_bias_rad" if from_pose else "velocity_angle_rad", "log": "velocity_scale",
+             "gyro": "yaw_rate_scale"}  # fmt: skip
+    return (names[kind],) if kind in names else ()
+
+
+# The extended model of a vessel file and a record.
 
 
 def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
@@ -107,3 +190,70 @@ def _rolled(roll: Roll | None) -> dict[str, float]:
 
 def _shoal(batch: Batch) -> int:
     return batch.input_names.index(SHOAL)
+
+
+# Names and units of effects in results.
+
+
+def stated_values(keys: Iterable[str], ship: ExtendedModel) -> str:
+    """A sentence on the values of these effects in the vessel file; empty without any."""
+    stated = []
+    for key in keys:
+        if key in ship.stated:
+            name, factor, offset, _ = public_name(key, ship)
+            stated.append(f"{name} {offset + factor * ship.stated[key]:.3g}")
+    return f" The vessel file states {', '.join(stated)}." if stated else ""
+
+
+def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
+    """(name, factor, offset, unit) that turn an effect into a number of the results: value = offset + factor effect."""
+    kind, _, rest = key.partition(":")
+    model = ship.model
+    if kind == "theta":
+        return rest, 1.0, float(model.parameters[model.names.index(rest)]), ""
+    if key == "heading_bias":  # as the vessel file counts it: of the compass, or of the velocity sensor's axes
+        return ("heading_bias_rad" if "u" in ship.derived else "velocity_angle_rad"), -1.0, 0.0, "rad"
+    if key in NAMES:
+        return NAMES[key][0], 1.0, 0.0, NAMES[key][1]
+    if kind == "deadband":
+        unit = _input_unit(rest, model)
+        return f"deadband_{rest}_{unit}" if unit else f"deadband_{rest}", 1.0, 0.0, unit
+    if kind == "slew":
+        unit = _input_unit(rest, model)
+        return f"slew_{rest}_s_per_{unit or 'unit'}", 1.0, 0.0, f"s/{unit}" if unit else "s"
+    if key == "asymmetry":
+        return _lean_name(model)
+    if kind in PATTERNS:
+        name, offset, unit = PATTERNS[kind]
+        return name.format(rest), 1.0, offset, unit
+    return ROLL[key], 1.0, 0.0, "rad/m" if key == "roll:yaw" else ""
+
+
+NAMES = {
+    "wind:toward": ("toward_rad", "rad"), "change:time": ("time_s", "s"),
+    "roll:period": ("roll_period_s", "s"), "roll:damping": ("roll_damping_ratio", ""),
+}  # fmt: skip
+"""Effect -> name in results and unit."""
+PATTERNS = {
+    "current": ("{}_mps", 0.0, "m/s"), "wind": ("{}_mps", 0.0, "m/s"), "offset": ("angle_offset_{}_rad", 0.0, "rad"),
+    "lag": ("lag_{}_s", 0.0, "s"), "delay": ("delay_{}_s", 0.0, "s"), "lever": ("{}_m", 0.0, "m"),
+    "late": ("{}_delay_s", 0.0, "s"), "shallow": ("{}_growth", 0.0, ""), "term": ("{}", 0.0, ""),
+    "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "log": ("factor", 1.0, ""),
+    "inertia": ("inertia_factor_{}", 1.0, ""), "change": ("{}_factor", 1.0, ""), "scale": ("angle_factor_{}", 1.0, ""),
+}  # fmt: skip
+"""Kind of effect -> name in results with {} for the rest of its key, value without the effect, unit."""
+
+
+def _input_unit(group: str, model: VesselModel) -> str:
+    """Unit of a group of inputs in names; generalised forces have none there."""
+    signal = model.inputs[group_columns(group, model.inputs)[0]]
+    return column_name(signal)[len(signal) + 1 :]
+
+
+def _lean_name(model: VesselModel) -> tuple[str, float, float, str]:
+    """Name of the yaw moment of ahead force: a length where force makes moments, else per unit of the model's input."""
+    if turns_by_force(model):
+        return "thrust_offset_m", 1.0, 0.0, "m"
+    if ahead_force_text(model) == "tau_x":
+        return "yaw_radps2_per_tau_x", 1.0, 0.0, ""
+    return "yaw_radps2_per_rps2", 1.0, 0.0, "rad/s\N{SUPERSCRIPT TWO} per rps\N{SUPERSCRIPT TWO}"

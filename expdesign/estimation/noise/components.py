@@ -1,4 +1,14 @@
-"""Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
+"""Residual noise as a sum of independent parts, each with a known shape in time, fitted to periodograms.
+
+Parts that noise may consist of: white, of the sensors, and slow ones, with their covariances in time.
+
+The formula and its sources stand in `components`.
+
+Periodograms of residuals, and their expectations for each part of the noise.
+
+Stretches may have gaps; expectations are exact for the samples that are there.
+
+Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
 
     cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1])
         + sum over m of (slow_m + turning_m cos(psi(i) - psi(j))) exp(-|i - j| / m)
@@ -31,16 +41,271 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from expdesign.estimation.noise.parts import Slow, alternatives, covariance_along, directions_of, filtered, slow_parts
-from expdesign.estimation.noise.periodograms import binned, expected_periodogram, misfit_of, periodograms
-from expdesign.estimation.noise.timeline import Stretch
-from expdesign.estimation.regression import Integers
+from expdesign.estimation.regression import Integers, batch_slices
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
+
+# Rows of a regression in time: stretches without long gaps, and short gaps filled with zeros.
+
+Turn = NDArray[np.complex128]
+"""exp(i psi) of headings psi."""
+Numbers = TypeVar("Numbers", NDArray[np.float64], Turn)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Rows in a row, with short gaps at most.
+
+    Attributes:
+        rows: of the data.
+        places: (k,) their sample numbers from the begin of the stretch.
+        turn: (t,) exp(i psi) of the heading psi at every sample, zero where one was left out; None without headings.
+    """
+
+    rows: slice
+    places: Integers
+    turn: Turn | None = None
+
+    @property
+    def samples(self) -> int:
+        """Number of samples from the first to the last, those left out included."""
+        return int(self.places[-1]) + 1
+
+    @property
+    def padded(self) -> int:
+        """Samples with zeros behind, up to a product of small primes: transforms of others may take 20 times longer."""
+        return int(scipy.fft.next_fast_len(self.samples))
+
+    def spread(self, rows: Array) -> Array:
+        """(t, ...) from (k, ...), zero where a sample was left out."""
+        return spread(rows, self.places)
+
+
+def stretches(batch: Integers, step: Integers, heading: Array | None = None) -> list[Stretch]:
+    """Every stretch; long gaps part a batch."""
+    result = []
+    for rows in batch_slices(batch):
+        edges = [
+            0,
+            *(np.flatnonzero(np.diff(step[rows]) > TUNING.long_gap_samples) + 1).tolist(),
+            rows.stop - rows.start,
+        ]
+        for low, high in pairwise(edges):
+            part = slice(rows.start + low, rows.start + high)
+            places = step[part] - step[part][0]
+            turn = None if heading is None else spread(np.exp(1j * heading[part]), places)
+            result.append(Stretch(part, places, turn))
+    return result
+
+
+def spread(rows: Numbers, places: Integers) -> Numbers:
+    """(t, ...) from (k, ...), zero where a sample was left out."""
+    if len(rows) == places[-1] + 1:
+        return rows
+    result = np.zeros((places[-1] + 1, *rows.shape[1:]), dtype=rows.dtype)
+    result[places] = rows
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """All samples from the first to the last of every stretch, those left out included.
+
+    Attributes:
+        place: (k,) where each row of the data stands.
+        batch, step: (t,) number of the stretch and sample number in it.
+    """
+
+    place: Integers
+    batch: Integers
+    step: Integers
+
+    def spread(self, rows: Array) -> Array:
+        """(t, ...) from (k, ...), zero where a sample was left out."""
+        if len(rows) == len(self.batch):
+            return rows
+        result = np.zeros((len(self.batch), *rows.shape[1:]))
+        result[self.place] = rows
+        return result
+
+
+def timeline(batch: Integers, step: Integers) -> Timeline:
+    """The timeline of rows (k,) with their batch and sample numbers."""
+    place, numbers, steps, begin = [], [], [], 0
+    for number, part in enumerate(stretches(batch, step)):
+        place.append(begin + part.places)
+        numbers.append(np.full(part.samples, number))
+        steps.append(np.arange(part.samples))
+        begin += part.samples
+    return Timeline(np.concatenate(place), np.concatenate(numbers), np.concatenate(steps))
+
+
+# Parts that noise may consist of: white, of the sensors, and slow ones, with their covariances in time.
+
+WHITE, SENSOR = 0, 1
+"""Places of the quick parts among the variances; slow ones follow."""
+MEMORIES = 2.0 ** np.arange(1, 11)
+"""Memories of slow parts [samples], at most the longest stretch; one more part lasts for ever."""
+
+
+@dataclass(frozen=True)
+class Slow:
+    """A disturbance that lasts.
+
+    Attributes:
+        memory: how long [samples].
+        turning: whether it keeps its side of the chart while the ship turns, not its side of the ship.
+    """
+
+    memory: float
+    turning: bool = False
+
+
+def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
+    """Slow parts that noise may have in stretches so long; those of the chart only where headings are known."""
+    longest = max(part.samples for part in parts)
+    memories = MEMORIES[longest >= MEMORIES].tolist()
+    turns = any(part.turn is not None and np.ptp(part.turn) > TUNING.rounding for part in parts)
+    ship, chart = [Slow(memory) for memory in (*memories, np.inf)], [Slow(memory, turning=True) for memory in memories]
+    return (*ship, *chart) if turns else tuple(ship)
+
+
+def alternatives(slow: Sequence[Slow], ordinates: int) -> list[tuple[Integers, float]]:
+    """Parts that noise may consist of, and what they must earn: no slow ones, those of the ship, those of the chart."""
+    quick = np.arange(2)
+    kinds = [2 + np.flatnonzero([part.turning == kind for part in slow]) for kind in (False, True)]
+    earned = np.log(ordinates) / 2
+    return [(quick, 0.0), *((np.append(quick, kind), earned) for kind in kinds if len(kind))]
+
+
+def directions_of(variances: Array, slow: Sequence[Slow]) -> tuple[Array, Array]:
+    """How variances (2 + m,) may be wrong: directions (2 + m, d), and what is known about each beforehand (d,).
+
+    The parts that are there may be larger or smaller, and slow ones may have the memory of their neighbours: what lasts
+    long is known much worse than by the size of a part whose memory is given.
+    """
+    there = np.flatnonzero(variances)
+    columns, before = list(np.eye(len(variances))[there]), [0.0] * len(there)
+    for place in there[there > SENSOR].tolist():
+        turning = slow[place - 2].turning
+        ends = [other for other in (place - 1, place, place + 1) if 0 <= other - 2 < len(slow)]
+        ends = [other for other in ends if slow[other - 2].turning == turning]
+        if len(ends) > 1:
+            column = np.zeros(len(variances))
+            column[[ends[0], ends[-1]]] = np.array([-1.0, 1.0]) * variances[place] / (ends[-1] - ends[0])
+            columns.append(column)
+            before.append(TUNING.memory_doublings**-2.0)
+    return np.reshape(columns, (-1, len(variances))).T, np.array(before)
+
+
+def covariance_along(directions: tuple[Array, Array], information: Array) -> Array:
+    """Covariance (q, q) of variances with this information (q, q) that are wrong in these `directions` only."""
+    T, before = directions
+    own = T.T @ information @ T + np.diag(before)
+    size = np.sqrt(np.diag(own))
+    size[size == 0] = 1.0
+    return np.asarray(T @ (np.linalg.pinv(own / np.outer(size, size), hermitian=True) / np.outer(size, size)) @ T.T)
+
+
+def filtered(index: int, slow: Sequence[Slow], W: Array, turn: Turn | None = None) -> Array:
+    """(t, p) covariance matrix of a part, with unit variance, times W (t, p), under headings exp(i psi) (t,)."""
+    if index == WHITE:
+        return W
+    if index == SENSOR:
+        result = 2.0 * W
+        result[1:] -= W[:-1]
+        result[:-1] -= W[1:]
+        return result
+    part = slow[index - 2]
+    if not part.turning:
+        return _remembered(W, part.memory)
+    assert turn is not None  # without headings there are no turning parts
+    c, s = turn.real[:, None], turn.imag[:, None]
+    return np.asarray(c * _remembered(c * W, part.memory) + s * _remembered(s * W, part.memory))
+
+
+def _remembered(W: Array, memory: float) -> Array:
+    keep = np.exp(-1.0 / memory)
+    past = scipy.signal.lfilter([1.0], [1.0, -keep], W, axis=0)
+    return np.asarray(past + scipy.signal.lfilter([1.0], [1.0, -keep], W[::-1], axis=0)[::-1] - W)
+
+
+# Periodograms of residuals, and their expectations for each part of the noise.
+
+
+def periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """Frequencies (f,), the periodogram there, and each part's expected one (2 + m, f), of all stretches in a row.
+
+    Frequency zero is there only where the mean is, not where it was subtracted.
+    """
+    found = []
+    for part, shapes in zip(parts, expected, strict=True):
+        own = eps[part.rows]
+        ordinates = np.abs(np.fft.rfft(part.spread(own), part.padded)) ** 2 / len(part.places)
+        frequency = 2 * np.pi * np.arange(len(ordinates)) / part.padded
+        first = int(abs(own.sum()) <= 1e-9 * np.sqrt(len(own)) * np.linalg.norm(own))
+        found.append((frequency[first:], ordinates[first:], shapes[:, first:]))
+    frequency, ordinates, shapes = (np.concatenate(items, axis=-1) for items in zip(*found, strict=True))
+    return frequency, ordinates, shapes
+
+
+def expected_periodogram(part: Stretch, slow: Sequence[Slow]) -> Array:
+    """(2 + m, f) expected periodogram of every part of the noise with unit variance, at the samples of a stretch."""
+    count = part.padded
+    lags = np.arange(count)
+    straight = _pairs(part.spread(np.ones(len(part.places))), count)
+    turning = straight if part.turn is None else _pairs(part.turn.real, count) + _pairs(part.turn.imag, count)
+    covariances = np.zeros((2 + len(slow), count))
+    covariances[:2, 0] = 1.0, 2.0
+    covariances[1, 1:2] = -1.0
+    covariances[:2] *= straight
+    for row, own in zip(covariances[2:], slow, strict=True):
+        row[:] = np.exp(-lags / own.memory) * (turning if own.turning else straight)
+    covariances /= len(part.places)
+    covariances[:, 1:] += covariances[:, :0:-1].copy()
+    return np.asarray(np.fft.rfft(covariances, axis=1).real)
+
+
+def _pairs(weights: Array, count: int) -> Array:
+    """(count,) sum of products of weights (t,) so many samples apart, t not above the count."""
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(weights, 2 * count)) ** 2, 2 * count)[:count])
+
+
+def binned(frequency: Array, ordinates: Array, shapes: Array) -> tuple[Array, Array, Array]:
+    """Mean ordinates (b,) and shapes (2 + m, b) of bins, and how many frequencies each holds, half for zero."""
+    means, weight = in_bins(frequency, np.vstack([ordinates, shapes]))
+    return means[0], means[1:], weight
+
+
+def in_bins(frequency: Array, rows: Array) -> tuple[Array, Array]:
+    """Means (q, b) of rows (q, f) in bins of frequency (f,), and how many frequencies each bin holds, half for zero."""
+    least = frequency[frequency > 0].min(initial=np.pi)
+    position = np.log(np.maximum(frequency, least) / least) / np.log(1.001 * np.pi / least)
+    place = np.where(frequency > 0, 1 + (TUNING.spectrum_bins * position).astype(int), 0)
+    _, place, count = np.unique(place, return_inverse=True, return_counts=True)
+    weight = np.asarray(np.bincount(place, np.where(frequency > 0, 1.0, 0.5)), dtype=float)
+    return np.array([np.bincount(place, row) / count for row in rows]), weight
+
+
+def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
+    """Bartlett's statistic: how far the cumulated ratio of periodogram to expectation is from a straight line."""
+    ratio = ordinates / np.maximum(level, 1e-12 * level.max())
+    order = np.argsort(frequency, kind="stable")
+    rising = np.cumsum(ratio[order[frequency[order] > 0]])
+    if not rising[-1] > 0:
+        return 0.0
+    even = np.arange(1, len(rising) + 1) / len(rising)
+    return float(np.abs(rising / rising[-1] - even).max() * np.sqrt(len(rising)))
+
+
+# Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,19 +24,21 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.estimation.noise.components import Fitted, left_shapes
-from expdesign.estimation.noise.parts import (
+from expdesign.estimation.noise.components import (
     SENSOR,
     WHITE,
+    Fitted,
     Slow,
+    Stretch,
     alternatives,
     covariance_along,
     directions_of,
+    in_bins,
+    left_shapes,
+    misfit_of,
     slow_parts,
 )
-from expdesign.estimation.noise.periodograms import in_bins, misfit_of
-from expdesign.estimation.noise.score_covariance import as_correlation, sums_of_parts
-from expdesign.estimation.noise.timeline import Stretch
+from expdesign.estimation.noise.covariance import as_correlation, sums_of_parts
 from expdesign.estimation.regression import Integers
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array

@@ -1,16 +1,37 @@
 """Measured batches as a linear regression."""
 
-from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes
-from expdesign.estimation.regression.nuisance import DIFFERENCE, EAST, NORTH, PRODUCT, Share, batch_signs
+from expdesign.estimation.regression.nuisance import (
+    DIFFERENCE,
+    EAST,
+    NORTH,
+    PRODUCT,
+    STEADY_CURRENT,
+    Guess,
+    Share,
+    batch_signs,
+    slopes,
+    with_wind_as_measured,
+)
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
 from expdesign.estimation.regression.predictors import (
     CURRENT,
     PREDICTORS,
     Layout,
+    Rows,
     build_layout,
+    build_regression,
+    headings_at,
+    room_for,
 )
-from expdesign.estimation.regression.regression import Integers, Mask, Regression, batch_slices, single_output
-from expdesign.estimation.regression.rows import Rows, build_regression, headings_at, room_for
+from expdesign.estimation.regression.regression import (
+    MEANS,
+    Integers,
+    Mask,
+    Regression,
+    batch_slices,
+    single_output,
+    subtract_mean,
+)
 from expdesign.estimation.regression.tables import (
     AIR,
     VANE,
@@ -27,8 +48,6 @@ from expdesign.estimation.regression.tables import (
     signal_table,
     with_depth,
 )
-from expdesign.estimation.regression.vane import with_wind_as_measured
-from expdesign.estimation.regression.zero_mean import MEANS, subtract_mean
 
 __all__ = [
     "AIR",

@@ -1,4 +1,6 @@
-"""Nuisance regressors for an unknown mean current and wind, derived from the terms.
+"""Nuisance regressors: an unknown current and wind, and terms of the wind from a vane.
+
+Nuisance regressors for an unknown mean current and wind, derived from the terms.
 
 With a current (N, E) in the n-frame the water velocities are u - (N cos psi + E sin psi) and v - (-N sin psi + E cos
 psi). A term f(u, v) of second order then grows by its derivatives times cos psi and sin psi, and by its second
@@ -11,6 +13,35 @@ The current's components also change along the axes of a ship that turns. This l
 and sway, which most models have by their own terms, too.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.44), (5.22), (5.37), (5.68)-(5.70).
+
+Regressors of an unknown steady current, exact to first order around a first guess of it.
+
+The acceleration over ground is that through water, Phi(nu - R(psi)^T c)^T theta with the current c to north and east,
+and the change of the current's components along the axes of a ship that turns, r S R^T c with S = [[0, 1], [-1, 0]].
+Around c_0 and theta_0
+
+    Phi(nu - R^T c)^T theta + r S R^T c ~ Phi(nu - R^T c_0)^T theta + r S R^T c_0 + J(c_0, theta_0) (c - c_0),
+
+with J = d(Phi^T theta) / dc + r S R^T. So two columns stand for all that the current does, whatever the terms are, and
+the estimate is repeated around what it found until the current stays. Beside the regressors of (5.68)-(5.70), which
+leave every product of a parameter and the current free, the two cost less information; they need no excitation
+condition.
+
+Source: Gauss's and Newton's linearisation of the model of T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
+Motion Control (2011), 8.3; the predictor of F. Ljungberg, doctoral thesis, Linköping University, (5.63), with it.
+
+Terms of the wind from a vane: unbiased for noise on its angle.
+
+Gaussian noise of standard deviation s on an angle shrinks its n-th harmonic by exp(-n**2 s**2 / 2). Components of the
+wind, n = 1, come divided by exp(-s**2 / 2). In a term of second degree, such as u_q v_q, or |u_q| u_q where u_q keeps
+its sign, that leaves the mean over the angle, n = 0, too large by exp(s**2) and the rest, n = 2, too small by as much.
+Both are known from the term at the wind turned by 90 degrees.
+
+That is right for instruments. Least squares is biased towards zero by the noise left in its regressors, and more so the
+more they are enlarged; it uses the wind as measured.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, (5.47)-(5.50), for components; K. V. Mardia and P. E. Jupp,
+Directional Statistics (2000), 3.5.7, for the harmonics of an angle with Gaussian noise.
 """
 
 from __future__ import annotations
@@ -21,11 +52,17 @@ from typing import Any
 
 import numpy as np
 
+from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression.polynomial import MOVING, Algebra, Polynomial, SignalTable, lift, symbol
-from expdesign.estimation.regression.tables import AIR
-from expdesign.vessel import VesselModel
+from expdesign.estimation.regression.tables import AIR, Table
+from expdesign.signals import Record
+from expdesign.simulation.motion import rates_over_ground, to_body
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.expressions import Expression
+
+# Nuisance regressors for an unknown mean current and wind, derived from the terms.
 
 FIRST = ("cos psi", "sin psi")
 SECOND = ("cos^2 psi", "sin 2psi")
@@ -190,3 +227,116 @@ def headings(psi: Any) -> dict[str, Any]:
     """Every function of heading that regressors are multiplied with, by name."""
     c, s = np.cos(psi), np.sin(psi)
     return {"cos psi": c, "sin psi": s, "cos^2 psi": c * c, "sin 2psi": 2.0 * s * c, "": 1.0}
+
+
+# Regressors of an unknown steady current, exact to first order around a first guess of it.
+
+STEADY_CURRENT = ("current to north", "current to east")
+"""Names of the nuisance parameters [m/s]."""
+STEP_MPS = 1e-4
+"""Step of the central difference, which is exact for terms of second order away from a change of sign of a modulus."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Guess:
+    """What regressors are linearised around.
+
+    Attributes:
+        to_mps: (2,) current to north and east [m/s].
+        parameters: (all,) of the model.
+    """
+
+    to_mps: Array
+    parameters: Array
+
+    def __post_init__(self) -> None:
+        seal(self, to_mps="2", parameters="p")
+
+
+def through_water(table: Table, to_mps: Array) -> Table:
+    """The table with velocities u and v through water that moves to north and east [m/s]; those through air stay."""
+    c, s = np.cos(table["psi"]), np.sin(table["psi"])
+    north, east = to_mps
+    return {**table, "u": table["u"] - (north * c + east * s), "v": table["v"] - (east * c - north * s)}
+
+
+def slopes(model: VesselModel, parameters: Array, table: Table, *, turning: bool = True) -> Array:
+    """(2, k, n) change of accelerations over ground, in the model's own scale, with the current to north and to east.
+
+    Args:
+        model: gives terms and outputs.
+        parameters: (all,) of it.
+        table: signals through water.
+        turning: as of `simulation.motion_rates`.
+    """
+    columns = []
+    for direction in np.eye(2):
+        ahead, back = (_accelerations(model, parameters, through_water(table, sign * direction)) for sign in STEPS)
+        columns.append((ahead - back) / (2 * STEP_MPS))
+    if turning:
+        columns = [own + turned_with(model, table, to) for own, to in zip(columns, np.eye(2), strict=True)]
+    return np.array(columns)
+
+
+def turned_with(model: VesselModel, table: Table, to_mps: Array) -> Array:
+    """(k, n) change of a current's components along the axes of a ship that turns, in the model's own scale."""
+    zero = np.zeros_like(table["psi"])
+    rates = rates_over_ground((zero, zero, zero), to_body(to_mps, table["psi"], NUMPY), table["r"])
+    every = np.stack(rates, axis=1) * model.time_scale_s
+    return np.asarray(every[:, [OUTPUTS.index(name) for name in model.outputs]])
+
+
+STEPS = (STEP_MPS, -STEP_MPS)
+
+
+def _accelerations(model: VesselModel, parameters: Array, table: Table) -> Array:
+    """(k, n) accelerations by all terms."""
+    total = np.zeros((len(table["psi"]), len(model.outputs)))
+    for term, expression, value in zip(model.terms, model.expressions, parameters, strict=True):
+        total[:, model.outputs.index(term.equation)] += value * np.asarray(expression.evaluate(table, NUMPY))
+    return total
+
+
+# Terms of the wind from a vane: unbiased for noise on its angle.
+
+
+def with_wind_as_measured(record: Record) -> Record:
+    """The record with winds from a vane as it measured them, shrunk by its noise."""
+    if not any(batch.vane_std_rad for batch in record.batches):
+        return record
+    batches = tuple(
+        batch
+        if batch.wind is None
+        else replace(batch, wind=batch.wind * np.exp(-(batch.vane_std_rad**2) / 2.0), vane_std_rad=0.0)
+        for batch in record.batches
+    )
+    return replace(record, batches=batches)
+
+
+def unbiased_value(expression: Expression, table: Table, std_rad: float) -> Array:
+    """(k,) a term of at most second degree in the wind, whose mean over the noise is the term without noise.
+
+    Args:
+        expression: of the term.
+        table: measured signals, with components of the wind divided by their shrinkage.
+        std_rad: of the noise on the vane's angle.
+    """
+    signs: list[Any] = []
+
+    def recorded(inside: Any) -> Any:
+        signs.append(np.sign(inside))
+        return np.abs(inside)
+
+    value = expression.evaluate(table, replace(NUMPY, abs=recorded))
+    if not set(AIR) & set(expression.signals):
+        return np.asarray(value)
+    u, v = (table[name] for name in AIR)
+
+    def at(u_q: Array, v_q: Array) -> Any:
+        known = iter(signs)  # moduli keep their sign while the wind is turned
+        return expression.evaluate({**table, "u_q": u_q, "v_q": v_q}, replace(NUMPY, abs=lambda x: next(known) * x))
+
+    even = (value + at(-u, -v)) / 2
+    mean = (even + (at(-v, u) + at(v, -u)) / 2) / 2
+    gain = np.exp(std_rad**2)
+    return np.asarray(value + (gain - 1.0) * (even - mean) + (1.0 / gain - 1.0) * mean)

@@ -20,6 +20,12 @@ left side.
 Fewer regressors leave more information about the ship, and a bias where the disturbance is there after all.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76), (6.5)-(6.10).
+
+Rows of a regression where velocities are read less often than they are sampled.
+
+Between two readings a velocity is interpolated, and its differences from sample to sample are those of the
+interpolation. Their sum from one reading to the next is a difference of readings. Every row therefore becomes the mean
+of the rows between two readings, for each output by itself; equations that hold for rows hold for their means.
 """
 
 from __future__ import annotations
@@ -29,16 +35,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from expdesign.errors import InputError, UnknownName
-from expdesign.estimation.regression.current import STEADY_CURRENT, Guess, slopes, through_water, turned_with
-from expdesign.estimation.regression.nuisance import Nuisance, headings, nuisance_regressors, symbolic
+from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError, NotInformative, UnknownName
+from expdesign.estimation.regression.nuisance import (
+    STEADY_CURRENT,
+    Guess,
+    Nuisance,
+    batch_signs,
+    headings,
+    nuisance_regressors,
+    slopes,
+    symbolic,
+    through_water,
+    turned_with,
+    unbiased_value,
+)
 from expdesign.estimation.regression.polynomial import Algebra
-from expdesign.estimation.regression.regression import Integers
-from expdesign.estimation.regression.tables import AIR, VANE, Table, measured_table
-from expdesign.estimation.regression.vane import unbiased_value
+from expdesign.estimation.regression.regression import Integers, Regression
+from expdesign.estimation.regression.tables import AIR, VANE, Table, heading_of, inputs_within, measured_table
 from expdesign.signals import Batch, Record
 from expdesign.simulation.motion import turns_current
-from expdesign.values import Array
+from expdesign.values import Array, closed
 from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import MOTION_SIGNALS
 
@@ -294,3 +311,102 @@ def _merged_note(name: str, partners: Mapping[str, str]) -> str:
         partner = partners[name]
         return f"This method uses no wind: {partner} is the sum of {partner} and {name}, and {name} is set to 0."
     return f"This method uses no wind: {name} is set to 0."
+
+
+# Rows of a regression where velocities are read less often than they are sampled.
+
+
+def mean_between_readings(rows: Array, interpolated: Array) -> Array:
+    """Rows (k - 1, n, ...) of pairs of successive samples, each replaced by the mean over its interval.
+
+    Args:
+        rows: of pairs of samples.
+        interpolated: (k, n) positive where an output lies between readings; the ends count as read.
+    """
+    result = np.array(rows)
+    for output, between in enumerate(interpolated.T):
+        starts = np.flatnonzero(~(between[:-1] > 0) | (np.arange(len(rows)) == 0))
+        counts = np.diff(np.append(starts, len(rows)))
+        sums = np.add.reduceat(rows[:, output], starts, axis=0)
+        means = sums / counts.reshape(-1, *[1] * (sums.ndim - 1))
+        result[:, output] = np.repeat(means, counts, axis=0)
+    return result
+
+
+# The rows of a regression, from the batches of a record and the columns of a layout.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rows:
+    """Where the rows of a regression come from.
+
+    Attributes:
+        regression: of all batches.
+        used: per batch, the samples k - 1 whose regressors are used.
+        left_out: number of rows left out because numbers are missing.
+    """
+
+    regression: Regression
+    used: tuple[Integers, ...]
+    left_out: int
+
+
+def build_regression(layout: Layout, record: Record) -> Rows:
+    """The regression of all batches.
+
+    Raises:
+        NotInformative: no row is complete.
+    """
+    used, left_out = [], 0
+    columns = [layout.model.outputs.index(name) for name in layout.model.outputs]
+    states = [OUTPUTS.index(layout.model.outputs[index]) for index in columns]
+    most = sum(len(batch) - 1 for batch in record.batches)
+    Phi, y = room_for(most, len(states), len(layout.names)), np.empty((most, len(states)))
+    end = 0
+    for batch in record.batches:
+        table = measured_table(layout.model, batch, wind_measured=layout.predictor.wind)
+        ratio = batch.sample_time_s / layout.model.time_scale_s
+        signs = batch_signs(layout.nuisance, table)
+        within = inputs_within(layout.model, batch)
+        regressors = layout.rows(table, signs, used=slice(0, -1), scale=ratio, within=within)
+        explained = np.diff(batch.velocity[:, states], axis=0) - ratio * layout.known(table, within)[:-1]
+        if batch.interpolated is not None:
+            regressors, explained = (
+                mean_between_readings(part, batch.interpolated[:, states]) for part in (regressors, explained)
+            )
+        whole = np.flatnonzero(np.isfinite(regressors).all(axis=(1, 2)) & np.isfinite(explained).all(axis=1))
+        places = slice(None) if len(whole) == len(explained) else whole
+        start, end = end, end + len(whole)
+        Phi[start:end], y[start:end] = regressors[places], explained[places]
+        used.append(whole)
+        left_out += len(explained) - len(whole)
+    if not end:
+        raise NotInformative("no pair of successive samples has every signal the predictor needs")
+    regression = Regression(
+        parameters=layout.names,
+        Phi=closed(Phi)[:end],
+        y=y[:end],
+        batch=np.repeat(np.arange(len(used)), [len(rows) for rows in used]),
+        step=np.concatenate(used),
+        outputs=layout.model.outputs,
+        heading=headings_at(record, used),
+    )
+    return Rows(regression=regression, used=tuple(used), left_out=left_out)
+
+
+def room_for(rows: int, outputs: int, columns: int) -> Array:
+    """(rows, outputs, columns) without values; every column lies in one piece, so that sums along it are quick."""
+    return np.empty((outputs, columns, rows)).transpose(2, 0, 1)
+
+
+def headings_at(record: Record, used: Sequence[Integers]) -> Array | None:
+    """(k,) heading at samples used of each batch, the last one measured where one is missing; None where all are."""
+    found = []
+    for batch, places in zip(record.batches, used, strict=True):
+        heading = heading_of(batch)
+        seen = np.isfinite(heading)
+        if not seen.any():
+            return None
+        latest = np.maximum.accumulate(np.where(seen, np.arange(len(seen)), int(seen.argmax())))
+        found.append(heading[latest][places])
+    return np.concatenate(found)

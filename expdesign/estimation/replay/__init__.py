@@ -1,18 +1,19 @@
 """Batches simulated again: instruments, and fast simulation for output error."""
 
-from expdesign.estimation.replay.compiled import Compiled, compiled
-from expdesign.estimation.replay.instruments import InstrumentModel, apart_from_start, instrument_wind
-from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
-from expdesign.estimation.replay.steered import (
+from expdesign.estimation.replay.compiled import Compiled, Stretches, compiled
+from expdesign.estimation.replay.instruments import (
     LEAVE_OUT,
     PLANNED,
     STEERED,
+    InstrumentModel,
     Steered,
+    apart_from_start,
     as_planned,
+    instrument_wind,
     open_loop,
     treatment_of,
 )
-from expdesign.estimation.replay.stretches import Stretches
+from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
 
 __all__ = [
     "LEAVE_OUT",

@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError, UnknownName
 from expdesign.estimation.regression import drive_of, model_for, parts_of
-from expdesign.estimation.replay.stretches import INTEGRATORS, Simulate
+from expdesign.estimation.replay.compiled import INTEGRATORS, Simulate
 from expdesign.signals import Batch, Record, Trajectory
 from expdesign.simulation.motion import begun
 from expdesign.simulation.program import STATES

@@ -1,10 +1,9 @@
 """Instrumental-variable equations solved, with covariance and null space."""
 
 from expdesign.estimation.solve.null_space import Direction, NullSpace
-from expdesign.estimation.solve.refine import Prior, Refined, refine_iv
 from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
-from expdesign.estimation.solve.solution import Solution, Weighting, solve_iv, solve_ls
-from expdesign.estimation.solve.weighting import BLOCKS
+from expdesign.estimation.solve.solution import Prior, Refined, Solution, Weighting, refine_iv, solve_iv, solve_ls
+from expdesign.estimation.solve.systems import BLOCKS
 
 __all__ = [
     "BLOCKS",

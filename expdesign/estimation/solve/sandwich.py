@@ -43,8 +43,7 @@ from expdesign.estimation.noise import (
     white_parts,
 )
 from expdesign.estimation.regression import Integers, Regression
-from expdesign.estimation.solve.systems import Part
-from expdesign.estimation.solve.weighting import Weighting
+from expdesign.estimation.solve.systems import Part, Weighting
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 

@@ -5,28 +5,40 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from expdesign.conventions import to_n_frame
 from expdesign.export import words
-from expdesign.export.cards.danger import Danger, look_out
 from expdesign.export.cards.orders import (
     HEADS,
+    Danger,
     columns_of,
     heading_rows,
     heading_zigzag,
+    look_out,
     order_columns,
     order_rows,
     orders_notes,
     run_orders,
 )
-from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, new_figure, page_figure, svg
-from expdesign.export.report.content import ReportContent, Run, relative_information
-from expdesign.export.report.figures.chart import draw_sea, place_labels
-from expdesign.export.report.figures.position_axes import draw_position_ticks, draw_scale_and_north
+from expdesign.export.pages import page_template
+from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, drawn, new_figure, page_figure, svg
+from expdesign.export.report import tables
+from expdesign.export.report.chart import (
+    chart,
+    chart_legend,
+    draw_position_ticks,
+    draw_scale_and_north,
+    draw_sea,
+    place_labels,
+)
+from expdesign.export.report.checks import day_sentence, day_words, procedure_sentences
+from expdesign.export.report.content import ReportContent, Run, primitive_runs, relative_information
 from expdesign.export.report.tables import settings_sentence, shown_name
+from expdesign.export.routes import require_verified
 from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Leg, Plan
 from expdesign.values import Array
@@ -287,4 +299,36 @@ def _record(content: ReportContent) -> str:
     return (
         f"every {step:g} s, with a common clock: time_s, lat_deg, lon_deg, heading_deg, u_mps, v_mps, r_radps, "
         f"{inputs}, wind_speed_mps, wind_angle_rad; from 30 s before the run to 30 s after it"
+    )
+
+
+# The cards as one page that prints on A4: a chart, an agenda, and the sheets in time order.
+
+
+def cards_html(content: ReportContent) -> str:
+    """One HTML page without outside references; consecutive runs of one manoeuvre share a sheet.
+
+    Raises:
+        NoPlan: the plan is not verified and must not be sailed.
+    """
+    require_verified(content.plan)
+    runs = primitive_runs(content.plan)
+    cards = drawn([partial(build_card, content, group) for group in card_groups(content, runs)])
+    overview = drawn([partial(chart, content)])[0]
+    page = page_template("expdesign.export.cards", "cards.html")
+    return page.render(
+        content=content,
+        cards=cards,
+        runs=len(runs),
+        blanks=BLANKS,
+        depths=bool(content.plan.area.depths),
+        chart=overview,
+        legend=chart_legend(content),
+        agenda=tables.agenda(content),
+        procedure=procedure_sentences(content.plan),
+        day=day_sentence(content.plan),
+        total=day_words(content.plan.day),
+        current=words.current(content.environment.current_to, content.environment.current_std_mps),
+        wind=words.wind(content.environment.wind_to, content.environment.wind_std_mps),
+        clearance=words.distance(content.clearance_m),
     )

@@ -1,8 +1,13 @@
 """The page about a diagnosis: one self-contained file."""
 
 from expdesign.export.diagnosis_page.page import diagnosis_html, diagnosis_notes
-from expdesign.export.diagnosis_page.results import diagnosis_json, diagnosis_tables, extended_vessel
-from expdesign.export.diagnosis_page.roll import RollVerdict, roll_sentences
+from expdesign.export.diagnosis_page.results import (
+    RollVerdict,
+    diagnosis_json,
+    diagnosis_tables,
+    extended_vessel,
+    roll_sentences,
+)
 
 __all__ = [
     "RollVerdict",

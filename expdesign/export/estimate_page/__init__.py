@@ -1,6 +1,5 @@
 """The page about an estimation: one self-contained file."""
 
-from expdesign.export.estimate_page.content import EstimateContent
-from expdesign.export.estimate_page.page import estimate_html, estimate_notes
+from expdesign.export.estimate_page.page import EstimateContent, estimate_html, estimate_notes
 
 __all__ = ["EstimateContent", "estimate_html", "estimate_notes"]

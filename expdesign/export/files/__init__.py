@@ -5,37 +5,40 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.export.files.design_files import dictionary_json, durations_json
-    from expdesign.export.files.dictionary_file import dictionary_files, growth_json
-    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table
-    from expdesign.export.files.estimate_tables import (
-        breach_sentences,
-        estimate_warnings,
-        failure_rows,
-        fit_table,
-        limit_table,
-        motion_words,
-        parameter_table,
-        plus_minus,
-        prediction_table,
-        prediction_title,
-        unstable_warning,
+    from expdesign.export.files.design_files import (
+        dictionary_files,
+        dictionary_json,
+        durations_json,
+        growth_json,
+        recorded_dictionary_json,
+        subsets_json,
     )
     from expdesign.export.files.estimates import (
+        breach_sentences,
+        disturbance_entries,
+        disturbance_table,
         estimate_json,
+        estimate_warnings,
         estimated_vessel,
+        failure_rows,
         fit_entries,
+        fit_table,
         limit_entries,
+        limit_table,
+        motion_words,
         parameter_entries,
+        parameter_table,
+        plus_minus,
         prediction_entries,
+        prediction_table,
+        prediction_title,
         rows_entry,
         steered_entry,
+        unstable_warning,
     )
     from expdesign.export.files.known import Known, Purchase, replan_json
     from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
-    from expdesign.export.files.record_file import record_csv
-    from expdesign.export.files.recorded_design import recorded_dictionary_json, subsets_json
-    from expdesign.export.files.text import finite, strict_json
+    from expdesign.export.files.text import finite, record_csv, strict_json
     from expdesign.export.files.vessel_file import vessel_toml
 
 __all__ = [
@@ -82,37 +85,52 @@ if not TYPE_CHECKING:
     __getattr__ = load_on_use(
         __name__,
         {
-            "design_files": ("dictionary_json", "durations_json"),
-            "dictionary_file": ("dictionary_files", "growth_json"),
-            "disturbances": ("disturbance_entries", "disturbance_table"),
-            "estimate_tables": (
-                "breach_sentences",
-                "estimate_warnings",
-                "failure_rows",
-                "fit_table",
-                "limit_table",
-                "prediction_table",
-                "prediction_title",
-                "motion_words",
-                "parameter_table",
-                "plus_minus",
-                "unstable_warning",
+            "design_files": (
+                "dictionary_files",
+                "dictionary_json",
+                "durations_json",
+                "growth_json",
+                "recorded_dictionary_json",
+                "subsets_json",
             ),
             "estimates": (
+                "breach_sentences",
+                "disturbance_entries",
+                "disturbance_table",
                 "estimate_json",
+                "estimate_warnings",
                 "estimated_vessel",
-                "prediction_entries",
+                "failure_rows",
                 "fit_entries",
+                "fit_table",
                 "limit_entries",
+                "limit_table",
+                "motion_words",
                 "parameter_entries",
+                "parameter_table",
+                "plus_minus",
+                "prediction_entries",
+                "prediction_table",
+                "prediction_title",
                 "rows_entry",
                 "steered_entry",
+                "unstable_warning",
             ),
-            "known": ("Known", "Purchase", "replan_json"),
-            "plan_files": ("commands_csv", "plan_json", "track_csv"),
-            "record_file": ("record_csv",),
-            "recorded_design": ("recorded_dictionary_json", "subsets_json"),
-            "text": ("finite", "strict_json"),
+            "known": (
+                "Known",
+                "Purchase",
+                "replan_json",
+            ),
+            "plan_files": (
+                "commands_csv",
+                "plan_json",
+                "track_csv",
+            ),
+            "text": (
+                "finite",
+                "record_csv",
+                "strict_json",
+            ),
             "vessel_file": ("vessel_toml",),
         },
     )

@@ -5,18 +5,23 @@ The dictionary holds motions in calm water, so velocities over ground and throug
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from expdesign.conventions import VELOCITY_COLUMNS, to_b_frame, to_n_frame
-from expdesign.dictionary.primitive import Primitive
+from expdesign.dictionary.spec import Primitive, PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, bordered, limits_kept, pool_gains
-from expdesign.export.files.text import finite, named, strict_json
-from expdesign.information.primitive_information import PrimitiveInformation
-from expdesign.vessel import Vessel
+from expdesign.export.files.text import csv_text, finite, named, named_finite, sample_seconds, strict_json
+from expdesign.growing import Growth
+from expdesign.information.moments import PrimitiveInformation, log_det_or_none
+from expdesign.information.recorded import BatchInformation
+from expdesign.rehearsal import Drawn
+from expdesign.signals import Commands
+from expdesign.vessel import Vessel, column_name
 
 
 def dictionary_json(
@@ -152,3 +157,160 @@ def _solver_entry(design: DurationDesign) -> dict[str, Any] | None:
 
 def _efficiency_entry(item: Efficiencies) -> dict[str, Any]:
     return {"title": item.title, "designs": dict(item.of), "missing": item.missing or None}
+
+
+# A dictionary as a dictionary file, with a CSV of commands for every recorded primitive.
+
+
+def dictionary_files(
+    specs: Sequence[PrimitiveSpec], *, name: str, stem: str, comments: Sequence[str] = ()
+) -> dict[str, str | bytes]:
+    """`<stem>.toml` and a CSV for each recorded primitive; reading them gives exactly the same requests.
+
+    Args:
+        specs: requests.
+        name: of the dictionary.
+        stem: of the file names.
+        comments: lines to go first.
+    """
+    lines = [f"# {line}".rstrip() for line in comments] + ["[dictionary]", f"name = {json.dumps(name)}"]
+    files: dict[str, str | bytes] = {}
+    for spec in specs:
+        settings = dict(spec.settings)
+        lines += ["", "[[primitives]]", f"name = {json.dumps(spec.name)}", f"family = {json.dumps(spec.family)}"]
+        if spec.commands is not None:
+            file = f"{stem}-{spec.name}.csv"
+            files[file] = recorded_csv(spec.commands)
+            lines.append(f"file = {json.dumps(file)}")
+            del settings["duration_s"]
+        lines += [f"{key} = {value!r}" for key, value in settings.items()]
+    return {f"{stem}.toml": "\n".join(lines) + "\n", **files}
+
+
+def growth_json(growth: Growth) -> str:
+    """Additions to a dictionary, the gain of each, and the guarantee of the search, as growth.json."""
+    velocities = zip(("u_mps", "v_mps", "r_radps"), growth.limits.tolist(), strict=True)
+    return strict_json(
+        {
+            "criterion": "D",
+            "dimension": growth.dimension,
+            "limits": dict(velocities),
+            "candidates": growth.evaluated,
+            "best_sensitivity_left": finite(growth.best_left),
+            "efficiency_at_least_among_candidates": growth.efficiency_left,
+            "rounds": [
+                {
+                    "name": row.name,
+                    "family": row.family,
+                    "settings": dict(row.settings),
+                    "sensitivity_before": row.sensitivity,
+                    "sensitivity_of_family_member": row.searched,
+                    "log_det_gain": row.log_det_gain,
+                    "efficiency_so_far": row.efficiency,
+                    "excitation_condition": row.excitation_condition,
+                }
+                for row in growth.rounds
+            ],
+        }
+    )
+
+
+def recorded_csv(commands: Commands) -> str:
+    """Commands as a recorded primitive's file; no digit is lost."""
+    rows = (
+        (repr(sample_seconds(sample, commands.sample_time_s)), *(repr(value) for value in values))
+        for sample, values in enumerate(commands.values.tolist())
+    )
+    return csv_text(("time_s", *(column_name(name) for name in commands.names)), rows)
+
+
+# A design from labelled, recorded data: its dictionary as dictionary.json, its draws as subsets.json.
+
+
+def recorded_dictionary_json(
+    dictionary: Sequence[BatchInformation],
+    parameters: Sequence[str],
+    *,
+    outputs: Sequence[str],
+    pieces: Mapping[str, int],
+    gains: Sequence[float],
+    mean_subtraction: str,
+) -> str:
+    """The labels with their information, in the keys of `dictionary_json` as far as data have them.
+
+    Args:
+        dictionary: moments of each label.
+        parameters: (p) names in the order of the matrices.
+        outputs: velocities that have equations.
+        pieces: number of each label.
+        gains: (q,) of each label beside the pool.
+        mean_subtraction: for `log_det_alone`, of which the symmetric part of the information counts.
+    """
+    entries = [
+        {
+            "name": item.name,
+            "family": "recorded",
+            "pieces": pieces[item.name],
+            "duration_s": item.seconds,
+            "samples": item.samples,
+            "X": item.X.tolist(),
+            "Y": item.Y.tolist(),
+            "Z": item.Z.tolist(),
+            "log_det_alone": _log_det(item, mean_subtraction),
+            "gain_beside_pool": finite(gain),
+        }
+        for item, gain in zip(dictionary, gains, strict=True)
+    ]
+    return strict_json({"parameters": list(parameters), "outputs": list(outputs), "primitives": entries})
+
+
+def _log_det(item: BatchInformation, mean_subtraction: str) -> float | None:
+    taken = item.Y @ item.Z.T if mean_subtraction != "none" else np.zeros_like(item.X)
+    information = (item.X - taken + (item.X - taken).T) / 2
+    return log_det_or_none(information, np.abs(np.diag(item.X)))
+
+
+def subsets_json(
+    drawn: Sequence[Drawn],
+    *,
+    outputs: Sequence[str],
+    pieces: Sequence[str],
+    labels: Sequence[str],
+    command: str,
+    version: str,
+) -> str:
+    """Draws of every design with their simulation errors; null where there is no estimate or its model diverges.
+
+    Args:
+        drawn: of each design.
+        outputs: velocities that have equations.
+        pieces, labels: of each piece.
+        command: that gives the same.
+        version: of the package.
+    """
+    return strict_json(
+        {
+            "pieces": [{"name": name, "label": label} for name, label in zip(pieces, labels, strict=True)],
+            "designs": {item.design: _design(item, outputs) for item in drawn},
+            "command": command,
+            "version": version,
+        }
+    )
+
+
+def _design(item: Drawn, outputs: Sequence[str]) -> dict[str, Any]:
+    middle, high = np.quantile(item.norm, [0.5, 0.95], method="higher")
+    return {
+        "degenerate": float(item.degenerate.mean()),
+        "median_norm": finite(float(middle)),
+        "norm_95_percent": finite(float(high)),
+        "draws": [
+            {
+                "pieces": list(subset),
+                "rmse": named_finite(outputs, rmse),
+                "norm": finite(float(norm)),
+                "degenerate": bool(wrong),
+            }
+            for subset, rmse, norm, wrong in zip(item.subsets, item.rmse, item.norm, item.degenerate, strict=True)
+        ],
+    }

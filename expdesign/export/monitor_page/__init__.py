@@ -1,6 +1,5 @@
 """Results of a watch over a ship in operation: JSON, sentences and a page."""
 
-from expdesign.export.monitor_page.budget import budget_entries
 from expdesign.export.monitor_page.content import (
     Moment,
     MonitorContent,
@@ -9,7 +8,7 @@ from expdesign.export.monitor_page.content import (
     monitor_tables,
     sentences,
 )
-from expdesign.export.monitor_page.page import monitor_html
+from expdesign.export.monitor_page.page import budget_entries, monitor_html
 
 __all__ = [
     "Moment",

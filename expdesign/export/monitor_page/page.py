@@ -1,4 +1,10 @@
-"""The page of a watch over a ship in operation."""
+"""The page of a watch over a ship in operation.
+
+What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
+
+Source of the idea: a master's thesis on the estimation of a ship's yaw dynamics in operation, section on the influence
+of terms (absolute contributions beside each other, by manoeuvre).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.export.monitor_page.budget import budget_figure, budget_header, budget_tables
+from expdesign.export.files import finite
 from expdesign.export.monitor_page.content import MonitorContent, monitor_header, monitor_tables, sentences
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import (
@@ -22,7 +28,103 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.words import HOUR, SINCE_1970_S, hours, when
+from expdesign.monitoring import KINDS
 from expdesign.values import Array
+
+# What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
+
+EQUATIONS = ("surge", "sway", "yaw")
+WHOLE = ("inertia:", "yaw:I_r")
+"""Effects that stand for all terms of an equation; thrust stands for those of the actuators."""
+SHOWN_SHARE = 0.02
+
+
+def shares(content: MonitorContent) -> Array:
+    """(k, m, 3) share of every term in the sum of sizes of all terms of an equation, by kind of stretch."""
+    single = [not c.effect.startswith(WHOLE) and c.effect != "gain" for c in content.changes]
+    sizes = content.state.budget.terms * np.array(single)[:, None]
+    return np.asarray(sizes / np.maximum(sizes.sum(axis=1, keepdims=True), 1e-300))
+
+
+def delays_s(content: MonitorContent) -> Array:
+    """(k, m) time in stretches of one kind until a change of its size is expected to raise an alarm [s]."""
+    c, budget = content.calibration, content.state.budget
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = budget.information / np.maximum(budget.stretches, 1.0)[:, None] / c.inflation
+        return np.asarray(np.where(rate > 0, np.ceil(2.0 * content.limit / rate) * c.stretch_s, np.inf))
+
+
+@page_figure
+def budget_figure(content: MonitorContent) -> str:
+    """Bars of the shares, an axes for each equation that has terms."""
+    share, stretches = shares(content), content.state.budget.stretches
+    used = [place for place in range(len(EQUATIONS)) if share[..., place].any()]
+    kinds = [kind for kind in range(len(KINDS)) if stretches[kind]]
+    figure = new_figure(6.8, 0.9 + (0.45 + 0.28 * len(kinds)) * max(len(used), 1))
+    for axes, place in zip(figure.subplots(max(len(used), 1), sharex=True, squeeze=False)[:, 0], used, strict=False):
+        left = np.zeros(len(kinds))
+        terms = [m for m in range(len(content.changes)) if share[kinds, m, place].max(initial=0.0) > SHOWN_SHARE]
+        for number, term in enumerate(terms):
+            width = share[kinds, term, place]
+            name = plain(content.changes[term].words.removeprefix("parameter "))
+            axes.barh(range(len(kinds)), width, left=left, color=LINES[number % len(LINES)], label=name, height=0.7)
+            left = left + width
+        axes.set_yticks(range(len(kinds)), [KINDS[kind] for kind in kinds], fontsize=8)
+        axes.invert_yaxis()
+        axes.set_xlim(0.0, 1.0)
+        axes.set_title(EQUATIONS[place], fontsize=9, loc="left")
+        axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        light_grid(axes)
+    figure.axes[-1].set_xlabel("share of the sizes of all terms")
+    return svg(figure, key="budget", label="Share of every term in each equation, by kind of stretch")
+
+
+def budget_header() -> tuple[str, ...]:
+    """Header of `budget_tables`."""
+    return ("change", *KINDS)
+
+
+def budget_tables(content: MonitorContent) -> list[tuple[str, ...]]:
+    """A row for each change that is watched for: time to an alarm in stretches of each kind."""
+    delays = delays_s(content)
+    rows = [("in the data", *(hours(value) for value in content.state.budget.duration_s.tolist()))]
+    for number, change in enumerate(content.changes):
+        if content.calibration.watched[number]:
+            rows.append((change.words, *(_after(value) for value in delays[:, number].tolist())))
+    return rows
+
+
+def _after(delay_s: float) -> str:
+    if not np.isfinite(delay_s):
+        return "never"
+    return f"{delay_s / 60.0:.0f} min" if delay_s < HOUR else hours(delay_s)
+
+
+def budget_entries(content: MonitorContent) -> list[dict[str, object]]:
+    """The budget for a file, by kind of stretch; accelerations in m/s2 and rad/s2.
+
+    Compared are stretches that are judged and those that are not for their weather.
+    """
+    budget, delays = content.state.budget, delays_s(content)
+    mean = budget.terms / np.maximum(budget.stretches, 1.0)[:, None, None]
+    return [
+        {
+            "kind": name,
+            "compared_h": float(budget.duration_s[kind] / HOUR),
+            "mean_accelerations": {
+                change.effect: dict(zip(EQUATIONS, mean[kind, number].tolist(), strict=True))
+                for number, change in enumerate(content.changes)
+                if mean[kind, number].any()
+            },
+            "alarm_after_s": {
+                change.effect: finite(float(delays[kind, number]))
+                for number, change in enumerate(content.changes)
+                if content.calibration.watched[number]
+            },
+        }
+        for kind, name in enumerate(KINDS)
+    ]
+
 
 SHOWN = 5
 """Largest number of estimates that are drawn."""

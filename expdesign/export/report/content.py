@@ -10,7 +10,7 @@ from expdesign.durations import DurationDesign, Efficiencies
 from expdesign.export.files import Known
 from expdesign.export.routes import Route
 from expdesign.growing import Growth
-from expdesign.information.primitive_information import PrimitiveInformation, over_shares
+from expdesign.information.moments import PrimitiveInformation, over_shares
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.simulation.environment import Environment

@@ -12,31 +12,40 @@ import numpy as np
 from expdesign.export import words
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import drawn, marked
-from expdesign.export.report import criteria, tables
-from expdesign.export.report.checks import checks, conditions
+from expdesign.export.report import tables
+from expdesign.export.report.chart import chart, chart_legend
+from expdesign.export.report.checks import checks, conditions, day_sentence, procedure_sentences
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.figures.chart import chart, chart_legend
-from expdesign.export.report.figures.design import (
+from expdesign.export.report.design import (
+    certificate,
+    chain,
+    comparison,
+    criterion_sentence,
+    equal_time_sentence,
+    growth_rows,
+    growth_sentences,
+    limit_rows,
+    short_of_optimum,
+)
+from expdesign.export.report.figures import (
     durations_figure,
     information_figure,
     pareto_figure,
+    primitive_figure,
+    timeline_figure,
     uncertainty_figure,
 )
-from expdesign.export.report.figures.gallery import primitive_figure
-from expdesign.export.report.figures.timeline import timeline_figure
-from expdesign.export.report.growth import growth_rows, growth_sentences
 from expdesign.export.report.parameters import (
     Expected,
     accuracy_table,
     equation_sentence,
     expected,
+    known_rows,
+    known_sentences,
     measures_velocity,
     parameter_rows,
     unknown_current_sentence,
 )
-from expdesign.export.report.procedure import day_sentence, procedure_sentences
-from expdesign.export.report.progress import known_rows, known_sentences
-from expdesign.export.report.trust import chain
 from expdesign.plan.legs import through_water
 from expdesign.plan.values import DayLength, LatticeProof
 from expdesign.sea_area import UNKNOWN_DEPTH
@@ -108,11 +117,11 @@ def report_html(content: ReportContent) -> str:
         runs=primitive_runs(content.plan),
         summary=summary(content),
         facts=facts(content),
-        certificate=criteria.certificate(content),
-        criterion=criteria.criterion_sentence(content),
-        equal_time=criteria.equal_time_sentence(content.design),
-        comparison=criteria.comparison(content),
-        limits=criteria.limit_rows(content),
+        certificate=certificate(content),
+        criterion=criterion_sentence(content),
+        equal_time=equal_time_sentence(content.design),
+        comparison=comparison(content),
+        limits=limit_rows(content),
         assumptions=assumptions(content),
         legend=chart_legend(content),
         agenda=tables.agenda(content),
@@ -121,7 +130,7 @@ def report_html(content: ReportContent) -> str:
         known_rows=known_rows(content.known),
         known_sentences=known_sentences(content.known, content.plan.area.frame),
         noise=measures_velocity(content),
-        chain=chain(content, short_of_optimum=criteria.short_of_optimum(content)),
+        chain=chain(content, short_of_optimum=short_of_optimum(content)),
         conditions=conditions(content),
         checks=checks(content),
         procedure=procedure_sentences(content.plan),
@@ -224,7 +233,7 @@ def _design_sentence(content: ReportContent) -> str:
     text = (
         f"The durations are the best for estimating {words.counted(len(content.parameters), 'model parameter')}. "
         f"Rounded to whole runs they reach {words.percent(design.efficiency_repeats)} of the optimum. "
-        f"{criteria.equal_time_sentence(design)}"
+        f"{equal_time_sentence(design)}"
     )
     if realised is None:
         return text
@@ -271,7 +280,7 @@ def _proof(content: ReportContent) -> Fact:
     day, reached = content.day, words.percent(content.design.efficiency_repeats)
     if day is None or day.most_s is not None or day.bound is None or day.bound.day_s <= 0:
         runs = f"; whole runs reach {reached}" if day is None else ""
-        value = criteria.short_of_optimum(content)
+        value = short_of_optimum(content)
         return Fact(name="Short of the optimum by", value=value, remark=f"at most, proven{runs}")
     share = words.percent(day.bound.day_s / day.plan.commands.duration_s)
     return Fact(

@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.information.primitive_information import PrimitiveInformation
+from expdesign.information.moments import PrimitiveInformation
 from expdesign.plan.values import Leg, Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array

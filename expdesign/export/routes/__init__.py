@@ -2,8 +2,7 @@
 
 from expdesign.export.routes.build import build_bridge_route, build_route
 from expdesign.export.routes.fence import build_fence
-from expdesign.export.routes.planned import PlannedTrack, planned_track, require_verified
-from expdesign.export.routes.read_plan import read_plan
+from expdesign.export.routes.read_plan import PlannedTrack, planned_track, read_plan, require_verified
 from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
 
 __all__ = [

@@ -12,13 +12,20 @@ import numpy as np
 import shapely
 
 from expdesign.errors import InputError, NoPlan
-from expdesign.export.routes.chords import cut_into_chords, merge_standing
-from expdesign.export.routes.corridor import Sides, corridor_in_water, sides_needed, widened
+from expdesign.export.routes.chords import (
+    Passage,
+    Sides,
+    Stop,
+    choose_stops,
+    corridor_in_water,
+    cut_into_chords,
+    merge_standing,
+    sides_needed,
+    widened,
+)
 from expdesign.export.routes.fence import Fence, build_fence, fence_polygon
-from expdesign.export.routes.fit import RouteFit, fit_route
-from expdesign.export.routes.planned import PlannedTrack
-from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, XTD_STEP_M, Route, Waypoint
-from expdesign.export.routes.stops import Passage, Stop, choose_stops
+from expdesign.export.routes.read_plan import PlannedTrack
+from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, XTD_STEP_M, Route, RouteFit, Waypoint, fit_route
 from expdesign.export.tuning import TUNING
 from expdesign.sea_area import as_multipolygon
 from expdesign.values import Array

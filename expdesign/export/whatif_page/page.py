@@ -4,10 +4,110 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import report_style
+from expdesign.export.pages.figures import (
+    LINES,
+    REPOSITION,
+    VERMILION,
+    light_grid,
+    new_figure,
+    page_figure,
+    plain,
+    report_style,
+    round_ticks,
+    svg,
+)
 from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
-from expdesign.export.whatif_page.figures import day_figure, ratio_figure, runs_figure, time_figure
+
+# Figures of variants: time for the same accuracy, standard deviation of each parameter, runs.
+
+
+@page_figure
+def time_figure(content: WhatIfContent) -> str:
+    """Informative time, with the repositioning where planned, and the time for the accuracy of the scenario."""
+    cases = [case for case in content.cases if not case.problem]
+    figure = new_figure(6.4, 1.3 + 0.42 * len(cases))
+    axes = figure.subplots()
+    rows = np.arange(len(cases))
+    axes.barh(rows, [case.informative_s / 60 for case in cases], height=0.55, color=VERMILION, alpha=0.75, label="runs")
+    if content.planned:
+        moving = [float(str(case.plan.get("repositioning_s", 0.0))) / 60 for case in cases]
+        begin = [case.informative_s / 60 for case in cases]
+        axes.barh(rows, moving, left=begin, height=0.55, color=REPOSITION, alpha=0.6, label="repositioning")
+    same_s = [against.same_accuracy_s if (against := content.against(case)) else None for case in cases]
+    same_min = [np.nan if time_s is None else time_s / 60 for time_s in same_s]
+    axes.plot(same_min, rows, "D", color="white", markeredgecolor="black", label="for the same accuracy")
+    axes.set_yticks(rows, [plain(case.name) for case in cases])
+    axes.invert_yaxis()
+    axes.set_xlabel("time [min]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="times", label="Time of each variant, and time for the accuracy of the scenario")
+
+
+@page_figure
+def day_figure(content: WhatIfContent) -> str | None:
+    """Length of the day against the information of its whole track, a point a case; None where no day is known."""
+    known = [(case, against.track) for case in content.cases if (against := content.against(case)) and against.track]
+    if not known:
+        return None
+    figure = new_figure(6.4, 3.6)
+    axes = figure.subplots()
+    for (case, share), colour in zip(known, LINES * 9, strict=False):
+        planned, median, most = (float(str(case.plan[key])) / 60 for key in DAY)
+        axes.plot([planned, most], [share, share], "-", color=colour, linewidth=1.2)
+        axes.plot(median, share, "|", color=colour, markersize=9)
+        axes.plot(planned, share, "o", color=colour, label=plain(case.name))
+    axes.set_xlabel("day [min]")
+    axes.set_ylabel("information / that of the scenario")
+    axes.set_ylim(0.0, 1.08 * max(share for _, share in known))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes)
+    return svg(figure, key="days", label="Length of the day against the information of its whole track, for each case")
+
+
+@page_figure
+def ratio_figure(content: WhatIfContent) -> str | None:
+    """Standard deviations over those of the scenario, for each parameter; None when nothing can be compared."""
+    compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
+    if not compared:
+        return None
+    names = content.cases[0].parameters
+    figure = new_figure(6.4, 1.3 + 0.26 * len(names))
+    axes = figure.subplots()
+    axes.axvline(1.0, color="black", linewidth=1.0, label=plain(content.cases[0].name))
+    for (case, against), colour in zip(compared, LINES * 9, strict=False):
+        rows = [names.index(name) for name in against.common]
+        axes.plot(against.ratios, rows, "o", color=colour, markersize=5, label=plain(case.name))
+    axes.set_yticks(range(len(names)), [plain(name) for name in names])
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    round_ticks(axes)
+    axes.set_xlabel("expected standard deviation / that of the scenario")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="ratios", label="Expected standard deviation of each parameter over that of the scenario")
+
+
+@page_figure
+def runs_figure(content: WhatIfContent) -> str:
+    """Whole runs of each primitive in every case."""
+    cases = [case for case in content.cases if not case.problem]
+    names = list(dict.fromkeys(name for case in cases for name in case.runs))
+    table = np.array([[case.runs.get(name, 0) for name in names] for case in cases])
+    figure = new_figure(6.4, 1.6 + 0.3 * len(names))
+    axes = figure.subplots()
+    axes.imshow(
+        np.where(table > 0, table, np.nan).T, cmap="Blues", vmin=0, vmax=1.6 * max(1, table.max()), aspect="auto"
+    )
+    for (column, row), count in np.ndenumerate(table):
+        axes.text(column, row, str(count) if count else "\N{MIDDLE DOT}", ha="center", va="center", fontsize=9)
+    axes.set_xticks(range(len(cases)), [plain(case.name) for case in cases], rotation=20, ha="right")
+    axes.set_yticks(range(len(names)), [plain(name) for name in names])
+    return svg(figure, key="runs", label="Whole runs of each primitive in every case")
+
 
 DAY_COLUMNS = ("day [min]", "median [min]", "95 % [min]")
 

@@ -16,8 +16,7 @@ from expdesign.monitoring.changes import Change
 from expdesign.monitoring.evidence import STARTS, Grams, stretch_kinds
 from expdesign.monitoring.tuning import TUNING
 from expdesign.monitoring.yaw.estimate import LARGEST_RATE, simulate_yaw
-from expdesign.monitoring.yaw.model import WORDS, YawData, YawModel, term_budget
-from expdesign.monitoring.yaw.recorded import SAMPLES, voyages
+from expdesign.monitoring.yaw.model import SAMPLES, WORDS, YawData, YawModel, term_budget, voyages
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel

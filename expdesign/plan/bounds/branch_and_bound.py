@@ -17,8 +17,7 @@ import scipy
 import shapely
 
 from expdesign.dictionary import Primitive
-from expdesign.plan.bounds.displacement import Displacement, Headway
-from expdesign.plan.bounds.track import SIDES, Track, track_of
+from expdesign.plan.bounds.displacement import SIDES, Displacement, Headway, Track, track_of
 from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import VisibilityGraph, build_visibility_graph, sight_lines, simplified, taut_bends
 from expdesign.sea_area import moved

@@ -1,6 +1,13 @@
 """The chart for the planner: clearance grid, visibility graph, distance to the goal."""
 
-from expdesign.plan.chart.clearance_grid import ClearanceField, clearance_field, narrowest_passage
+from expdesign.plan.chart.clearance_grid import (
+    ClearanceField,
+    clearance_field,
+    connects,
+    narrowest_passage,
+    reachable,
+    resolved,
+)
 from expdesign.plan.chart.goal_distance import (
     GoalDistance,
     build_goal_distance,
@@ -9,7 +16,6 @@ from expdesign.plan.chart.goal_distance import (
     shortest_path_tree,
     taut_bends,
 )
-from expdesign.plan.chart.reachable import connects, reachable, resolved
 from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import (
     Corners,

@@ -6,16 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from expdesign.dictionary.build import drift, trim
+from expdesign.dictionary.trim import drift, trim
 from expdesign.errors import NoPlan
 from expdesign.plan.control.helm_capability import (
     leg_radius_m,
+    side_by_side,
     simulated_acceleration,
+    steady_turns,
     stopping_distance_m,
     why_not_ahead,
 )
 from expdesign.plan.control.ships import AgileShip, Capability, DubinsShip, HelmShip
-from expdesign.plan.control.steady_turns import side_by_side, steady_turns
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import steady_ahead

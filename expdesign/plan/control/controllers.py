@@ -9,6 +9,9 @@ from typing import Protocol
 import numpy as np
 
 from expdesign.conventions import wrap_angle
+from expdesign.plan.control.helm_capability import SteadyTurn
+from expdesign.plan.control.tuning import CONTROL
+from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Allocator, Vessel, required_force
 
@@ -81,3 +84,112 @@ class ForceController:
     @cached_property
     def _allocator(self) -> Allocator:
         return Allocator(self.vessel.actuators, sample_time_s=self.vessel.sample_time_s)
+
+
+# The controller of helm-steered ships: helm and engine orders, for many ships at once.
+
+ORDERS = np.linspace(-1.0, 1.0, 9)
+"""Engine orders compared."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HelmController:
+    """Helm and engine orders for desired courses and speeds.
+
+    Attributes:
+        vessel: with the nominal model.
+        approach: straight ahead at transit speed.
+        turns: steady turns from there.
+        transit_speed_mps: of legs.
+    """
+
+    vessel: Vessel
+    approach: Approach
+    turns: tuple[SteadyTurn, ...]
+    transit_speed_mps: float
+
+    @property
+    def answer_s(self) -> float:
+        """Time of a hull length at transit speed, at least three samples [s]."""
+        return max(self._pace_s, 3.0 * self.vessel.sample_time_s)
+
+    def commands(self, demand: Demand) -> Array:
+        """(n, m) desired actuator values."""
+        speed, course = self._pointed(demand)
+        desired = np.column_stack([speed, course - demand.states[:, 2], demand.reference[:, 5]])
+        angle = self._helm(desired, demand.moving, demand.unexplained)
+        drive = self._drive(desired[:, 0], demand.moving, angle, demand.unexplained[:, 0])
+        return np.asarray(self.approach.helm.rows(drive, angle))
+
+    def _pointed(self, demand: Demand) -> tuple[Array, Array]:
+        """(n,) surge speeds and headings of ships that go where they point.
+
+        Ships that hardly move keep the reference's heading. So do those that are to go astern, as after a crash stop:
+        their helm does not lead them anywhere.
+        """
+        desired, through = demand.reference, demand.through
+        speed = np.hypot(*through.T)
+        moves = speed > 0.05 * self.transit_speed_mps
+        ahead = np.cos(desired[:, 2]) * through[:, 0] + np.sin(desired[:, 2]) * through[:, 1]
+        astern = moves & (demand.reference_through[:, 0] < 0.0)
+        pointing = np.where(moves & ~astern, np.arctan2(through[:, 1], through[:, 0]), desired[:, 2])
+        return np.where(astern, np.minimum(ahead, 0.0), speed), pointing
+
+    @property
+    def _pace_s(self) -> float:
+        """Time of a hull length at transit speed [s]."""
+        return self.vessel.length_m / self.transit_speed_mps
+
+    def _helm(self, desired: Array, moving: Array, unexplained: Array) -> Array:
+        """(n,) helm angles: those of steady turns, and more or less by what is missing in heading and yaw rate."""
+        approach = self.approach
+        quick = CONTROL.course_frequency / self._pace_s
+        turn = np.clip(wrap_angle(desired[:, 1]), -CONTROL.helm_farthest_rad, CONTROL.helm_farthest_rad)
+        damping = 2 * CONTROL.course_damping * quick - self._own_damping
+        missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
+        effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, CONTROL.helm_slowest) ** 2
+        change = np.interp(desired[:, 2], *self._turns) + missing / effect
+        return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
+
+    def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
+        """(n,) engine orders by which the nominal model comes to the desired speed in the time of a hull length."""
+        given = self.approach.helm.rows(ORDERS[:, None], angle)  # (o, n, m)
+        motion = tuple(moving.T)
+        predicted = self.vessel.model.accelerations(motion, motion[:2], tuple(np.moveaxis(given, -1, 0)))[0]
+        gains = np.maximum.accumulate(np.broadcast_to(predicted, given.shape[:2]), axis=0)
+        desired = (speed - moving[:, 0]) / self._pace_s - unexplained
+        above = np.clip((gains < desired).sum(axis=0), 1, len(ORDERS) - 1)
+        ships = np.arange(len(angle))
+        low, high = gains[above - 1, ships], gains[above, ships]
+        share = np.clip((desired - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
+        return np.asarray(ORDERS[above - 1] + share * (ORDERS[above] - ORDERS[above - 1]))
+
+    @cached_property
+    def _hardest(self) -> float:
+        approach = self.approach
+        return float(approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
+
+    @cached_property
+    def _helm_effect(self) -> float:
+        """Yaw acceleration per helm angle on the straight approach [1/s2]."""
+        approach, tilt = self.approach, 1e-3
+        motion = tuple(approach.velocity.tolist())
+        sides = [
+            approach.helm.acceleration(motion, approach.drive, approach.angle_rad + side * approach.starboard * tilt)[2]
+            for side in (1, -1)
+        ]
+        return max(float(sides[0] - sides[1]) / (2 * tilt), 1e-12)
+
+    @cached_property
+    def _own_damping(self) -> float:
+        """What the ship herself damps yaw rates by, sway following [1/s]; negative for course-unstable ones."""
+        rates, angles = self._turns
+        nearest = int(np.abs(rates[rates != 0.0]).argmin())
+        return float(self._helm_effect * angles[rates != 0.0][nearest] / rates[rates != 0.0][nearest])
+
+    @cached_property
+    def _turns(self) -> tuple[Array, Array]:
+        """Yaw rates of steady turns, and changes of helm that hold them."""
+        rows = sorted([(turn.yaw_rate_radps, turn.helm_rad) for turn in self.turns] + [(0.0, 0.0)])
+        rates, angles = np.array(rows).T
+        return rates, angles

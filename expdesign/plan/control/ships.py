@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control.controllers import Controller, ForceController
-from expdesign.plan.control.helm_controller import HelmController
-from expdesign.plan.control.steady_turns import SteadyTurn
+from expdesign.plan.control.controllers import Controller, ForceController, HelmController
+from expdesign.plan.control.helm_capability import SteadyTurn
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Approach
 from expdesign.values import Array

@@ -4,26 +4,166 @@ First the ship recovers from what it was doing. From there the path is a Dubins 
 between straights: one to accelerate, one in which the turn decays and, before a goal, the ship stops. Optimisation
 starts from steady turns along it; on long straights the ship is steady. The last part before a run is the run-up of the
 standard trials: steady speed, helm as it holds the course, engines as the run begins with.
+
+Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
+
+Legs begin with it, and the search for places allows for it: a ship still turns and drifts for some lengths.
+
+The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
+
+There is nothing to optimise about it. The program of a leg of a hundred hull lengths that contains it is large, and
+IPOPT sometimes ends without an answer.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import CONTROL, HelmShip
+from expdesign.plan.control import CONTROL, Capability, HelmShip
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
-from expdesign.plan.legs.recovery import Recovery, recover
-from expdesign.plan.legs.transit import steady_transit
 from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns, through_water
-from expdesign.values import Array
+from expdesign.simulation import to_body
+from expdesign.values import Array, seal
+from expdesign.vessel import NUMPY, within_limits
+
+# Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recovery:
+    """From a state until the ship goes straight.
+
+    Attributes:
+        states: (k + 1, 6) at every sample.
+        commands: (k, m).
+    """
+
+    states: Array
+    commands: Array
+
+    def __post_init__(self) -> None:
+        seal(self, states="n 6", commands="k m")
+
+
+def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recovery:
+    """End the turn of a ship at a state (6,) after commands (h, m); empty where it does not turn."""
+    vessel, approach = water.vessel, ship.approach
+    pace_s, swing = vessel.length_m / ship.transit_speed_mps, ship.transit_speed_mps / ship.turning_radius_m
+    hardest = approach.helm.hardest(approach.drive) - abs(approach.angle_rad)
+    states, rows = [np.asarray(state)], [past[-1]]
+    while (
+        abs(states[-1][5]) > LEGS.recovered_share * swing
+        and len(states) * vessel.sample_time_s < LEGS.recovery_hulls * pace_s
+    ):
+        against = float(np.clip(LEGS.counter_helm * pace_s * states[-1][5], -hardest, hardest))
+        desired = np.array(approach.helm.inputs(approach.drive, approach.angle_rad - approach.starboard * against))
+        row = within_limits(vessel.actuators, desired[None], sample_time_s=vessel.sample_time_s, before=rows[-1])
+        given = past if water.prompt else water.remembered(np.concatenate([past, *(row[None] for row in rows[1:])]))
+        states.append(water.states(states[-1], row, given)[-1])
+        rows.append(row[0])
+    return Recovery(states=np.array(states), commands=np.array(rows[1:]).reshape(-1, len(vessel.limits)))
+
+
+def displaced(recovery: Recovery, ship: Capability, *, sample_time_s: float, hull_m: float) -> Array:
+    """(4,) displacement until the ship can be in any turn: recovery, and a straight while the helm takes effect.
+
+    Distance ahead and to starboard [m], course at its end from the first heading [rad], and time [s].
+    """
+    first, last = recovery.states[0], recovery.states[-1]
+    c, s = math.cos(first[2]), math.sin(first[2])
+    course = last[2] + (math.atan2(last[4], last[3]) if last[3] > 0 else 0.0)
+    north, east = (
+        last[:2] - first[:2] + LEGS.straight_off_hulls * hull_m * np.array([math.cos(course), math.sin(course)])
+    )
+    time_s = len(recovery.commands) * sample_time_s + LEGS.straight_off_hulls * hull_m / ship.transit_speed_mps
+    return np.array([north * c + east * s, east * c - north * s, course - first[2], time_s])
+
+
+# The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Transit:
+    """A steady part of a leg.
+
+    Attributes:
+        to: (i, 3) places and courses of the leg's path before it.
+        states: (k + 1, 6) at every sample.
+        commands: (k, m), all the same.
+        on: (j, 3) places and courses of the path after it; the first is where the ship then is.
+    """
+
+    to: Array
+    states: Array
+    commands: Array
+    on: Array
+
+    def __post_init__(self) -> None:
+        seal(self, to="i 3", states="n 6", commands="k m", on="j 3")
+
+
+def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShip) -> Transit | None:
+    """The longest straight of a path (k, 3), if it is long and the ship keeps its course and speed on it.
+
+    Args:
+        path: places and courses from the leg's start to its end.
+        braking_m: length at its end on which the ship slows down.
+        water, ship: of the leg.
+
+    Returns:
+        None where every straight is short, or wind turns or slows the ship.
+    """
+    hull_m = water.vessel.length_m
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
+    first, last = _longest_straight(along, path[:, 2])
+    gather_m = ship.transit_speed_mps**2 / (2.0 * ship.acceleration_mps2)
+    begin = max(along[first], gather_m) + LEGS.transit_ends_hulls * hull_m
+    end = min(along[last], along[-1] - braking_m) - LEGS.transit_ends_hulls * hull_m
+    if end - begin < LEGS.transit_hulls * hull_m:
+        return None
+    course = float(path[first, 2])
+    place = path[first, :2] + (begin - along[first]) * np.array([np.cos(course), np.sin(course)])
+    start = _steady_state(place, course, water, ship)
+    count = int((end - begin) / (float(np.hypot(*start[3:5])) * water.vessel.sample_time_s))
+    commands = np.tile(ship.approach.inputs, (count, 1))
+    states = water.states(start, commands)
+    scale = np.r_[1.0, [ship.transit_speed_mps] * 2, ship.yaw_rate_radps]
+    if (np.abs(states[-1] - start)[2:] > LEGS.arrival / 10 * scale).any():
+        return None
+    return Transit(
+        to=np.vstack([path[along < begin], [*place, course]]),
+        states=states,
+        commands=commands,
+        on=np.vstack([[*states[-1, :2], course], path[along > end]]),
+    )
+
+
+def _longest_straight(along: Array, course: Array) -> tuple[int, int]:
+    """Indices of the points between which a path keeps its course longest."""
+    bends = np.flatnonzero(np.abs(np.diff(course)) > LEGS.straight_rad)
+    ends = np.r_[bends, len(course) - 1]  # a bend lies between its point and the next
+    begins = np.r_[0, bends + 1]
+    longest = int(np.argmax(along[ends] - along[begins]))
+    return int(begins[longest]), int(ends[longest])
+
+
+def _steady_state(place: Array, course: float, water: LegWater, ship: HelmShip) -> Array:
+    """(6,) the ship at a place (2,) at transit speed through water, heading so that it makes good a course [rad]."""
+    velocity, heading = np.zeros(3), course
+    for _ in range(LEGS.heading_rounds):
+        current = to_body(water.environment.current_to, heading, NUMPY)
+        velocity = ship.approach.velocity + np.array([*current, 0.0])
+        heading = course - float(np.arctan2(velocity[1], velocity[0]))
+    return np.array([*place, heading, *velocity])
 
 
 def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> FoundLeg | None:

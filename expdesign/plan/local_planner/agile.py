@@ -12,14 +12,6 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, leg_end
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, agile_leg, curved_leg
-from expdesign.plan.local_planner.agile_times import (
-    TURNS,
-    LegTimes,
-    leg_times,
-    nearest_direction,
-    transition_losses_s,
-    transitions,
-)
 from expdesign.plan.local_planner.arcs import PathPoints, all_round, between, moved, on_paths, path_points
 from expdesign.plan.local_planner.protocol import (
     Alike,
@@ -30,7 +22,15 @@ from expdesign.plan.local_planner.protocol import (
     Successors,
     TransitionTrials,
 )
-from expdesign.plan.local_planner.transitions import with_transitions
+from expdesign.plan.local_planner.transitions import (
+    TURNS,
+    LegTimes,
+    leg_times,
+    nearest_direction,
+    transition_losses_s,
+    transitions,
+    with_transitions,
+)
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.simulation import CALM

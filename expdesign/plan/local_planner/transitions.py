@@ -3,12 +3,20 @@
 The least length of a leg on which the ship arrives at a run's entry without slowing down or circling depends on the
 motion and the actuators at the end of the run before, for which there is no rule. Each pair of runs is optimised once,
 in open calm water: the leg may end anywhere, and displacement counts as much as at transit speed.
+
+How long legs of agile vessels take, for the search: a rule that optimised legs follow.
+
+Such a vessel moves as if pushed equally in every direction while it turns, so a leg lasts about as long as the longer
+of two: a point that is accelerated from one velocity to the other over the leg's path, along it and across it, and a
+turn on the spot; a little longer where both last equally long. Before and after, actuators need time to get to work
+while the ship goes on as it did.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -17,9 +25,8 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.memory import in_order
 from expdesign.plan.chart import clearance_field
-from expdesign.plan.control import AgileShip
+from expdesign.plan.control import AgileShip, SpeedChanges, to_work_s
 from expdesign.plan.legs import LegTask, LegWater, free_leg
-from expdesign.plan.local_planner.agile_times import LegTimes
 from expdesign.plan.local_planner.protocol import Pair, SearchSpace, TransitionTrials, TriedTransition
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
@@ -27,6 +34,150 @@ from expdesign.plan.values import Placement
 from expdesign.sea_area import as_multipolygon
 from expdesign.simulation import CALM
 from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+# How long legs of agile vessels take, for the search: a rule that optimised legs follow.
+
+LENGTHS = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.2, 1.5, 2.0, 2.7, 3.5, 5.0])
+"""Lengths of transitions between runs, in hull lengths."""
+GOING_ON = np.array([1.0, 1.1, 1.25])
+"""More of them, in how far the ship goes while it settles."""
+TURNS = np.arange(16) * np.pi / 8
+"""Turns in them, and courses from the heading before."""
+COURSES = np.arange(24) * np.pi / 12
+DIRECTIONS = np.arange(12) * np.pi / 6
+"""Directions to go, from the heading before."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegTimes:
+    """What the rule needs.
+
+    Attributes:
+        speed_mps: of long legs.
+        push_mps2: acceleration in every direction.
+        swing_radps: mean yaw rate of turns.
+        settle_s: until actuators have got to work, at both ends together.
+        hull_m: unit of length.
+    """
+
+    speed_mps: float
+    push_mps2: float
+    swing_radps: float
+    settle_s: float
+    hull_m: float
+
+    def step_s(self, step: Array, exit_mps: Array, entry_mps: Array) -> Array:
+        """(...,) time of straight legs through open water [s].
+
+        Args:
+            step: (..., 3) forward m, starboard m and turn rad.
+            exit_mps, entry_mps: speeds ahead, at the beginning and at the end.
+        """
+        turn = step[..., 2]
+        course = np.arctan2(step[..., 1], step[..., 0])
+        return self.seconds(np.hypot(step[..., 0], step[..., 1]), -course, turn - course, turn, exit_mps, entry_mps)
+
+    def seconds(
+        self, length_m: Array, first_rad: Array, last_rad: Array, turn_rad: Array, exit_mps: Array, entry_mps: Array
+    ) -> Array:
+        """(...,) time of legs along a path [s].
+
+        Args:
+            length_m: of the path.
+            first_rad, last_rad: heading at the beginning and at the end, from the path's course there.
+            turn_rad: from the one heading to the other.
+            exit_mps, entry_mps: speeds ahead, at the beginning and at the end.
+        """
+        a, top, wait_s = self.push_mps2, self.speed_mps, self.settle_s / 2
+        begins, ends = ((v * np.cos(x), v * np.sin(x)) for v, x in ((exit_mps, first_rad), (entry_mps, last_rad)))
+        along = _least_s(length_m - wait_s * (begins[0] + ends[0]), begins[0], ends[0], a, top)
+        across = _least_s(-wait_s * (begins[1] + ends[1]), begins[1], ends[1], a, top)
+        turn_s = np.abs(wrap_angle(turn_rad)) / self.swing_radps
+        return np.asarray(
+            (np.maximum(along, across) ** LOCAL.time_power + turn_s**LOCAL.time_power) ** (1 / LOCAL.time_power)
+            + self.settle_s
+        )
+
+
+def leg_times(vessel: Vessel, ship: AgileShip, changes: SpeedChanges) -> LegTimes:
+    """The rule for a vessel."""
+    return LegTimes(
+        speed_mps=ship.transit_speed_mps,
+        push_mps2=LOCAL.acceleration_share * changes.mean_mps2,
+        swing_radps=LOCAL.yaw_rate_share * ship.spot_rate_radps,
+        settle_s=LOCAL.settling_share * to_work_s(vessel),
+        hull_m=vessel.length_m,
+    )
+
+
+def _least_s(distance: Array, first: Array, last: Array, a: float, top: float) -> Array:
+    """Least time of a point over a distance in one dimension from one velocity to another [s]."""
+    sign = np.where(distance >= (first + last) * np.abs(last - first) / (2 * a), 1.0, -1.0)
+    distance, first, last = sign * distance, sign * first, sign * last
+    ends = np.maximum(first, last)
+    peak = np.maximum(np.sqrt(np.maximum(a * distance + (first**2 + last**2) / 2, 0.0)), ends)
+    most = np.maximum(top, ends)
+    cruise = (distance - (most**2 - (first**2 + last**2) / 2) / a) / most
+    return np.asarray((2 * np.minimum(peak, most) - first - last) / a + np.maximum(cruise, 0.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Transitions:
+    """Short legs between two runs in open water, through water, the heading before being zero.
+
+    Attributes:
+        step: (n, 3) forward m, starboard m, turn rad.
+        seconds: (n,) time.
+    """
+
+    step: Array
+    seconds: Array
+
+
+@lru_cache(maxsize=512)
+def transitions(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Transitions:
+    """The best legs between two speeds: for every turn and every direction to go, the one that loses least time.
+
+    Unless they may be `short` they are `Tuning.near_hulls` hull lengths long.
+    """
+    course, length, turn, seconds = _all_transitions(times, exit_mps, entry_mps, short)
+    along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps
+    lost = np.concatenate([seconds - along, seconds[None]]).reshape(len(DIRECTIONS) + 1, len(TURNS), -1)
+    length_of, course_of = np.divmod(lost.argmin(axis=-1), len(COURSES))
+    turn_of = np.arange(len(TURNS))
+    # of equals to port and to starboard both are kept
+    both = [(turn_of, length_of, course_of), (-turn_of % len(TURNS), length_of, -course_of % len(COURSES))]
+    best = np.unique([np.ravel_multi_index((a + 0 * b, b, c), seconds.shape) for a, b, c in both])
+    course, length, turn, seconds = (
+        np.broadcast_to(grid, seconds.shape).ravel()[best] for grid in (course, length, turn, seconds)
+    )
+    return Transitions(step=np.stack([length * np.cos(course), length * np.sin(course), turn], axis=1), seconds=seconds)
+
+
+def _all_transitions(
+    times: LegTimes, exit_mps: float, entry_mps: float, short: bool
+) -> tuple[Array, Array, Array, Array]:
+    going_on_m = times.settle_s * (exit_mps + entry_mps) / 2
+    lengths = np.r_[times.hull_m * LENGTHS, going_on_m * GOING_ON]
+    lengths = lengths[short | (lengths >= LOCAL.near_hulls * times.hull_m)]
+    turn, length, course = np.meshgrid(TURNS, lengths, COURSES, indexing="ij")
+    step = np.stack([length * np.cos(course), length * np.sin(course), turn], axis=-1)
+    seconds = times.step_s(step, np.array(exit_mps), np.array(entry_mps))
+    return course, length, turn, seconds
+
+
+@lru_cache(maxsize=512)
+def transition_losses_s(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Array:
+    """(turns, directions) least time that transitions lose against going on at full speed in a direction [s]."""
+    course, length, _, seconds = _all_transitions(times, exit_mps, entry_mps, short)
+    along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps
+    return np.asarray((seconds - along).reshape(len(DIRECTIONS), len(TURNS), -1).min(axis=-1).T)
+
+
+def nearest_direction(course_rad: float) -> int:
+    """Index in `DIRECTIONS` of the one nearest to a course."""
+    return int(np.abs(wrap_angle(DIRECTIONS - course_rad)).argmin())
 
 
 def pairs_of(placements: Sequence[Placement]) -> list[Pair]:

@@ -10,9 +10,8 @@ import numpy as np
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CONTROL, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
-from expdesign.plan.monte_carlo.go_around import GoAroundPaths
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
-from expdesign.plan.monte_carlo.return_paths import PathFollowers, ReturnPaths, build_return_paths
+from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers, ReturnPaths, build_return_paths
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array

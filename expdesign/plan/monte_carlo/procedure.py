@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.conventions import wrap_angle
-from expdesign.dictionary.build import drift
+from expdesign.dictionary.trim import drift
 from expdesign.plan.control import CONTROL, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO

@@ -17,8 +17,7 @@ from expdesign.conventions import wrap_angle
 from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
-from expdesign.plan.search.local_search import ChainEnds, polished
-from expdesign.plan.search.successors import clear_successors
+from expdesign.plan.search.local_search import ChainEnds, clear_successors, polished
 from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
 from expdesign.processes import in_order

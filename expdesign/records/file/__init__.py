@@ -16,8 +16,7 @@ from expdesign.records.file.names import (
     meaning,
 )
 from expdesign.records.file.ranges import check_ranges
-from expdesign.records.file.table import MISSING, Table, read_table
-from expdesign.records.file.wind import check_wind, relative_wind
+from expdesign.records.file.table import MISSING, Table, check_wind, read_table, relative_wind
 
 __all__ = [
     "COLUMNS",

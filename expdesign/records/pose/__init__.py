@@ -1,7 +1,6 @@
 """Pose and velocity: positions, derived velocities, and whether they agree."""
 
 from expdesign.records.pose.agreement import check_agreement, check_heading
-from expdesign.records.pose.fix import Fix, last_fix
 from expdesign.records.pose.motion import (
     MEASURED,
     SMOOTHED,
@@ -17,7 +16,7 @@ from expdesign.records.pose.motion import (
     smoothed_velocity,
     velocity_origins,
 )
-from expdesign.records.pose.position import LocalMetres, check_jumps, with_continuous_angles, with_metres
+from expdesign.records.pose.position import Fix, LocalMetres, check_jumps, last_fix, with_continuous_angles, with_metres
 
 __all__ = [
     "MEASURED",

@@ -10,9 +10,17 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
-from expdesign.scenario.charts.metres import KM_PER_DEGREE, Box, beside, far_outside, in_metres, off_km, swapped_meets
 from expdesign.scenario.charts.tuning import TUNING
-from expdesign.scenario.charts.zones import OpenChart
+from expdesign.scenario.charts.zones import (
+    KM_PER_DEGREE,
+    Box,
+    OpenChart,
+    beside,
+    far_outside,
+    in_metres,
+    off_km,
+    swapped_meets,
+)
 from expdesign.scenario.tables import Entry, check_table, read_toml, shown
 from expdesign.sea_area import LocalFrame, SeaArea, Zones, build_sea_area
 from expdesign.values import Array
@@ -69,7 +77,7 @@ def _open_chart(file: AreaTable, draught_m: float, given: Box | None, entry: Ent
     if chart.geojson is not None and chart.s57 is not None:
         raise entry.at("s57").error(f"is {shown(chart.s57)} in addition to geojson, expected one chart")
     if chart.s57 is not None:
-        from expdesign.scenario.charts.s57_zones import open_cell  # its reader takes a second to load
+        from expdesign.scenario.charts.s57 import open_cell  # its reader takes a second to load
 
         return open_cell(file, draught_m=draught_m, entry=entry)
     if chart.geojson is None:

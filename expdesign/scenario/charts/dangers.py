@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expdesign.scenario.charts.metres import in_metres
 from expdesign.scenario.charts.tuning import TUNING
+from expdesign.scenario.charts.zones import in_metres
 from expdesign.sea_area import LocalFrame
 
 SOLID = (

@@ -17,20 +17,21 @@ import shapely
 
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
-from expdesign.scenario.charts.chart import Chart, read_layers
 from expdesign.scenario.charts.dangers import ChartedObject, ShipRules, closed_water
-from expdesign.scenario.charts.geojson import UNNAMED, Feature, positions_in, read_features
+from expdesign.scenario.charts.geojson import UNNAMED, Chart, Feature, positions_in, read_features, read_layers
 from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
-from expdesign.scenario.charts.metres import (
+from expdesign.scenario.charts.zones import (
     Box,
+    ChartZones,
+    OpenChart,
     around,
     beside,
     far_outside,
     in_metres,
     off_km,
+    rule_text,
     swapped_meets,
 )
-from expdesign.scenario.charts.zones import ChartZones, OpenChart, rule_text
 from expdesign.scenario.tables import LARGEST, Entry, offer, shown
 from expdesign.sea_area import LocalFrame
 

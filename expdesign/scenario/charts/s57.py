@@ -5,13 +5,17 @@ update number that the cell then states; a gap in the chain of updates is refuse
 
 Source: International Hydrographic Organization, S-57 edition 3.1 (2000), appendix A (object catalogue) and B.1 (ENC
 product specification).
+
+Allowed water of an S-57 cell: deep enough, clear of solid objects, dangers and restricted areas.
+
+Unknown depths count as too shallow.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +24,24 @@ import pyogrio
 import shapely
 from pyogrio.errors import DataSourceError
 
+from expdesign.errors import NoPlan
 from expdesign.input_files import check_ends
-from expdesign.scenario.charts.dangers import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
+from expdesign.scenario.charts.area_tables import AreaTable
+from expdesign.scenario.charts.dangers import (
+    BUOYS,
+    CLEARANCES,
+    DANGERS,
+    OVERHEAD,
+    SOLID,
+    UNSURVEYED,
+    ChartedObject,
+    ShipRules,
+    closed_water,
+    united,
+)
+from expdesign.scenario.charts.zones import Box, ChartZones, OpenChart, around, rule_text
 from expdesign.scenario.tables import Entry
+from expdesign.sea_area import LocalFrame
 
 OPTIONS = {"UPDATES": "APPLY", "SPLIT_MULTIPOINT": "YES", "ADD_SOUNDG_DEPTH": "YES"}
 DEPTHS = ("DEPARE", "DRGARE")
@@ -176,3 +195,54 @@ def _notes(header: dict[str, Any], updates: int, entry: Entry) -> tuple[str, ...
 
 def _counted(repaired: list[str]) -> tuple[str, ...]:
     return (f"{len(repaired)} outlines that touch or cross themselves taken apart",) if repaired else ()
+
+
+# Allowed water of an S-57 cell: deep enough, clear of solid objects, dangers and restricted areas.
+
+GEOJSON_ONLY = (
+    *("outlines", "land_layers", "water_layers", "layer_property", "depth_layers", "depth_property", "depth_positive"),
+    *("skip_features", "danger_layers"),
+)
+
+
+def open_cell(file: AreaTable, *, draught_m: float, entry: Entry) -> OpenChart:
+    """The cell that an area file names with `chart.s57`."""
+    for name in [name for name in GEOJSON_ONLY if name in file.chart.model_fields_set]:
+        raise entry.at(name).error("is given with s57, expected it with geojson only: a cell has its own layers")
+    path = entry.at("s57").file(file.chart.s57 or "")
+    cell = read_cell(path)
+    needed_m, required = rule_text(file.depth, draught_m)
+    rules = ShipRules(needed_m=needed_m, margin_m=file.chart.hazard_margin_m, air_draught_m=file.chart.air_draught_m)
+
+    def zones(box: Box, frame: LocalFrame) -> ChartZones:
+        found = cell_zones(cell, rules, box, frame)
+        if found.deep is None or found.deep.is_empty:
+            deepest = max((depth for depth, _ in found.depths), default=float("nan"))
+            raise NoPlan(
+                str(entry.at("s57").error(f"no charted depth reaches {required}, the deepest is {deepest:g} m"))
+            )
+        return replace(
+            found,
+            depth_rule=f"Allowed water lies in charted areas at least {needed_m:g} m deep: {required}.",
+            notes=tuple(f"{path.name}: {note}" for note in (*cell.notes, *found.notes)),
+        )
+
+    return OpenChart(path=path, extent=cell.extent, zones=zones)
+
+
+def cell_zones(cell: Cell, rules: ShipRules, box: Box, frame: LocalFrame) -> ChartZones:
+    """The zones of a cell inside bounds."""
+    window = around(box)
+    areas = [feature for feature in cell.of(*DEPTHS) if feature.geometry.intersects(window)]
+    found = closed_water(cell.features, rules, window, frame)
+    return ChartZones(
+        depth_rule="",
+        land=found.solid,
+        deep=united([area for area in areas if area.depth_m >= rules.needed_m], window, frame),
+        closed=found.closed,
+        depths=tuple(
+            (depth, united([area for area in areas if area.depth_m == depth], window, frame))
+            for depth in sorted({area.depth_m for area in areas if not np.isnan(area.depth_m)})
+        ),
+        notes=found.notes,
+    )

@@ -1,6 +1,6 @@
 """Vessel files, and the weather that vessel and scenario files state."""
 
-from expdesign.scenario.vessels.environment_table import EnvironmentTable, build_environment
 from expdesign.scenario.vessels.vessel_file import load_vessel
+from expdesign.scenario.vessels.vessel_tables import EnvironmentTable, build_environment
 
 __all__ = ["EnvironmentTable", "build_environment", "load_vessel"]

@@ -12,7 +12,6 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.scenario.tables import Entry, check_table, offer, read_toml, shown
-from expdesign.scenario.vessels.environment_table import build_environment
 from expdesign.scenario.vessels.pendulum_table import build_pendulum, check_names, checked_correlation
 from expdesign.scenario.vessels.vessel_tables import (
     ACTUATOR_TABLES,
@@ -23,6 +22,7 @@ from expdesign.scenario.vessels.vessel_tables import (
     SensorsTable,
     TermTable,
     VesselTable,
+    build_environment,
 )
 from expdesign.vessel import (
     CALM,

@@ -33,8 +33,7 @@ from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.measured import doubted, measured
 from expdesign.workflows.steps.workers import workers
 

@@ -32,8 +32,7 @@ from expdesign.export import (
 from expdesign.export.estimate_page import EstimateContent, estimate_html, estimate_notes
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.outcome import Outcome, TextTable, command_text, note_on_roll
 from expdesign.workflows.steps.measured import doubted, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 

@@ -23,8 +23,7 @@ from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.measured import measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")

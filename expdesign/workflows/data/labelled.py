@@ -133,8 +133,8 @@ def labelled_design(
 def _nominal(pieces: Record, model: VesselModel, parameters: Sequence[str], predictor: str) -> VesselModel:
     if model.parameters.any():
         return model
+    from expdesign.estimation.instrumental import Settings
     from expdesign.estimation.methods import METHODS
-    from expdesign.estimation.settings import Settings
 
     (method,) = (item.name for item in METHODS if item.predictor == predictor and item.solver == "ls")
     fixed = tuple(name for name in model.names if name not in parameters)

@@ -22,7 +22,6 @@ from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.command_text import command_text
 from expdesign.workflows.data.labelled import (
     Asked,
     labelled_design,
@@ -31,7 +30,7 @@ from expdesign.workflows.data.labelled import (
     labelled_tables,
     piece_of,
 )
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 
 

@@ -40,9 +40,7 @@ from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
 from expdesign.scenario import load_vessel
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.data.prepared import Asked, Read, prepared
-from expdesign.workflows.data.watched_ship import VESSEL, check_model
+from expdesign.workflows.data.watched_ship import VESSEL, Asked, Read, check_model, prepared
 from expdesign.workflows.data.watching import (
     HOUR,
     Learning,
@@ -57,7 +55,7 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.workers import workers
 
 

@@ -1,4 +1,4 @@
-"""`expdesign export`: route files of a plan made before."""
+"""`expdesign export` and `expdesign check-route`: route files of a plan, and checks of route files of any origin."""
 
 from __future__ import annotations
 
@@ -8,18 +8,14 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from expdesign.errors import InputError
-from expdesign.export import (
-    FORMATS,
-    build_bridge_route,
-    build_route,
-    find_format,
-    route_files,
-    write_files,
-)
+from expdesign.errors import FileError, InputError
+from expdesign.export import FORMATS, build_bridge_route, build_route, find_format, route_files, write_files
+from expdesign.export.formats.check import check_route_file
 from expdesign.export.routes import ROUTE_NAME, read_plan
 from expdesign.progress import Progress, silent
 from expdesign.workflows.outcome import Outcome
+
+# `expdesign export`: route files of a plan made before.
 
 
 def export(
@@ -76,3 +72,21 @@ def _departure(text: str | None) -> datetime | None:
         return datetime.fromisoformat(text)
     except ValueError:
         raise InputError(f"--departure is {text!r}, expected a time such as 2026-05-01T08:00:00Z") from None
+
+
+# `expdesign check-route`: route files of any origin checked.
+
+
+def check_routes(files: Sequence[Path], *, progress: Progress = silent) -> Outcome:
+    """Whether RTZ and GPX files are fit to be loaded.
+
+    Raises:
+        FileError: the first problem of the first file that has one, and how many more there are.
+    """
+    for number, path in enumerate(files):
+        progress(f"checking {path.name}", number / len(files))
+        problems = check_route_file(path)
+        if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            raise FileError(path, "", problems[0] + more)
+    return Outcome(files=(), summary={"files": len(files), "problems": 0})

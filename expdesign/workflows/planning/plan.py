@@ -7,13 +7,12 @@ from pathlib import Path
 from expdesign.durations import with_repeats
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import check_plannable, plan_files, plan_summary, planned
+from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
 
 

@@ -29,13 +29,11 @@ from expdesign.plan.values import Plan
 from expdesign.progress import Progress, ending, silent, within
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.planned import check_plannable, planned
+from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
 from expdesign.workflows.steps.scored import scored
-from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
 from expdesign.workflows.steps.workers import load_planner, workers
 
 Files = dict[str, Content]

@@ -7,14 +7,19 @@ from pathlib import Path
 
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import growth_summary, ready
-from expdesign.workflows.steps.planned import check_plannable, plan_summary
-from expdesign.workflows.steps.trial_files import built_route, check_no_trial, report_content, trial_files
+from expdesign.workflows.steps.planned import (
+    built_route,
+    check_no_trial,
+    check_plannable,
+    plan_summary,
+    report_content,
+    trial_files,
+)
+from expdesign.workflows.steps.scored import growth_summary, ready
 from expdesign.workflows.steps.workers import workers
 
 WORK = (0.05, 0.08, 0.02, 0.68, 0.17)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from expdesign.dictionary.desired import deviating
+from expdesign.dictionary.build import deviating
 from expdesign.progress import Progress, silent, within
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written

@@ -26,12 +26,11 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.day import planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
 from expdesign.workflows.steps.planned import plan_summary
+from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import load_plans, workers
 
 WHOLE_RUNS = "repeats"

@@ -26,11 +26,9 @@ from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.vessel import VesselModel
 from expdesign.workflows.outcome import TextTable
-from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.design_tables import design_summary
-from expdesign.workflows.steps.grown import STEM
+from expdesign.workflows.steps.design_problem import design_summary, designed
 from expdesign.workflows.steps.planned import plan_problem, planned
-from expdesign.workflows.steps.scored import scored
+from expdesign.workflows.steps.scored import STEM, scored
 
 FEW_CANDIDATES = 64
 """Candidates of every family at first, where [design.grow] does not say how many; each round's prices lead to better

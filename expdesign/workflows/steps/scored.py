@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.durations import bordered, pool_gains
-from expdesign.export import (
-    dictionary_json,
-)
+from expdesign.export import dictionary_json
+from expdesign.export.files import dictionary_files, growth_json
+from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.memory import recalled
-from expdesign.progress import Progress, silent
+from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.vessel import Environment, Vessel
 from expdesign.workflows.outcome import TextTable
@@ -86,3 +87,123 @@ def ranking(case: Scenario, information: Sequence[PrimitiveInformation]) -> Text
 def parameters_of(case: Scenario) -> tuple[str, ...]:
     """Parameters that a scenario estimates, in order."""
     return estimated_parameters(case.vessel.model, case.design.fixed_parameters)
+
+
+# The grown dictionary of a scenario, its files and its tables.
+
+STEM = "dictionary-grown"
+
+
+def grown(
+    case: Scenario,
+    information: Sequence[PrimitiveInformation],
+    *,
+    always: bool = False,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Growth | None:
+    """The scored dictionary with additions as the scenario sets; None without [design.grow], and for a stated accuracy.
+
+    The search for the shortest day looks for additions by itself, for what they save.
+
+    Args:
+        case: the scenario; its key design.grow says how.
+        information: of its dictionary.
+        always: grow it by the usual settings also without that key.
+        seed: of all chance, unless the key has its own.
+        progress: of the search.
+    """
+    for_durations = None if case.design.accuracy else case.design.grow
+    settings = for_durations or ((case.design.grow or GrowSettings()) if always else None)
+    if settings is None:
+        return None
+    return grow_dictionary(
+        case.vessel,
+        information,
+        settings=settings if settings.seed is not None else replace(settings, seed=seed),
+        environment=case.environment,
+        fixed_parameters=case.design.fixed_parameters,
+        mean_subtraction=case.design.mean_subtraction,
+        progress=progress,
+    )
+
+
+def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes]:
+    """The grown dictionary as a file for every command, and the additions."""
+    if growth is None:
+        return {}
+    comments = (
+        f"The dictionary of scenario {case.name!r} and {len(growth.rounds)} manoeuvres added to it.",
+        f"They were found for vessel {case.vessel.name!r}.",
+    )
+    specs = [*case.dictionary, *growth.specs]
+    return {
+        **dictionary_files(specs, name=f"{case.name}-grown", stem=STEM, comments=comments),
+        "growth.json": growth_json(growth),
+    }
+
+
+def growth_note(case: Scenario) -> dict[str, object]:
+    """Settings of [design] that the search for additions ignores, if any."""
+    settings = case.design
+    limits = {
+        f"criterion {settings.criterion}": settings.criterion != "D",
+        f"predictor {settings.predictor}": settings.predictor != "model",
+        f"robust {settings.robust}": settings.robust != "nominal",
+        "prior": settings.prior != "none" or bool(settings.prior_data),
+        "times": bool(settings.least_s or settings.most_s or settings.required or settings.excluded),
+        "budgets": bool(settings.budgets),
+        "balance": bool(settings.balance),
+        "reveal": bool(settings.reveal or settings.tell_apart),
+    }
+    asked = [name for name, is_asked in limits.items() if is_asked]
+    if not asked:
+        return {}
+    return {
+        "note_on_additions": "optimal for criterion D of the nominal model alone; only the durations account for "
+        f"{', '.join(asked)} of [design]"
+    }
+
+
+def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[str, object]:
+    """Key numbers, and with the scenario the settings that the search ignored."""
+    if growth is None:
+        return {}
+    note = {} if case is None else growth_note(case)
+    return {
+        **note,
+        "manoeuvres_added": len(growth.rounds),
+        "efficiency_of_grown_dictionary": growth.rounds[-1].efficiency if growth.rounds else 1.0,
+        "candidates_looked_at": growth.evaluated,
+        "efficiency_at_least_among_candidates": growth.efficiency_left,
+    }
+
+
+def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
+    """Gain of each addition."""
+    if growth is None:
+        return ()
+    rows = tuple(
+        (
+            str(number),
+            row.name,
+            f"{row.sensitivity:.2f}",
+            f"{row.log_det_gain:+.3f}",
+            f"{row.efficiency:.3f}",
+            "yes" if row.excitation_condition else "no",
+            " ".join(f"{key} {value:.4g}" for key, value in row.settings.items()),
+        )
+        for number, row in enumerate(growth.rounds, start=1)
+    )
+    header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
+    title = f"Manoeuvres added; one improves the design if its d is above {growth.dimension}"
+    return (TextTable(title=title, header=header, rows=rows),) if rows else ()
+
+
+def ready(
+    case: Scenario, *, grow: bool = False, seed: int, progress: Progress = silent
+) -> tuple[tuple[PrimitiveInformation, ...], Growth | None]:
+    """The scored dictionary, grown if the scenario or the command says so."""
+    information = scored(case, progress=within(progress, 0.0, 0.2 if grow or case.design.grow else 1.0))
+    growth = grown(case, information, always=grow, seed=seed, progress=within(progress, 0.2, 1.0))
+    return (information if growth is None else growth.information), growth

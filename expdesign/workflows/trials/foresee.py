@@ -30,11 +30,10 @@ from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
 
 OF_DESIGN = "the runs of the design, without the legs between them"

@@ -24,16 +24,14 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import growth_summary, ready
 from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
-from expdesign.workflows.steps.planned import plan_summary
+from expdesign.workflows.steps.planned import built_route, plan_summary, report_content, trial_files
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
-from expdesign.workflows.steps.trial_files import built_route, report_content, trial_files
+from expdesign.workflows.steps.scored import growth_summary, ready
 from expdesign.workflows.steps.workers import workers
 
 VESSEL_FILE = "vessel-used.toml"

@@ -20,10 +20,9 @@ from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.command_text import command_text
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.grown import ready
+from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
 
 OPTIMISED, EQUAL = "optimised", "equal shares"

@@ -18,11 +18,10 @@ import scipy
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import fit
-from expdesign.diagnosis.model.term_library import term_library
+from expdesign.diagnosis.model.terms import term_library
 from expdesign.diagnosis.motion import fitted_start, stable_windows
 from expdesign.diagnosis.motion.simulation import simulate_from_measured
-from expdesign.diagnosis.vessel_file.reading import extended_model
-from expdesign.diagnosis.vessel_file.result_names import public_name
+from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
 from expdesign.signals import Batch, Record
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from expdesign.assessment.runs import TEST, check_run
+from expdesign.assessment.misfit import TEST, check_run
 from expdesign.errors import NoAnswer
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.settings import Settings
 from expdesign.processes import in_order
 from expdesign.signals import Batch, Record
 from expdesign.simulation import Ensemble, Environment, simulate_ensemble

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import NoAnswer
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.values import Estimate
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent

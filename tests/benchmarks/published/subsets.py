@@ -25,12 +25,12 @@ import numpy as np
 from scipy.stats import binomtest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from expdesign.assessment.runs import TEST, check_run
+from expdesign.assessment.misfit import TEST, check_run
 from expdesign.errors import NoAnswer
+from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
 from expdesign.estimation.regression import PREDICTORS
 from expdesign.estimation.replay import Integration
-from expdesign.estimation.settings import Settings
 from expdesign.estimation.solve import Weighting
 from expdesign.processes import in_order
 from expdesign.records import load_records

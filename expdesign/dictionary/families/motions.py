@@ -1,0 +1,359 @@
+"""Families that state a motion; commands follow from the inverse model.
+
+Multisine: surge, sway and yaw rate each swing with several frequencies at once.
+
+Phases follow Schroeder's rule, so that the sum of equal sines stays low; each of the three velocities has its own
+frequencies, so that they are uncorrelated over a whole period.
+
+Source: M. R. Schroeder, Synthesis of low-peak-factor signals, IEEE Trans. Inf. Theory 16 (1970), 85-89.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting
+from expdesign.dictionary.tuning import TUNING
+from expdesign.errors import InputError
+from expdesign.values import Array
+
+# Smooth shapes of reference motions: without jumps, because actuators have rate limits.
+
+RAMP_FRACTION = Setting(
+    name="ramp_fraction",
+    meaning="share of the run that the change takes",
+    default=0.7,
+    low=0.01,
+    high=1,
+    searched="share",
+)
+
+
+def ramp(time_s: Array, *, start_s: float = 0.0, length_s: float) -> Array:
+    """Half a cosine from 0 to 1 over `length_s`, flat outside."""
+    x = np.clip((time_s - start_s) / max(length_s, 1e-12), 0.0, 1.0)
+    return np.asarray((1.0 - np.cos(np.pi * x)) / 2.0)
+
+
+def envelope(time_s: Array, *, length_s: float) -> Array:
+    """1, brought in from zero at the start and taken back to zero at the end over `length_s`."""
+    return ramp(time_s, length_s=length_s) * ramp(float(time_s[-1]) - time_s, length_s=length_s)
+
+
+def flat_wave(time_s: Array, *, period_s: float) -> Array:
+    """A rounded square wave of amplitude 1 that begins and ends at zero and has zero mean.
+
+    It starts in the middle of a plateau, so that its integral (heading, sideways distance) swings evenly to both sides
+    and returns.
+
+    Raises:
+        InputError: the samples hold no swing of that period.
+    """
+    sharpness = 3.0
+    wave = np.tanh(sharpness * np.cos(2.0 * np.pi * time_s / period_s)) / np.tanh(sharpness)
+    fade = envelope(time_s, length_s=period_s / 12)
+    weights = np.r_[0.5, np.ones(len(time_s) - 2), 0.5]
+    centred = fade * (wave - weights @ (fade * wave) / max(weights @ fade, 1e-300))
+    if not (centred.max() > TUNING.least_swing and centred.min() < -TUNING.least_swing):
+        raise InputError(
+            f"period_s is {period_s:g}, expected a full swing within duration_s = {time_s[-1]:g} and several samples "
+            f"of {time_s[1]:g} s within a swing"
+        )
+    return np.asarray(centred / np.abs(centred).max())
+
+
+def speed_change(time_s: Array, *, first: float, last: float, share: float) -> Array:
+    """(k, 3) u, v, r of a straight run whose surge speed changes over a share of it and then stays."""
+    surge = first + (last - first) * ramp(time_s, length_s=share * float(time_s[-1]))
+    return np.stack([surge, 0 * surge, 0 * surge], axis=1)
+
+
+# Acceleration on a straight course.
+
+
+def _reference_acceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+    first, last = settings["from_speed_mps"], settings["speed_mps"]
+    return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
+
+
+ACCELERATION = Family(
+    name="acceleration",
+    summary="from a lower to a higher surge speed on a straight course",
+    settings=(
+        DURATION,
+        Setting(name="speed_mps", meaning="surge speed reached", low=-50, high=50, searched="surge"),
+        Setting(
+            name="from_speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50, searched="surge"
+        ),
+        RAMP_FRACTION,
+    ),
+    reference=_reference_acceleration,
+)
+
+
+# Deceleration on a straight course.
+
+
+def _reference_deceleration(settings: Mapping[str, float], time_s: Array) -> Array:
+    first, last = settings["speed_mps"], settings["to_speed_mps"]
+    return speed_change(time_s, first=first, last=last, share=settings["ramp_fraction"])
+
+
+DECELERATION = Family(
+    name="deceleration",
+    summary="from a surge speed down to a lower one, or to rest, on a straight course",
+    settings=(
+        DURATION,
+        Setting(name="speed_mps", meaning="surge speed at the start", low=-50, high=50, searched="surge"),
+        Setting(name="to_speed_mps", meaning="surge speed reached", default=0.0, low=-50, high=50, searched="surge"),
+        RAMP_FRACTION,
+    ),
+    reference=_reference_deceleration,
+)
+
+
+# Inward spiral: a turn that tightens steadily.
+
+
+def _reference_inward_spiral(settings: Mapping[str, float], time_s: Array) -> Array:
+    surge = np.full_like(time_s, settings["speed_mps"])
+    sway = settings["sway_mps"] * ramp(time_s, length_s=settings["entry_s"])
+    return np.stack([surge, sway, settings["yaw_rate_radps"] * time_s / float(time_s[-1])], axis=1)
+
+
+INWARD_SPIRAL = Family(
+    name="inward_spiral",
+    summary="steady surge and sway while the yaw rate grows from zero, so the turn tightens",
+    settings=(
+        DURATION,
+        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
+        Setting(
+            name="yaw_rate_radps", meaning="yaw rate at the end, positive to starboard", low=-5, high=5, searched="yaw"
+        ),
+        Setting(
+            name="sway_mps", meaning="sway speed, positive to starboard", default=0.0, low=-20, high=20, searched="sway"
+        ),
+        Setting(
+            name="entry_s", meaning="time in which the sway builds up", default=3.0, low=0, high=1e4, searched="time"
+        ),
+    ),
+    reference=_reference_inward_spiral,
+)
+
+
+# Multisine: surge, sway and yaw rate each swing with several frequencies at once.
+
+
+def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
+    """Largest modulus 1, harmonics first, first + 3, ... of a period."""
+    place = np.arange(TUNING.tones)
+    phase = -np.pi * place * (place + 1) / TUNING.tones
+    angles = 2 * np.pi * (first + 3 * place)[:, None] * time_s / period_s + phase[:, None]
+    wave = np.sin(angles).sum(axis=0) * envelope(time_s, length_s=period_s / 12)
+    return np.asarray(wave / max(float(np.abs(wave).max()), 1e-12))
+
+
+def _reference_multisine(settings: Mapping[str, float], time_s: Array) -> Array:
+    swing, side, turn = (_sum_of_sines(time_s, period_s=settings["period_s"], first=first) for first in (1, 2, 3))
+    surge = settings["speed_mps"] + settings["speed_swing_mps"] * swing
+    return np.stack([surge, settings["sway_mps"] * side, settings["yaw_rate_radps"] * turn], axis=1)
+
+
+MULTISINE = Family(
+    name="multisine",
+    summary="multisines in surge speed, sway speed and yaw rate, with four different frequencies each",
+    settings=(
+        WHOLE_PERIODS,
+        Setting(name="period_s", meaning="common period of all sines", low=1e-2, high=1e5, searched="time"),
+        Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
+        Setting(
+            name="speed_swing_mps",
+            meaning="amplitude of surge speed",
+            default=0.0,
+            low=0,
+            high=50,
+            searched="surge",
+        ),
+        Setting(name="sway_mps", meaning="largest sway speed", default=0.0, low=-20, high=20, searched="sway"),
+        Setting(name="yaw_rate_radps", meaning="largest yaw rate", default=0.0, low=-5, high=5, searched="yaw"),
+    ),
+    reference=_reference_multisine,
+)
+
+
+# Sway step: sideways motion that starts, stays and ends, on a steady heading.
+
+
+def _reference_sway_step(settings: Mapping[str, float], time_s: Array) -> Array:
+    rise_s, held_s = settings["rise_s"], settings["held_fraction"] * float(time_s[-1])
+    sway = settings["sway_mps"] * (ramp(time_s, length_s=rise_s) - ramp(time_s, start_s=held_s, length_s=rise_s))
+    return np.stack([np.full_like(time_s, settings["speed_mps"]), sway, 0 * sway], axis=1)
+
+
+SWAY_STEP = Family(
+    name="sway_step",
+    summary="a step of sway speed on a steady heading, and back",
+    settings=(
+        DURATION,
+        Setting(name="sway_mps", meaning="sway speed, positive to starboard", low=-20, high=20, searched="sway"),
+        Setting(name="rise_s", meaning="time that a step takes", low=1e-2, high=1e4, searched="time"),
+        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
+        Setting(
+            name="held_fraction",
+            meaning="share of the run after which the sway returns to zero",
+            default=0.6,
+            low=0.05,
+            high=1,
+            searched="share",
+        ),
+    ),
+    reference=_reference_sway_step,
+)
+
+
+# Sway zig-zag: sideways motion to one side and the other on a steady heading.
+
+
+def _reference_sway_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+    wave = flat_wave(time_s, period_s=settings["period_s"])
+    surge = np.full_like(time_s, settings["speed_mps"])
+    return np.stack([surge, settings["sway_mps"] * wave, 0 * wave], axis=1)
+
+
+SWAY_ZIGZAG = Family(
+    name="sway_zigzag",
+    summary="alternating sideways motion on a steady heading, with or without headway",
+    settings=(
+        WHOLE_PERIODS,
+        Setting(
+            name="sway_mps",
+            meaning="largest sway speed; the first push is to starboard",
+            low=-20,
+            high=20,
+            searched="sway",
+        ),
+        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
+        Setting(name="speed_mps", meaning="surge speed", default=0.0, low=-50, high=50, searched="surge"),
+    ),
+    reference=_reference_sway_zigzag,
+)
+
+
+# Random telegraph: surge, sway and yaw rate switch between two levels each, independently.
+
+
+def _switching(rng: np.random.Generator, time_s: Array, *, hold_s: float, rise_s: float) -> Array:
+    """A +-1 signal that changes sign after exponential times of mean `hold_s`, smoothed over `rise_s`."""
+    end_s = float(time_s[-1])
+    flips = np.cumsum(rng.exponential(hold_s, size=max(8, int(8 * end_s / hold_s))))
+    flips = flips[flips < end_s + 10 * rise_s]  # later ones are not seen
+    sign = 2.0 * rng.integers(0, 2) - 1.0
+    level = sum((np.tanh(2.0 * (time_s - flip) / rise_s) + 1.0) * (-1.0) ** n for n, flip in enumerate(flips))
+    return np.asarray(sign * (1.0 - level))
+
+
+def _reference_telegraph(settings: Mapping[str, float], time_s: Array) -> Array:
+    rng = np.random.default_rng(int(settings["draw"]))
+    hold_s, rise_s = settings["hold_s"], settings["rise_s"]
+    swing, sway, yaw = (_switching(rng, time_s, hold_s=hold_s, rise_s=rise_s) for _ in range(3))
+    fade = envelope(time_s, length_s=rise_s)
+    surge = settings["speed_mps"] + settings["speed_swing_mps"] * fade * swing
+    side = fade * (settings["sway_offset_mps"] + settings["sway_mps"] * sway)
+    turn = fade * (settings["yaw_offset_radps"] + settings["yaw_rate_radps"] * yaw)
+    return np.stack([surge, side, turn], axis=1)
+
+
+TELEGRAPH = Family(
+    name="telegraph",
+    summary="random switching of surge speed, sway speed and yaw rate between two levels each",
+    settings=(
+        DURATION,
+        Setting(name="speed_mps", meaning="mean surge speed", low=-50, high=50, searched="surge"),
+        Setting(
+            name="speed_swing_mps",
+            meaning="amplitude of surge speed",
+            low=0,
+            high=50,
+            searched="surge",
+        ),
+        Setting(name="sway_mps", meaning="sway speed to both sides", low=0, high=20, searched="sway"),
+        Setting(name="yaw_rate_radps", meaning="yaw rate to both sides", low=0, high=5, searched="yaw"),
+        Setting(name="hold_s", meaning="mean time between switches", low=1e-2, high=1e5, searched="time"),
+        Setting(name="rise_s", meaning="time that a switch takes", low=1e-2, high=1e4, searched="time"),
+        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
+        Setting(
+            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
+        ),
+        Setting(
+            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
+        ),
+    ),
+    reference=_reference_telegraph,
+)
+
+
+# Turning circle: a steady turn at a steady surge speed.
+
+
+def _reference_turning_circle(settings: Mapping[str, float], time_s: Array) -> Array:
+    entered = ramp(time_s, length_s=settings["entry_s"])
+    surge = settings["speed_mps"] + (settings["turn_speed_mps"] - settings["speed_mps"]) * entered
+    return np.stack([surge, -settings["sway_mps"] * entered, settings["yaw_rate_radps"] * entered], axis=1)
+
+
+TURNING_CIRCLE = Family(
+    name="turning_circle",
+    summary="a turn to one side from a straight approach to a steady yaw rate, drifting outwards",
+    settings=(
+        DURATION,
+        Setting(name="speed_mps", meaning="approach speed", low=-50, high=50, searched="surge"),
+        Setting(name="turn_speed_mps", meaning="surge speed in the turn", low=-50, high=50, searched="surge"),
+        Setting(
+            name="yaw_rate_radps", meaning="yaw rate in the turn, positive to starboard", low=-5, high=5, searched="yaw"
+        ),
+        Setting(name="entry_s", meaning="time from straight to steady turn", low=0, high=1e4, searched="time"),
+        Setting(
+            name="sway_mps", meaning="outward sway, positive to port", default=0.0, low=-20, high=20, searched="sway"
+        ),
+    ),
+    reference=_reference_turning_circle,
+)
+
+
+# Zig-zag: yaw rate to one side and the other at a steady surge speed.
+
+
+def _reference_zigzag(settings: Mapping[str, float], time_s: Array) -> Array:
+    wave = flat_wave(time_s, period_s=settings["period_s"])
+    surge = np.full_like(time_s, settings["speed_mps"])
+    offset = envelope(time_s, length_s=settings["period_s"] / 4)
+    sway = settings["sway_offset_mps"] * offset - settings["sway_mps"] * wave
+    return np.stack([surge, sway, settings["yaw_offset_radps"] * offset + settings["yaw_rate_radps"] * wave], axis=1)
+
+
+ZIGZAG = Family(
+    name="zigzag",
+    summary="alternating turns at a steady surge speed, drifting outwards; without offsets the heading returns",
+    settings=(
+        WHOLE_PERIODS,
+        Setting(name="speed_mps", meaning="surge speed", low=-50, high=50, searched="surge"),
+        Setting(
+            name="yaw_rate_radps",
+            meaning="largest yaw rate; the first turn is to starboard",
+            low=-5,
+            high=5,
+            searched="yaw",
+        ),
+        Setting(name="period_s", meaning="time of one full swing", low=1e-2, high=1e5, searched="time"),
+        Setting(name="sway_mps", meaning="largest outward sway speed", default=0.0, low=-20, high=20, searched="sway"),
+        Setting(
+            name="sway_offset_mps", meaning="steady sway added to it", default=0.0, low=-20, high=20, searched="sway"
+        ),
+        Setting(
+            name="yaw_offset_radps", meaning="steady yaw rate added to it", default=0.0, low=-5, high=5, searched="yaw"
+        ),
+    ),
+    reference=_reference_zigzag,
+)

@@ -1,0 +1,315 @@
+"""Families that state helm and engine orders.
+
+Dieudonne (direct) spiral: the helm goes through steps from one side to the other and back.
+
+Source: ITTC Recommended Procedure 7.5-04-02-01 (2017); J. Dieudonne, Collected French papers on the stability of route
+of ships at sea, 1949-1950, DTMB Translation 246 (1953).
+
+Pull-out: a turn, then helm amidships; the decay of the yaw rate shows whether the ship is stable on course.
+
+Source: ITTC Recommended Procedure 7.5-04-02-01 (2017).
+
+Turning circle of the standard trials: a given helm, held.
+
+Source: IMO MSC.137(76), 6.1 (35 degrees of rudder, or as much as there is).
+
+Zig-zag switched by heading, e.g. 10/10 and 20/20.
+
+Source: IMO MSC.137(76), 6.2; ITTC Recommended Procedure 7.5-04-02-01 (2017).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from expdesign.dictionary.spec import DURATION, Excitation, Family, PrimitiveSpec, Setting
+from expdesign.dictionary.trim import hold
+from expdesign.errors import InputError
+from expdesign.simulation import Conduct, zigzag
+from expdesign.simulation.helm import Approach, steady_ahead
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+# Engine and helm orders from a steady straight approach, for families defined by commands.
+
+APPROACH = Setting(name="speed_mps", meaning="approach speed, more than 0", low=1e-6, high=50, searched="surge")
+HALF_TURN = np.pi / 2
+
+
+def helm_setting(meaning: str, *, default: float | None = None) -> Setting:
+    """A helm angle; positive turns to starboard, independent of the sign of the actuator's angle."""
+    return Setting(name="helm_rad", meaning=meaning, default=default, low=-HALF_TURN, high=HALF_TURN, searched="helm")
+
+
+def run_times(vessel: Vessel, request: PrimitiveSpec) -> Array:
+    """(k,) times at which commands are given."""
+    count = round(request.settings["duration_s"] / vessel.sample_time_s)
+    return np.asarray(np.arange(count) * vessel.sample_time_s, dtype=float)
+
+
+def steered(approach: Approach) -> Approach:
+    """The approach, if its helm turns the vessel.
+
+    Raises:
+        InputError: the helm does not turn the vessel.
+    """
+    if not approach.starboard:
+        raise InputError(
+            f"the helm of vessel {approach.helm.vessel.name!r}, {approach.helm.description or 'none'}, does not turn it"
+        )
+    return approach
+
+
+def ordered(approach: Approach, drive: Array, helm_rad: Array) -> Excitation:
+    """Engine orders (k,) and helm (k,), counted from the approach's and positive to starboard, as commands.
+
+    Raises:
+        InputError: an actuator cannot give the largest helm at the approach's engine order.
+    """
+    angles = approach.angle_rad + approach.starboard * helm_rad
+    for angle in (float(angles.min()), float(angles.max())):
+        approach.helm.check(approach.drive, angle)
+    pairs, place = np.unique(np.stack([drive, angles], axis=1), axis=0, return_inverse=True)
+    rows = np.array([approach.helm.inputs(*pair) for pair in pairs.tolist()])
+    return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=rows[place.ravel()])
+
+
+def helm_family(
+    helm: Callable[[PrimitiveSpec, Array], Array],
+) -> Callable[[Vessel, PrimitiveSpec], Excitation]:
+    """Orders with the approach's engine order and the helm `helm`(request, time_s (k,)) -> (k,) rad."""
+
+    def orders(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+        approach = steered(steady_ahead(vessel, request.settings["speed_mps"]))
+        time_s = run_times(vessel, request)
+        return ordered(approach, np.full_like(time_s, approach.drive), helm(request, time_s))
+
+    return orders
+
+
+# Crash stop: engines astern from a steady approach, helm unchanged.
+
+
+def _orders_crash_stop(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    approach = steady_ahead(vessel, request.settings["speed_mps"])
+    time_s = run_times(vessel, request)
+    braking = time_s < request.settings["astern_fraction"] * request.settings["duration_s"]
+    return ordered(approach, np.where(braking, -request.settings["astern"], 0.0), 0.0 * time_s)
+
+
+CRASH_STOP = Family(
+    name="crash_stop",
+    summary="engines astern from a straight approach for a share of the run, then stopped; helm unchanged",
+    settings=(
+        DURATION,
+        APPROACH,
+        Setting(name="astern", meaning="engine order, 1 for full astern", default=1.0, low=0, high=1, searched="share"),
+        Setting(
+            name="astern_fraction",
+            meaning="share of the run that engines go astern",
+            default=1.0,
+            low=0.01,
+            high=1,
+            searched="share",
+        ),
+    ),
+    orders=_orders_crash_stop,
+)
+
+
+# Dieudonne (direct) spiral: the helm goes through steps from one side to the other and back.
+
+
+def _helm_dieudonne_spiral(request: PrimitiveSpec, time_s: Array) -> Array:
+    steps = round(request.settings["steps"])
+    down = np.linspace(1.0, -1.0, 2 * steps + 1)
+    levels = np.concatenate([down, down[-2::-1]])  # to the other side and back
+    place = (time_s / request.settings["duration_s"] * len(levels)).astype(int)
+    return np.asarray(request.settings["helm_rad"] * levels[np.minimum(place, len(levels) - 1)])
+
+
+DIEUDONNE_SPIRAL = Family(
+    name="dieudonne_spiral",
+    summary="helm in equal steps from one side to the other and back, each held for the same time",
+    settings=(
+        DURATION,
+        APPROACH,
+        helm_setting("largest helm, where it begins; positive to starboard", default=float(np.radians(15.0))),
+        Setting(name="steps", meaning="steps of helm to each side, a whole number", default=3.0, low=1, high=50),
+    ),
+    orders=helm_family(_helm_dieudonne_spiral),
+)
+
+
+# Pull-out: a turn, then helm amidships; the decay of the yaw rate shows whether the ship is stable on course.
+
+
+def _helm_pull_out(request: PrimitiveSpec, time_s: Array) -> Array:
+    turning = time_s < request.settings["turn_fraction"] * request.settings["duration_s"]
+    return np.where(turning, request.settings["helm_rad"], 0.0)
+
+
+PULL_OUT = Family(
+    name="pull_out",
+    summary="helm over for a share of the run, then back to the course-keeping angle",
+    settings=(
+        DURATION,
+        APPROACH,
+        helm_setting("helm in the turn, positive to starboard", default=float(np.radians(20.0))),
+        Setting(
+            name="turn_fraction",
+            meaning="share of the run with the helm over",
+            default=0.5,
+            low=0.05,
+            high=0.95,
+            searched="share",
+        ),
+    ),
+    orders=helm_family(_helm_pull_out),
+)
+
+
+# Recorded or hand-made commands, read from a file and repeated as they are.
+
+
+def _orders_recorded(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    recorded, settings = request.commands, request.settings
+    if recorded is None:
+        raise InputError("family 'recorded' needs commands, which a dictionary file gives by the key file")
+    if set(recorded.names) != set(vessel.model.inputs):
+        raise InputError(
+            f"its file commands {', '.join(recorded.names)}, vessel {vessel.name!r} takes "
+            f"{', '.join(vessel.model.inputs)}"
+        )
+    if abs(recorded.sample_time_s - vessel.sample_time_s) > 1e-6 * vessel.sample_time_s:
+        raise InputError(
+            f"its file has a sample every {recorded.sample_time_s:g} s, vessel {vessel.name!r} takes one every "
+            f"{vessel.sample_time_s:g} s"
+        )
+    values = np.stack([recorded.column(name) for name in vessel.model.inputs], axis=1)
+    velocity = np.array([settings["speed_mps"], settings["sway_mps"], settings["yaw_rate_radps"]])
+    return Excitation(velocity=velocity, inputs=hold(vessel, velocity), commands=values)
+
+
+RECORDED = Family(
+    name="recorded",
+    summary="commands read from a CSV file, recorded or made by hand",
+    settings=(
+        Setting(name="duration_s", meaning="duration of one run, that of the file", low=1e-3, high=1e5),
+        Setting(name="speed_mps", meaning="surge speed at the start", default=0.0, low=-50, high=50),
+        Setting(name="sway_mps", meaning="sway speed at the start", default=0.0, low=-20, high=20),
+        Setting(name="yaw_rate_radps", meaning="yaw rate at the start", default=0.0, low=-5, high=5),
+    ),
+    orders=_orders_recorded,
+)
+
+
+# Steps: engine order and helm go to random levels, held for random times.
+
+
+def _levels(rng: np.random.Generator, time_s: Array, hold_s: float, count: int) -> Array:
+    """(k,) levels between -1 and 1, each held for an exponential time of mean `hold_s`; `count` of them, 0 for any."""
+    many = 8 + int(8 * (time_s[-1] + 1.0) / hold_s)
+    changes = np.cumsum(rng.exponential(hold_s, size=many))
+    drawn = rng.uniform(-1.0, 1.0, size=many + 1)
+    if count:
+        drawn = np.floor((drawn + 1.0) / 2.0 * count) * 2.0 / (count - 1) - 1.0
+    return np.asarray(drawn[np.searchsorted(changes, time_s)])
+
+
+def _orders_steps(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    settings, time_s = request.settings, run_times(vessel, request)
+    approach = steered(steady_ahead(vessel, settings["speed_mps"]))
+    rng = np.random.default_rng(int(settings["draw"]))
+    count = round(settings["levels"])
+    if count == 1:
+        raise InputError("levels is 1, expected 0 for any, or at least 2")
+    engine, helm = (_levels(rng, time_s, settings["hold_s"], count) for _ in range(2))
+    drive = np.clip(approach.drive + settings["engine_swing"] * engine, -1.0, 1.0)
+    return ordered(approach, drive, settings["helm_offset_rad"] + settings["helm_rad"] * helm)
+
+
+STEPS = Family(
+    name="steps",
+    summary="engine order and helm step to random levels about the approach's, held for random times",
+    settings=(
+        DURATION,
+        APPROACH,
+        helm_setting("largest helm to both sides"),
+        Setting(name="hold_s", meaning="mean time between steps", low=1e-2, high=1e5, searched="time"),
+        Setting(
+            name="engine_swing",
+            meaning="largest change of the engine order, as a share of full ahead",
+            default=0.0,
+            low=0,
+            high=2,
+            searched="share",
+        ),
+        Setting(
+            name="helm_offset_rad", meaning="steady helm added to it", default=0.0, low=-1.5, high=1.5, searched="helm"
+        ),
+        Setting(
+            name="levels",
+            meaning="number of even levels from one side to the other, a whole number: 2 for hard to hard; 0 for any",
+            default=0.0,
+            low=0,
+            high=100,
+        ),
+        Setting(name="draw", meaning="seed of the random numbers", default=1.0, low=0, high=2**31, searched="draw"),
+    ),
+    orders=_orders_steps,
+)
+
+
+# Turning circle of the standard trials: a given helm, held.
+
+
+def _helm_turning_circle_helm(request: PrimitiveSpec, time_s: Array) -> Array:
+    return np.full_like(time_s, request.settings["helm_rad"])
+
+
+TURNING_CIRCLE_HELM = Family(
+    name="turning_circle_helm",
+    summary="helm over from a straight approach and held; engines as on the approach",
+    settings=(DURATION, APPROACH, helm_setting("helm, positive to starboard", default=float(np.radians(35.0)))),
+    orders=helm_family(_helm_turning_circle_helm),
+)
+
+
+# Zig-zag switched by heading, e.g. 10/10 and 20/20.
+
+
+def _orders_zigzag_heading(vessel: Vessel, request: PrimitiveSpec) -> Excitation:
+    settings = request.settings
+    approach = steady_ahead(vessel, settings["speed_mps"])
+    commands, _ = zigzag(
+        vessel,
+        heading_rad=settings["heading_rad"],
+        helm_rad=abs(settings["helm_rad"]),
+        side="starboard" if settings["helm_rad"] > 0 else "port",
+        conduct=Conduct(speed_mps=settings["speed_mps"], duration_s=settings["duration_s"]),
+    )
+    return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=commands.values)
+
+
+ZIGZAG_HEADING = Family(
+    name="zigzag_heading",
+    summary="helm to one side until the heading has changed by a given angle, then to the other, and so on",
+    settings=(
+        DURATION,
+        APPROACH,
+        helm_setting("helm; positive turns to starboard first", default=float(np.radians(10.0))),
+        Setting(
+            name="heading_rad",
+            meaning="change of heading at which the helm is reversed",
+            default=float(np.radians(10.0)),
+            low=1e-3,
+            high=np.pi,
+            searched="heading",
+        ),
+    ),
+    orders=_orders_zigzag_heading,
+    closed_loop=True,
+)

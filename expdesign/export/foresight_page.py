@@ -1,0 +1,401 @@
+"""What a diagnosis would find, before the trial is sailed: page, JSON and table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from expdesign.export import words
+from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
+from expdesign.export.pages.figures import (
+    BLUE,
+    GREY,
+    VERMILION,
+    light_grid,
+    new_figure,
+    page_figure,
+    plain,
+    report_style,
+    svg,
+)
+from expdesign.foresight import TOLD_APART, AddedRuns, Detectability, Foreseen, Foresight, OperationForesight, interval
+
+# Power, confusions and added runs as JSON and as rows for people.
+
+NONE = "\N{EN DASH}"
+HALF = 0.5
+MOST_LISTED = 5
+"""Largest number of causes in a sentence."""
+HEADER = (
+    "cause",
+    "least visible as",
+    "a size that matters",
+    "power",
+    "found",
+    "named",
+    "90 % from",
+    "90 % with",
+    "not told from",
+)
+"""Columns of the table for people."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForesightContent:
+    """The values that page and file show.
+
+    Attributes:
+        scenario: its name.
+        vessel: its name.
+        source: the trial, in words.
+        found: what is foreseen.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    vessel: str
+    source: str
+    found: Foresight
+    command: str
+    version: str
+
+
+def foresight_rows(found: Foresight) -> tuple[tuple[str, ...], ...]:
+    """One row for the least visible effect of every cause, in the order of `HEADER`."""
+    return tuple(effect_row(item) for item in found.weakest)
+
+
+def effect_row(item: Foreseen) -> tuple[str, ...]:
+    """One effect, in the order of `HEADER`."""
+    others = ", ".join(other.cause for other in item.mistaken_for[:2])
+    more = len(item.mistaken_for) - 2
+    return (
+        item.cause,
+        item.name,
+        size_text(item.name, item.change, item.unit),
+        words.percent(item.power) if item.sized else NONE,
+        words.percent(item.found) if item.sized else NONE,
+        words.percent(item.named) if item.sized else NONE,
+        size_text(item.name, item.least_change, item.unit),
+        remedy(item),
+        (others + (f" and {more} more" if more > 0 else "")) if item.power >= TOLD_APART and others else NONE,
+    )
+
+
+def remedy(item: Foreseen) -> str:
+    """What brings an effect to the wanted power, in words."""
+    if not item.needs_runs:
+        return NONE
+    if item.added is not None:
+        return runs_text(item.added)
+    return "no data: within stated std" if item.within_std else "none of this dictionary"
+
+
+def runs_text(added: AddedRuns) -> str:
+    """Runs and their time."""
+    runs = ", ".join(f"{count} \N{MULTIPLICATION SIGN} {name}" for name, count in added.runs)
+    return f"{runs} ({words.duration(added.time_s)})"
+
+
+def conclusions(found: Foresight) -> tuple[str, ...]:
+    """What follows for the trial, in sentences."""
+    return tuple(_sentences_content(found))
+
+
+def _sentences_content(found: Foresight) -> Iterator[str]:
+    least = [item for item in found.weakest if item.sized]
+    seen = [item for item in least if item.found >= found.wanted_power]
+    yield (
+        f"A diagnosis of this trial would find {len(seen)} of {len(least)} causes with a probability of at least "
+        f"{100 * found.wanted_power:g} %, wherever they act and at the smallest size that matters."
+    )
+    missed = sorted((item for item in least if item.found < found.wanted_power), key=lambda item: item.found)
+    likely = [item for item in missed if item.found >= HALF]
+    for text, items in (("It would probably miss", missed[: len(missed) - len(likely)]), ("It may miss", likely)):
+        if items:
+            listed = ", ".join(
+                f"{item.cause} as {item.name} ({words.percent(item.found)})" for item in items[:MOST_LISTED]
+            )
+            rest = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
+            yield f"{text} {listed}{rest}."
+    within = list(dict.fromkeys(item.cause for item in found.effects if item.needs_runs and item.within_std))
+    if within:
+        yield (
+            f"No data would show {', '.join(within)} at that size in every case: that is within the standard "
+            "deviations in the vessel file."
+        )
+    pairs = dict.fromkeys((f"{item.cause} as {item.name}", other.cause) for item, other in found.not_told_apart)
+    if pairs:
+        listed = ", ".join(f"{one} from {other}" for one, other in pairs)
+        yield f"Their tests would notice, but not distinguish: {listed}."
+    if found.together is not None:
+        more = runs_text(found.together)
+        yield f"With {more} more, its tests would also accept what runs of this dictionary can show."
+    if found.unseen:
+        yield "Not seen at all: " + ", ".join(f"{cause} ({why})" for cause, why in found.unseen) + "."
+
+
+def size_text(name: str, change: float, unit: str) -> str:
+    """A size with its unit; factors as per cent, angles in degrees."""
+    if not math.isfinite(change):
+        return NONE
+    if unit == "" and ("factor" in name or "growth" in name):
+        return f"{words.significant(100 * abs(change), 2)} %"
+    if unit == "rad":
+        return f"{words.significant(math.degrees(abs(change)), 2)} deg"
+    return f"{words.significant(abs(change), 2)} {unit}".rstrip()
+
+
+def foresight_json(content: ForesightContent) -> str:
+    """`foresee.json`."""
+    found = content.found
+    return strict_json(
+        {
+            "scenario": content.scenario,
+            "vessel": content.vessel,
+            "trial": content.source,
+            "duration_s": found.duration_s,
+            "wanted_power": found.wanted_power,
+            "random_current_mps": found.random_current_mps,
+            "effects": [effect_entry(item) for item in found.effects],
+            "missed": list(found.missed),
+            "conclusions": list(conclusions(found)),
+            "not_told_apart": [
+                {"cause": item.cause, "effect": item.name, "from": other.cause, "cosine": other.cosine,
+                 "noncentrality_left": other.noncentrality, "told_apart": other.told_apart}
+                for item, other in found.not_told_apart
+            ],
+            "together": _added(found.together),
+            "beyond_the_dictionary": [
+                {"cause": item.cause, "effect": item.name, "best_power": item.best_power, "within_std": item.within_std}
+                for item in found.beyond
+            ],
+            "not_seen": [{"cause": cause, "why": why} for cause, why in found.unseen],
+        }
+    )  # fmt: skip
+
+
+def effect_entry(item: Foreseen) -> dict[str, object]:
+    """One effect."""
+    return {
+        "cause": item.cause,
+        "effect": item.name,
+        "size": finite(item.change),
+        "unit": item.unit,
+        "rule": item.rule,
+        "noncentrality": finite(item.noncentrality),
+        "freedom": item.freedom,
+        "level": item.level,
+        "power": finite(item.power),
+        "found": finite(item.found),
+        "named": finite(item.named),
+        "size_for_wanted_power": finite(item.least_change),
+        "mistaken_for": [
+            {"cause": other.cause, "cosine": other.cosine, "told_apart": other.told_apart}
+            for other in item.mistaken_for
+        ],
+        "added_runs": _added(item.added),
+        "best_power": finite(item.best_power),
+    }
+
+
+def _added(runs: AddedRuns | None) -> dict[str, object] | None:
+    return None if runs is None else {"runs": dict(runs.runs), "time_s": runs.time_s}
+
+
+# What a watch over a ship in operation would find: page, JSON and table.
+
+OPERATION_HEADER = ("change", "by", "found", "95 %", "median delay", "named rightly", "or as likely", "else taken for")
+"""Columns of the table for people."""
+FINDS = 0.5
+"""Share of voyages from which a change counts as found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperationContent:
+    """The values that page and file show.
+
+    Attributes:
+        scenario, vessel: their names.
+        found: what is foreseen.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    vessel: str
+    found: OperationForesight
+    command: str
+    version: str
+
+
+def operation_rows(found: OperationForesight) -> tuple[tuple[str, ...], ...]:
+    """One row for each change and size, in the order of `OPERATION_HEADER`."""
+    return tuple(_row(item) for item in found.rows)
+
+
+def _row(item: Detectability) -> tuple[str, ...]:
+    low, high = interval(item.found, item.voyages)
+    return (
+        item.change,
+        f"{100.0 * item.size:g}{words.NB}%",
+        f"{item.found} of {item.voyages}",
+        f"{100 * low:.0f} to {100 * high:.0f} %",
+        words.duration(item.delay_s) if math.isfinite(item.delay_s) else "more than a voyage",
+        f"{item.named} of {item.found}",
+        f"{item.likely} of {item.found}",
+        ", ".join(f"{name} ({count})" for name, count in item.taken_for) or NONE,
+    )
+
+
+def operation_sentences(found: OperationForesight) -> tuple[str, ...]:
+    """What follows, in sentences."""
+    return tuple(_sentences_operation(found))
+
+
+def _sentences_operation(found: OperationForesight) -> Iterator[str]:
+    low, high = interval(found.false_alarms, found.nominal)
+    yield (
+        f"Of {words.counted(found.nominal, 'voyage')} of {words.duration(found.voyage_s)} without a change, "
+        f"{found.false_alarms or 'none'} raised an alarm (95 % interval of the share: {100 * low:.0f} to "
+        f"{100 * high:.0f} %). The threshold allows one in {found.false_alarm_days:g} days at most."
+    )
+    for change in dict.fromkeys(item.change for item in found.rows):
+        own = sorted((item for item in found.rows if item.change == change), key=lambda item: item.size)
+        first = next((item for item in own if item.found >= FINDS * item.voyages), None)
+        if first is None:
+            yield f"{_named(own[-1])} is found in {own[-1].found} of {own[-1].voyages} voyages only."
+            continue
+        yield (
+            f"{_named(first)} is found in {first.found} of {first.voyages} voyages, after "
+            f"{words.duration(first.delay_s)} in half of them."
+        )
+    for item in found.rows:
+        if item.taken_for and item.found - item.named > FINDS * item.found:
+            name, count = item.taken_for[0]
+            wrong, told = item.found - item.named, item.likely - item.named
+            yield (
+                f"{_named(item)} is mostly taken for another change: in {wrong} of "
+                f"{words.counted(item.found, 'alarm')}, most often for {name} ({count}). Of these, {told or 'none'} "
+                "say that the right one explains the data as well."
+            )
+    if found.not_watched:
+        yield f"These sensors and voyages give no information about {', '.join(found.not_watched)}."
+
+
+def _named(item: Detectability) -> str:
+    return f"{item.change.capitalize()} by {100.0 * item.size:g} %"
+
+
+def operation_json(content: OperationContent) -> str:
+    """The content as JSON; a delay of null is longer than a voyage."""
+    found = content.found
+    rows = []
+    for item in found.rows:
+        table = {**asdict(item), "delay_s": item.delay_s if math.isfinite(item.delay_s) else None}
+        table["found_interval"] = interval(item.found, item.voyages)
+        rows.append(table)
+    return strict_json(
+        {
+            "vessel": content.vessel,
+            "sentences": operation_sentences(found),
+            "voyage_s": found.voyage_s,
+            "reference_s": found.reference_s,
+            "voyages_without_change": found.nominal,
+            "false_alarms": found.false_alarms,
+            "false_alarm_days": found.false_alarm_days,
+            "changes": rows,
+            "watched": found.watched,
+            "not_watched": found.not_watched,
+        }
+    )
+
+
+def operation_html(content: OperationContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("expdesign.export.foresight_page", "operation.html").render(
+        content=content,
+        sentences=operation_sentences(content.found),
+        header=OPERATION_HEADER,
+        rows=operation_rows(content.found),
+        lasts=words.duration(content.found.voyage_s),
+        learns=words.duration(content.found.reference_s),
+    )
+
+
+# The page on what a diagnosis would find.
+
+
+@page_figure
+def power_figure(found: Foresight) -> str:
+    """Probability that the test accepts each cause, that held-out runs show it too, and that it is named first."""
+    items = [item for item in found.weakest if item.sized]
+    figure = new_figure(6.8, 1.1 + 0.26 * len(items))
+    axes = figure.subplots()
+    rows = np.arange(len(items))
+    axes.barh(
+        rows, [100 * item.power for item in items], height=0.6, color=BLUE, alpha=0.35, label="accepted by its test"
+    )
+    axes.barh(rows, [100 * item.found for item in items], height=0.3, color=BLUE, label="found")
+    axes.plot([100 * item.named for item in items], rows, "D", color=VERMILION, markersize=5, label="found and first")
+    axes.axvline(100 * found.wanted_power, color=GREY, linewidth=0.9, linestyle="--")
+    axes.set_yticks(rows, [plain(_name(item)) for item in items])
+    axes.invert_yaxis()
+    axes.set_xlim(0, 101)
+    axes.set_xlabel("probability [%]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=3, fontsize=9)
+    light_grid(axes, "x")
+    return svg(figure, key="power", label="Probability that a diagnosis finds each cause, and that it names it first")
+
+
+def _name(item: Foreseen) -> str:
+    return item.cause if item.cause.endswith(f":{item.name}") else f"{item.cause}: {item.name}"
+
+
+def foresight_html(content: ForesightContent) -> str:
+    """One HTML page without any outside reference."""
+    found = content.found
+    with report_style():
+        figure = power_figure(found)
+    return page_template("expdesign.export.foresight_page", "foresee.html").render(
+        content=content,
+        found=found,
+        figure=figure,
+        lasts=words.duration(found.duration_s),
+        conclusions=conclusions(found),
+        header=HEADER[:-1],
+        rows=[row[:-1] for row in foresight_rows(found)],
+        pairs=_pairs(found),
+        together=None if found.together is None else runs_text(found.together),
+        every=[_every(item) for item in found.effects],
+    )
+
+
+def _every(item: Foreseen) -> tuple[str, ...]:
+    cause, name, size, power, found, _, least, *_ = effect_row(item)
+    return (
+        cause,
+        name,
+        size,
+        power,
+        found,
+        item.rule,
+        words.significant(item.noncentrality) if item.sized else NONE,
+        least,
+    )
+
+
+def _pairs(found: Foresight) -> list[tuple[str, ...]]:
+    return [
+        (
+            f"{item.cause}: {item.name}",
+            other.cause,
+            words.number(other.cosine, 3),
+            words.significant(other.noncentrality),
+            words.percent(other.told_apart),
+        )
+        for item, other in found.not_told_apart
+    ]

@@ -1,0 +1,216 @@
+"""Results of load plans: JSON, load cases as files, sentences, tables and a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
+from expdesign.export.words import counted
+from expdesign.loading import LoadOption, LoadPlan
+from expdesign.roll import MEANINGS, UNITS
+
+# A load plan as JSON, tables, sentences and a page, and the files of its load cases.
+
+CASE_HEADER = ("case", "load", "runs", "manoeuvres", "time [s]")
+PRECISION_HEADER = ("parameter", "meaning", "value", "std before", "std after, at least", "unit")
+STEP_HEADER = ("load cases", "loads", "efficiency", "smallest relative sensitivity")
+
+HARDLY = 0.5
+"""Relative standard deviation from which a parameter is said to be hardly determined."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoadContent:
+    """The values that page and files show.
+
+    Attributes:
+        scenario: its name.
+        plan: the load cases.
+        known: parameters that are not sought, by name.
+        commands: that plan each load case, and estimate from the data.
+        command, version: to reproduce it.
+    """
+
+    scenario: str
+    plan: LoadPlan
+    known: Mapping[str, float]
+    commands: tuple[str, ...]
+    command: str
+    version: str
+
+    @property
+    def options(self) -> tuple[LoadOption, ...]:
+        """Load cases in the plan's order."""
+        return tuple(self.plan.question.options[place] for place in self.plan.chosen.options)
+
+    def runs(self, case: int) -> dict[str, int]:
+        """Manoeuvre -> whole runs of a load case, those that are run."""
+        repeats = self.plan.repeats[case].astype(int).tolist()
+        return {name: count for name, count in zip(self.plan.manoeuvres, repeats, strict=True) if count}
+
+    def time_s(self, case: int) -> float:
+        """Informative time of a load case [s]."""
+        return sum(count * self.plan.manoeuvres[name] for name, count in self.runs(case).items())
+
+
+def case_rows(content: LoadContent) -> list[tuple[str, ...]]:
+    """One for each load case."""
+    rows: list[tuple[str, ...]] = []
+    for case, option in enumerate(content.options):
+        runs = content.runs(case)
+        each = ", ".join(f"{name} {count}x" if count > 1 else name for name, count in runs.items())
+        rows.append((str(case + 1), option.name, str(sum(runs.values())), each, f"{content.time_s(case):.0f}"))
+    return rows
+
+
+def precision_rows(content: LoadContent) -> list[tuple[str, ...]]:
+    """One for each parameter that is sought."""
+    plan = content.plan
+    values = plan.question.theta[plan.question.places]
+    return [
+        (
+            name, MEANINGS[name], f"{value:.4g}", f"{before:.2g}" if math.isfinite(before) else "unknown",
+            f"{after:.2g}", UNITS[name],
+        )
+        for name, value, before, after in zip(
+            plan.question.free, values, plan.std_before, plan.std_after, strict=True
+        )
+    ]  # fmt: skip
+
+
+def step_rows(content: LoadContent) -> list[tuple[str, ...]]:
+    """One for each number of load cases, the plan's marked."""
+    plan = content.plan
+    return [
+        (
+            f"{len(step.options)}, chosen" if step is plan.chosen else str(len(step.options)),
+            "; ".join(plan.question.options[place].name for place in step.options),
+            f"{step.efficiency:.3f}", f"{step.smallest:.1e}",
+        )
+        for step in plan.steps
+    ]  # fmt: skip
+
+
+def load_sentences(content: LoadContent) -> tuple[str, ...]:
+    """The findings."""
+    return tuple(_sentences(content))
+
+
+def _sentences(content: LoadContent) -> Iterator[str]:
+    plan = content.plan
+    count, total = len(content.options), sum(content.time_s(case) for case in range(len(content.options)))
+    yield (
+        f"{counted(count, 'load case')} with {counted(int(plan.repeats.sum()), 'run')} in {total:.0f} s tell most "
+        f"about {', '.join(plan.question.free)}: {'; '.join(option.name for option in content.options)}."
+    )
+    if len(plan.steps) > 1:
+        yield (
+            f"With these loads the best plan has an efficiency of {plan.chosen.efficiency:.3f} of the best with all "
+            f"{len(plan.question.options)} candidates; whole runs keep {plan.design.efficiency_repeats:.3f} of that."
+        )
+    aim = plan.design.problem.aim
+    yield (
+        f"Best means here: the least volume of the confidence region of {', '.join(aim.interest) or 'all parameters'}. "
+        f"No other shares of time on these loads and manoeuvres are better by more than {plan.design.gap:.1e} in "
+        f"the logarithm of its determinant ({plan.design.certificate.kind})."
+    )
+    if plan.faintest.size > 0:
+        yield (
+            f"Least determined is a change of all of these together: {plan.faintest}. The relative standard "
+            f"deviation along it is {1.0 / plan.faintest.size:.2g}."
+        )
+    values = np.abs(plan.question.theta[plan.question.places])
+    hardly = [name for name, far in zip(plan.question.free, plan.std_after > HARDLY * values, strict=True) if far]
+    if hardly:
+        yield f"Hardly determined, with a standard deviation of half the value or more: {', '.join(hardly)}."
+    if content.known:
+        yield f"Not sought, as [known] gives them: {', '.join(content.known)}."
+    if plan.design.note:
+        yield plan.design.note
+
+
+def load_plan_json(content: LoadContent) -> str:
+    """All results as JSON."""
+    plan = content.plan
+    stds = zip(plan.question.free, plan.std_before.tolist(), plan.std_after.tolist(), strict=True)
+    return strict_json(
+        {
+            "command": content.command,
+            "version": content.version,
+            "load_cases": [
+                {
+                    "name": option.name,
+                    "unknown": option.load is None,
+                    **({} if option.load is None else {
+                        "mass_kg": option.load.mass_kg, "height_m": -option.load.z_m,
+                        "inertia_kgm2": option.load.inertia_kgm2,
+                    }),
+                    "runs": content.runs(case),
+                    "time_s": content.time_s(case),
+                }
+                for case, option in enumerate(content.options)
+            ],
+            "parameters": {
+                name: {"std_before": finite(before), "std_after_at_least": after, "unit": UNITS[name]}
+                for name, before, after in stds
+            },
+            "steps": [
+                {
+                    "loads": [plan.question.options[place].name for place in step.options],
+                    "efficiency": step.efficiency,
+                    "smallest_relative_sensitivity": float(step.smallest),
+                    "chosen": step is plan.chosen,
+                }
+                for step in plan.steps
+            ],
+            "told_worst": {"change": plan.faintest.change, "relative_std": finite(1.0 / plan.faintest.size)},
+            "gap": plan.design.gap,
+            "efficiency_whole_runs": plan.design.efficiency_repeats,
+            "remarks": list(load_sentences(content)),
+        }
+    )  # fmt: skip
+
+
+def repeats_json(content: LoadContent, case: int) -> str:
+    """Whole runs of a load case, as `expdesign plan --durations` reads them."""
+    counts = content.runs(case)
+    return strict_json(
+        {"primitives": [{"name": name, "repeats": counts.get(name, 0)} for name in content.plan.manoeuvres]}
+    )
+
+
+def loads_toml(content: LoadContent) -> str:
+    """The load cases as `expdesign roll --loads` reads them, with --vessel."""
+    lines = ["# Load cases of a roll trial, by:", f"#     {content.command}"]
+    for case, option in enumerate(content.options):
+        lines += ["", f"# {case + 1}: {option.name}", "[[load]]"]
+        if option.load is None:
+            lines.append("unknown = true")
+        elif option.load.mass_kg:
+            lines += [f"mass_kg = {option.load.mass_kg!r}", f"height_m = {-option.load.z_m!r}"]
+            lines += [f"inertia_kgm2 = {option.load.inertia_kgm2!r}"] * bool(option.load.inertia_kgm2)
+    question = content.plan.question
+    guessed = {name: float(question.theta[place]) for name, place in zip(question.free, question.places, strict=True)}
+    for head, values in (("known", content.known), ("start", {n: guessed[n] for n in ("m", "z_m") if n in guessed})):
+        if values:
+            lines += ["", f"[{head}]", *(f"{name} = {value!r}" for name, value in values.items())]
+    return "\n".join(lines) + "\n"
+
+
+def load_plan_html(content: LoadContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("expdesign.export.load_page", "load_plan.html").render(
+        content=content,
+        sentences=load_sentences(content),
+        case_header=[name.capitalize() for name in CASE_HEADER],
+        case_rows=case_rows(content),
+        precision_header=[name.capitalize() for name in PRECISION_HEADER],
+        precision_rows=precision_rows(content),
+        step_header=[name.capitalize() for name in STEP_HEADER],
+        step_rows=step_rows(content),
+    )

@@ -1,0 +1,169 @@
+"""The draft of a refused plan: what stands in the way, where, what helps; never a route."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from expdesign.errors import NoPlan
+from expdesign.export.pages import page_template
+from expdesign.export.pages.figures import (
+    BLACK,
+    GREEN,
+    GREY,
+    PURPLE,
+    VERMILION,
+    new_figure,
+    page_figure,
+    report_style,
+    svg,
+)
+from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, draw_sea
+from expdesign.export.tuning import TUNING
+from expdesign.sea_area import SeaArea
+from expdesign.values import Array, seal
+from expdesign.vessel import Vessel
+
+# One page and one table on a plan that was refused.
+
+WIDTH_IN = 6.4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refusal:
+    """A refused plan.
+
+    Attributes:
+        scenario: name.
+        vessel, area: who and where.
+        start, goal: (3,) poses.
+        clearance_m: asked for [m].
+        error: the refusal.
+        earlier: names of results of an earlier attempt in the same folder.
+        command, version: how it came about.
+    """
+
+    scenario: str
+    vessel: Vessel
+    area: SeaArea
+    start: Array
+    goal: Array
+    clearance_m: float
+    error: NoPlan
+    earlier: tuple[str, ...] = ()
+    command: str = ""
+    version: str = ""
+
+    def __post_init__(self) -> None:
+        seal(self, start="3", goal="3")
+
+    @property
+    def track(self) -> Array:
+        """(k, 3) poses of the draft, thinned; none where nothing was planned."""
+        poses = self.error.poses
+        if poses is None:
+            return np.zeros((0, 3))
+        return np.asarray(poses)[:: max(1, -(-len(poses) // TUNING.draft_poses))]
+
+    @property
+    def where(self) -> str:
+        """The place of the obstacle, in degrees and in metres; "" where it has none."""
+        if self.error.place is None:
+            return ""
+        north, east = self.error.place
+        lat, lon = self.area.frame.to_degrees(np.array([north, east]))
+        return f"{lat:.5f}, {lon:.5f} (north {north:.0f} m, east {east:.0f} m)"
+
+
+def refused_json(refusal: Refusal) -> str:
+    """The same as `refused_html`, for programs."""
+    error, frame = refusal.error, refusal.area.frame
+    place = None
+    if error.place is not None:
+        lat, lon = frame.to_degrees(np.array(error.place)).tolist()
+        place = {"north_m": error.place[0], "east_m": error.place[1], "lat_deg": lat, "lon_deg": lon}
+    content = {
+        "refused": True,
+        "verified": False,
+        "scenario": refusal.scenario,
+        "obstacle": error.obstacle,
+        "place": place,
+        "remedies": list(error.remedies),
+        "tried": list(error.tried),
+        "earlier_results_in_this_folder": list(refusal.earlier),
+        "frame": {"projection": frame.definition},
+        "draft_track": [
+            {"north_m": round(north, 2), "east_m": round(east, 2), "heading_rad": round(heading, 4)}
+            for north, east, heading in refusal.track.tolist()
+        ],
+        "command": refusal.command,
+        "version": refusal.version,
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def refused_html(refusal: Refusal) -> str:
+    """One HTML page without any outside reference."""
+    with report_style():
+        figure = _chart(refusal)
+    return page_template("expdesign.export.refused_page", "refused.html").render(
+        content=refusal, error=refusal.error, chart=figure, legend=_legend(refusal)
+    )
+
+
+@page_figure
+def _chart(refusal: Refusal) -> Markup:
+    """Start, goal, the track as far as it was planned, and the obstacle."""
+    west, south, east, north = box = _view(refusal)
+    map_width_in = WIDTH_IN - 0.9
+    figure = new_figure(WIDTH_IN, map_width_in * (north - south) / (east - west) + 0.4)
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    axes.set_xlim(west, east)
+    axes.set_ylim(south, north)
+    draw_sea(axes, refusal.area, box, clearance_m=refusal.clearance_m, draught_m=refusal.vessel.draught_m)
+    axes.plot(refusal.track[:, 1], refusal.track[:, 0], color=GREY, linewidth=1.3, linestyle=(0, (4, 2)), zorder=3)
+    for pose, sign, colour, size in ((refusal.start, "o", GREEN, 9), (refusal.goal, "*", PURPLE, 15)):
+        axes.plot(pose[1], pose[0], sign, color=colour, markersize=size, markeredgecolor="white", zorder=5)
+    if refusal.error.place is not None:
+        place = refusal.error.place[::-1]
+        axes.plot(*place, "o", color=VERMILION, markersize=24, markerfacecolor="none", markeredgewidth=2.4, zorder=6)
+        axes.plot(*place, "x", color=VERMILION, markersize=10, markeredgewidth=2.4, zorder=6)
+    axes.text(
+        0.5, 0.5, "REFUSED", transform=axes.transAxes, ha="center", va="center", rotation=24, fontsize=54,
+        fontweight="bold", color=BLACK, alpha=0.09, zorder=2,
+    )  # fmt: skip
+    draw_position_ticks(axes, refusal.area.frame, box)
+    draw_scale_and_north(axes, box)
+    return svg(figure, key="refused", label=f"Chart of {refusal.area.name}: start, goal, draft of a track, obstacle")
+
+
+def _view(refusal: Refusal) -> tuple[float, float, float, float]:
+    """West, south, east, north [m] of all that is drawn, with room around it."""
+    places = [refusal.start[:2], refusal.goal[:2], *refusal.track[:, :2]]
+    places += [] if refusal.error.place is None else [np.array(refusal.error.place)]
+    (south, west), (north, east) = np.min(places, axis=0), np.max(places, axis=0)
+    margin = max(0.15 * max(north - south, east - west), 6 * refusal.vessel.length_m)
+    width, height = east - west + 2 * margin, north - south + 2 * margin
+    width, height = max(width, 0.75 * height), max(height, 0.5 * width)
+    middle = (west + east) / 2, (south + north) / 2
+    return middle[0] - width / 2, middle[1] - height / 2, middle[0] + width / 2, middle[1] + height / 2
+
+
+def _legend(refusal: Refusal) -> list[dict[str, str]]:
+    entries = [
+        {"text": "start", "colour": GREEN, "sign": "\N{BLACK CIRCLE}"},
+        {"text": "goal", "colour": PURPLE, "sign": "\N{BLACK STAR}"},
+    ]
+    if refusal.error.place is not None:
+        entries.append({"text": "what stands in the way", "colour": VERMILION, "sign": "\N{CIRCLED TIMES}"})
+    if len(refusal.track):
+        text = "draft of the track, not checked or too risky"
+        entries.append({"text": text, "colour": GREY, "sign": "\N{BOX DRAWINGS LIGHT TRIPLE DASH HORIZONTAL}"})
+    if refusal.clearance_m > 0:
+        text = f"{refusal.clearance_m:g} m from forbidden water"
+        entries.append({"text": text, "colour": GREY, "sign": "\N{BOX DRAWINGS LIGHT DOUBLE DASH HORIZONTAL}"})
+    return entries

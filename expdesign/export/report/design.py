@@ -1,0 +1,262 @@
+"""The design in a report: its criterion and certificate, added manoeuvres, and the losses on the way to the route."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.durations import CRITERIA, DurationDesign, limits_kept
+from expdesign.export import words
+from expdesign.export.report.content import ReportContent
+from expdesign.export.report.tables import setting, shown_names
+from expdesign.export.routes import DEGREE_DECIMALS
+from expdesign.growing import GrowRound, Growth
+from expdesign.shortest_day import ShortestDay
+
+# The criterion of the design, its certificate, and the efficiency under other criteria.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Efficiencies as a table; `missing` gives the reason why a criterion is not in it."""
+
+    designs: tuple[str, ...]
+    rows: tuple[tuple[str, str, tuple[str, ...]], ...]
+    missing: tuple[tuple[str, str], ...]
+
+
+NAMES = {"continuous": "optimal allocation", "repeats": "whole runs", "uniform": "equal time"}
+
+
+def comparison(content: ReportContent) -> Comparison:
+    """Every design under every criterion."""
+    known = [item for item in content.compared if item.of]
+    designs = tuple(known[0].of) if known else ()
+    return Comparison(
+        designs=tuple(NAMES.get(name, name) for name in designs),
+        rows=tuple(
+            (item.criterion, item.title, tuple(words.percent(item.of[name]) for name in designs)) for item in known
+        ),
+        missing=tuple((item.criterion, item.missing) for item in content.compared if item.missing),
+    )
+
+
+def limit_rows(content: ReportContent) -> list[tuple[str, str, str, str, str]]:
+    """Name, required value, optimal allocation, whole runs and price of every limit."""
+    return [
+        (
+            kept.name,
+            words.significant(kept.limit),
+            words.significant(kept.continuous),
+            words.significant(kept.repeats),
+            words.significant(kept.price, 2) if kept.price > 1e-6 else "0",
+        )
+        for kept in limits_kept(content.design)
+    ]
+
+
+def criterion_sentence(content: ReportContent) -> str:
+    """The criterion, its scope, and its models."""
+    problem = content.design.problem
+    title = {item.name: item.title for item in CRITERIA}[problem.aim.criterion]
+    about = f", of {', '.join(problem.aim.interest)}" if problem.aim.interest else ""
+    if problem.aim.criterion == "V":
+        about = f": {', '.join(problem.aim.outcomes)}"
+    models = {
+        "nominal": "",
+        "average": f", on average over {len(problem.sampled)} models drawn from the prior",
+        "worst": f", for the worst of {len(problem.sampled)} models drawn from the prior",
+    }[problem.robust]
+    prior = " Prior knowledge is included." if problem.prior.any() else ""
+    return f"Criterion {problem.aim.criterion} minimises the {title}{about}{models}.{prior}"
+
+
+def equal_time_sentence(design: DurationDesign) -> str:
+    """What equal time on every primitive reaches; more than the optimum only where the limits rule it out."""
+    reached = words.percent(design.efficiency_uniform)
+    if design.efficiency_uniform > 1.0:
+        return f"Equal time for every manoeuvre is not allowed by the limits of the scenario; it would reach {reached}."
+    return f"Equal time for every manoeuvre would reach {reached}."
+
+
+def certificate(content: ReportContent) -> str:
+    """The equivalence theorem, with this design's numbers."""
+    design = content.design
+    proof, net = design.certificate, design.sensitivities - design.certificate.prices
+    if not math.isfinite(proof.bound):
+        return f"There is no certificate of optimality: {proof.kind.removeprefix('none: ')}."
+    best = int(net.argmax())
+    price = " minus the price of the limits" if proof.multipliers else ""
+    named = shown_names(content).get(design.problem.names[best], design.problem.names[best])
+    return (
+        f"The durations are optimal if no sensitivity{price} exceeds the bound {words.significant(proof.level, 4)}, "
+        f"and every used manoeuvre reaches it ({proof.kind}). The largest value is "
+        f"{words.significant(float(net[best]), 4)}, that of {named}. So no other durations of these manoeuvres are "
+        f"better by more than {short_of_optimum(content)} in {design.problem.aim.criterion}-efficiency."
+    )
+
+
+def short_of_optimum(content: ReportContent) -> str:
+    """Upper bound on the possible gain in efficiency, rounded up."""
+    design = content.design
+    degree = len(content.parameters) if design.problem.aim.criterion == "D" else design.certificate.degree
+    gain = math.expm1(max(design.gap, 0.0) / degree)
+    if not math.isfinite(gain):
+        return "not certified"
+    if gain < 1e-4:
+        return f"0.01{words.NB}%"
+    power = 10.0 ** (math.floor(math.log10(gain)) - 1)
+    return f"{100 * math.ceil(gain / power) * power:.10f}".rstrip("0").rstrip(".") + f"{words.NB}%"
+
+
+# The steps from the mathematical optimum to the route file: the loss and the proof at each step.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """One step: its name, its result, and the method behind the number."""
+
+    step: str
+    found: str
+    proof: str
+
+
+def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
+    """The links that lead from durations to the route, each with its proof."""
+    design, plan, check = content.design, content.plan, content.plan.verification
+    links = [
+        Link(
+            step=f"Optimal durations{', which state the accuracy' if _asks_accuracy(content.day) else ''}",
+            found=f"no other allocation of the time is better by more than {short_of_optimum}",
+            proof="equivalence theorem, with the matrices in dictionary.json",
+        ),
+        Link(
+            step="Whole runs",
+            found=f"{words.percent(design.efficiency_repeats)} of that optimum",
+            proof="information of the whole runs",
+        ),
+        *_day_links(content.day),
+    ]
+    if plan.design_efficiency_placed is not None:
+        links.append(
+            Link(
+                step="Runs as placed",
+                found=f"{words.percent(plan.design_efficiency_placed)} of the information of the optimum",
+                proof="information of the runs alone, with their planned headings and initial velocities",
+            )
+        )
+    if plan.design_efficiency_realised is not None:
+        links.append(
+            Link(
+                step="Whole track",
+                found=f"{words.percent(plan.design_efficiency_realised)} of the information of the optimum",
+                proof="information of the whole track, repositioning included",
+            )
+        )
+    links.append(
+        Link(
+            step="Allowed water",
+            found=(
+                f"least clearance {words.distance(check.clearance_min_m)}, "
+                f"{words.distance(content.clearance_m)} required"
+            ),
+            proof="independent simulation with a ten times smaller step; swept hull against the polygons of the chart",
+        )
+    )
+    return [*links, *_route_links(content)]
+
+
+def _asks_accuracy(day: ShortestDay | None) -> bool:
+    return day is not None and day.most_s is None
+
+
+def _day_links(day: ShortestDay | None) -> list[Link]:
+    if day is None or day.bound is None or day.bound.day_s <= 0:
+        return []
+    share = words.percent(day.bound.day_s / day.plan.commands.duration_s)
+    return [
+        Link(
+            step="The day",
+            found=f"no day is shorter than {words.duration(day.bound.day_s)}, {share} of this one",
+            proof="transit at the largest speed; an upper bound on the information rate of any motion within limits",
+        )
+    ]
+
+
+def _route_links(content: ReportContent) -> list[Link]:
+    route = content.route
+    if route is None:
+        return []
+    fit = route.fit
+    water = {True: ", every leg in allowed water", False: ", NOT every leg in allowed water", None: ""}[fit.in_water]
+    return [
+        Link(
+            step="Exported route",
+            found=(
+                f"{len(route.waypoints)} waypoints; track within {words.number(fit.largest_m)} m of the legs; "
+                f"stated cross-track distance {words.number(route.xtd_m)} m{water}"
+            ),
+            proof=(
+                f"computed at every sample, positions with {DEGREE_DECIMALS} decimals; rhumb lines deviate from the "
+                f"straight legs by {_small(fit.loxodrome_m)}, great circles by {_small(fit.orthodrome_m)}"
+            ),
+        )
+    ]
+
+
+def _small(length_m: float) -> str:
+    return "less than 1 mm" if length_m < 1e-3 else f"{1000 * length_m:.0f} mm"
+
+
+# Manoeuvres that a search added to the dictionary, and the gain of each.
+
+
+@dataclass(frozen=True, kw_only=True)
+class GrowthRow:
+    """One manoeuvre that was added."""
+
+    number: int
+    name: str
+    what: str
+    sensitivity: str
+    gain: str
+    efficiency: str
+    excites: bool
+
+
+def growth_rows(growth: Growth) -> list[GrowthRow]:
+    """Additions in order."""
+    return [_row(number, found) for number, found in enumerate(growth.rounds, start=1)]
+
+
+def _row(number: int, found: GrowRound) -> GrowthRow:
+    settings = ", ".join(setting(name, value) for name, value in found.settings.items())
+    return GrowthRow(
+        number=number,
+        name=found.name,
+        what=found.family.replace("_", " ") + (f"; {settings}" if settings else ""),
+        sensitivity=words.number(found.sensitivity),
+        gain=f"+{words.number(found.log_det_gain, 3)}" if found.log_det_gain >= 0 else words.number(found.log_det_gain),
+        efficiency=words.percent(found.efficiency),
+        excites=found.excitation_condition,
+    )
+
+
+def growth_sentences(growth: Growth) -> tuple[str, str]:
+    """Sentences before and after the table: the search space, and the guarantee."""
+    (u, v, r) = growth.limits.tolist()
+    turning = [words.number(float(np.degrees(rate)), 1) for rate in r]
+    before = (
+        f"The search evaluated {words.counted(growth.evaluated, 'candidate')}, with u from {words.number(u[0])} to "
+        f"{words.number(u[1])} m/s, v from {words.number(v[0])} to {words.number(v[1])} m/s and r from {turning[0]} to "
+        f"{turning[1]} \N{DEGREE SIGN}/s. A manoeuvre improves the design if its sensitivity exceeds "
+        f"{growth.dimension}. Each step adds the most sensitive one and optimises the durations again."
+    )
+    after = (
+        f"The most sensitive remaining candidate has {words.number(growth.best_left)}. The final design therefore has "
+        f"an efficiency of at least {words.percent(growth.efficiency_left)} among all evaluated candidates. There is "
+        "no guarantee about manoeuvres that were not evaluated."
+    )
+    return before, after

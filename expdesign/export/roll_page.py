@@ -1,0 +1,278 @@
+"""Results of roll identification: JSON, sentences, tables and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
+from expdesign.export.words import percent
+from expdesign.roll import (
+    G_MPS2,
+    MEANINGS,
+    PARAMETERS,
+    TUNING,
+    UNITS,
+    Direction,
+    LowPass,
+    NullSpace,
+    RollEstimate,
+    froude_scaled,
+    roll_frequency,
+    stiffness,
+)
+
+# Roll identification as JSON, tables, sentences and a page.
+
+PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
+SCALED_HEADER = ("parameter", "at full scale", "95 % interval", "unit")
+CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
+NORMAL = 1.96
+LEAST_CHANCE = 1e-4
+"""Smallest probability that is written out."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RollContent:
+    """The values that page and files show.
+
+    Attributes:
+        estimate: the parameters.
+        report: the combinations that the data do not determine.
+        filter: that the data passed.
+        notes: on the data.
+        command, version: to reproduce it.
+        scale: of the ship to the model that was tried; None for a ship.
+    """
+
+    estimate: RollEstimate
+    report: NullSpace
+    filter: LowPass
+    notes: tuple[str, ...]
+    command: str
+    version: str
+    scale: float | None = None
+
+
+def parameter_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """One for each parameter that is estimated or given."""
+    return [
+        (name, MEANINGS[name], f"{value:.4g}", _interval(content, name), UNITS[name])
+        for name, value in content.estimate.values.items()
+        if name in content.estimate.problem.free or value
+    ]
+
+
+def _interval(content: RollContent, name: str, factor: float = 1.0) -> str:
+    estimate = content.estimate
+    if name not in estimate.problem.free:
+        return "given"
+    if name in estimate.held:
+        return "held: not determined"
+    low, high = (factor * end for end in interval(content, name))
+    only = f" for {' and '.join(estimate.held)} as held" if name in content.report.undetermined else ""
+    return f"{low:.4g} to {high:.4g}{only}"
+
+
+def interval(content: RollContent, name: str) -> tuple[float, float]:
+    """95 % interval of a free parameter, for held parameters as they are."""
+    value, std = content.estimate.values[name], content.estimate.std[name]
+    return value - NORMAL * std, value + NORMAL * std
+
+
+def scaled_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """What Froude's law makes of free parameters for the ship; none without a scale."""
+    if content.scale is None:
+        return []
+    of = dict(zip(PARAMETERS, froude_scaled(np.ones(len(PARAMETERS)), content.scale).tolist(), strict=True))
+    estimate = content.estimate
+    free = [name for name in estimate.problem.free if name not in estimate.held]
+    return [
+        (name, f"{of[name] * estimate.values[name]:.4g}", _interval(content, name, of[name]), UNITS[name])
+        for name in free
+    ]
+
+
+def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
+    """What would determine the open directions, the best first."""
+    count = len(content.report.free)
+    return [(one.what, str(count - one.rank), f"{one.smallest:.1e}") for one in content.report.cures]
+
+
+def roll_sentences(content: RollContent) -> tuple[str, ...]:
+    """The findings."""
+    return tuple(_sentences(content))
+
+
+def _sentences(content: RollContent) -> Iterator[str]:
+    estimate, report, body = content.estimate, content.report, content.estimate.problem.body
+    if "m" in estimate.problem.free:
+        yield _load(content)
+    for case in estimate.problem.cases:
+        right = stiffness(estimate.theta, body, case.load)
+        hertz = roll_frequency(estimate.theta, body, case.load)
+        upright = f"a roll period of {1.0 / hertz:.3g} s" if hertz else "which does not keep her upright"
+        if_so = f", for {' and '.join(estimate.held)} as held" if estimate.held else ""
+        mass = body.mass_kg + (estimate.values["m"] if case.load is None else case.load.mass_kg)
+        height = f"a metacentric height of {right / (G_MPS2 * mass):.3g} m"
+        yield f"{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
+    yield from _open(content)
+    for one in report.faint:
+        yield f"The data hardly show the combination {one}: its relative standard deviation is {1.0 / one.size:.2g}."
+    yield _filtered(content)
+    if not estimate.settled:
+        yield "Instruments and noise models did not settle; expected longer runs, or a better start under [start]."
+    if estimate.surprise > TUNING.most_surprise:
+        yield (
+            f"Residuals follow the rudder {estimate.surprise:.2g} times as much as noise would: the model misses "
+            "something, or a strong roll moment of waves hides what the rudder does."
+        )
+    if estimate.weak:
+        yield (
+            "Waves and sensors hide what the rudder does, so that estimates lean towards those of least squares: the "
+            f"information from the rudder is {estimate.strength:.2g} times what noise alone would give, expected "
+            f"{TUNING.least_strength:g} times or more by larger rudder angles, longer runs or calmer water."
+        )
+    if estimate.answering:
+        yield (
+            "The rudder seems to answer what rolls the ship: it follows the noise of roll, as one that answers nothing "
+            f"does by chance in {_chance(estimate.unanswered)} of trials. Estimates then lean towards what the "
+            "helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
+        )
+    for name in estimate.reached:
+        yield (
+            f"{name} stands at a bound of the search, {estimate.values[name]:.4g} {UNITS[name]}: it is no estimate; "
+            "give it under [known], or a better start under [start]."
+        )
+    if estimate.method == "ls":
+        yield "Least squares is biased where waves or sensors disturb, and its intervals do not say so; use iv."
+    if not estimate.trusted:
+        yield "The 95 % intervals are not to be trusted, for what is said above; they may be far too short."
+
+
+def _load(content: RollContent) -> str:
+    """The unknown load, where the data tell it."""
+    estimate, (low, high) = content.estimate, interval(content, "m")
+    value = f"{estimate.values['m']:.4g} kg"
+    if "m" in estimate.held:
+        return f"The unknown load is not known: the load cases do not determine it, and {value} is its start value."
+    if "m" in estimate.reached:
+        return f"The unknown load is not known: its search ended at a bound, {value}."
+    known = f"95 % interval {low:.4g} to {high:.4g} kg"
+    only = f", for {' and '.join(estimate.held)} as held" if "m" in content.report.undetermined else ""
+    if not estimate.trusted:
+        return f"The unknown load is not known: the estimate of {value} with the {known}{only} is not to be trusted."
+    return f"The unknown load is {value}, {known}{only}."
+
+
+def _open(content: RollContent) -> Iterator[str]:
+    report, held = content.report, content.estimate.held
+    if not report.open:
+        yield f"The load cases determine all {len(report.free)} parameters (rank {report.rank})."
+        return
+    yield (
+        f"The load cases determine {report.rank} of {len(report.free)} parameters, whatever the data are. "
+        f"{', '.join(held)} {'was' if len(held) == 1 else 'were'} held at the start value."
+    )
+    for one in report.open:
+        yield f"The data would be the same if these changed together: {one}. So none of them is known by itself."
+
+
+def _chance(p_value: float) -> str:
+    return percent(p_value) if p_value >= LEAST_CHANCE else f"less than {percent(LEAST_CHANCE)}"
+
+
+def _filtered(content: RollContent) -> str:
+    used = content.filter
+    if len(used.taps) == 1:
+        return f"No filter; {used.samples_per_period:.0f} samples in a period of roll."
+    return (
+        f"The low-pass filter has a bandwidth of {used.bandwidth_hz:.3g} Hz and passes {percent(used.passed)} of "
+        f"roll at {used.roll_hz:.3g} Hz; {used.samples_per_period:.0f} samples in its period."
+    )
+
+
+def roll_json(content: RollContent) -> str:
+    """All results as JSON."""
+    estimate, report = content.estimate, content.report
+    return strict_json(
+        {
+            "command": content.command,
+            "version": content.version,
+            "method": estimate.method,
+            "parameters": {name: _parameter(content, name) for name in estimate.values},
+            "null_space": {
+                "free": list(report.free),
+                "rank": report.rank,
+                "singular_values": report.singular_values.tolist(),
+                "open": [one.change for one in report.open],
+                "faint": [_direction_entry(one) for one in report.faint],
+                "cures": [vars(one) for one in report.cures],
+            },
+            "filter": {
+                "bandwidth_hz": content.filter.bandwidth_hz,
+                "roll_hz": content.filter.roll_hz,
+                "passed": content.filter.passed,
+                "sample_time_s": content.filter.step_s,
+            },
+            **({} if content.scale is None else {"at_full_scale": _scaled(content)}),
+            "settled": estimate.settled,
+            "surprise": finite(estimate.surprise),
+            "instrument_strength": finite(estimate.strength),
+            "chance_that_the_rudder_answers_nothing": finite(estimate.unanswered),
+            "reached_bounds": list(estimate.reached),
+            "intervals_trusted": estimate.trusted,
+            "remarks": list(roll_sentences(content)),
+            "notes": list(content.notes),
+        }
+    )
+
+
+def _scaled(content: RollContent) -> dict[str, object]:
+    estimate, scale = content.estimate, content.scale
+    assert scale is not None
+    std = np.array([estimate.std.get(name, 0.0) for name in PARAMETERS])
+    values, stds = froude_scaled(estimate.theta, scale).tolist(), froude_scaled(std, scale).tolist()
+    rows = zip(PARAMETERS, values, stds, strict=True)
+    entries = {
+        name: {"value": value, "std": deviation or None, "determined": _determined(content, name)}
+        for name, value, deviation in rows
+    }
+    return {"scale": scale, **entries}
+
+
+def _determined(content: RollContent, name: str) -> bool:
+    return name in content.estimate.problem.free and name not in content.report.undetermined
+
+
+def _direction_entry(one: Direction) -> dict[str, object]:
+    return {"change": one.change, "relative_std": 1.0 / one.size}
+
+
+def _parameter(content: RollContent, name: str) -> dict[str, object]:
+    estimate = content.estimate
+    free = name in estimate.problem.free
+    std = estimate.std[name] if free and name not in estimate.held else None
+    return {
+        "value": estimate.values[name],
+        "unit": UNITS[name],
+        "std": std,
+        "determined": _determined(content, name),
+    }
+
+
+def roll_html(content: RollContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("expdesign.export.roll_page", "roll.html").render(
+        content=content,
+        sentences=roll_sentences(content),
+        parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
+        parameter_rows=parameter_rows(content),
+        scaled_header=[name.capitalize() for name in SCALED_HEADER],
+        scaled_rows=scaled_rows(content),
+        cure_header=[name.capitalize() for name in CURE_HEADER],
+        cure_rows=cure_rows(content),
+    )

@@ -1,0 +1,193 @@
+"""`expdesign identify-steps`: a model of speed and yaw rate, and a nominal vessel, from steps of both commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from expdesign import __version__
+from expdesign.errors import InputError
+from expdesign.export import Content, vessel_toml, write_files
+from expdesign.export.step_trial_page import (
+    REPEAT_HEADER,
+    StepTrialContent,
+    Validated,
+    nominal_rows,
+    repeat_rows,
+    sentences,
+    step_model_json,
+    step_trial_html,
+    to_repeat,
+)
+from expdesign.progress import Progress, silent, within
+from expdesign.records import load_records
+from expdesign.scenario import load_vessel
+from expdesign.signals import Record
+from expdesign.step_trials import (
+    Controls,
+    Sailed,
+    StepTrial,
+    controls_of,
+    fit_percent,
+    nominal_vessel,
+    sailed,
+    with_delays,
+)
+from expdesign.step_trials import identify_steps as identified
+from expdesign.vessel import Vessel
+from expdesign.workflows.data.step_list import listed_steps
+from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.steps.measured import data_files
+
+SIMULATED_STEP_S = 0.5
+"""Least time between samples of a simulation that is compared with data [s]."""
+
+
+def identify_steps(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path | None = None,
+    throttle: Sequence[str] = (),
+    rudder: Sequence[str] = (),
+    tests: Sequence[Path] = (),
+    steps: Path | None = None,
+    velocity: str = "auto",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """Model and nominal vessel from steps, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files, or folders of them.
+        out: folder, or None.
+        vessel: what was known before, which the steps update; None for the model of two degrees of freedom alone.
+        throttle, rudder: names of signals; found by their kinds when empty.
+        tests: files that are simulated only.
+        steps: list of those that were to be sailed, see `listed_steps`; others are not asked to be repeated.
+        velocity: source of the velocities, as in `estimate`.
+        seed: of the calibration of the test for steady state.
+        progress: of the command.
+
+    Raises:
+        InputError: arguments or files that are wrong.
+        NoAnswer: the data are no step trial, or tell too little.
+    """
+    for path in tests:
+        if path in data:
+            raise InputError(f"{path} is given to identify and to test, expected only one of them")
+    progress("reading the data", 0.0)
+    ship = None if vessel is None else load_vessel(vessel)
+    record = _record(data, ship, velocity)
+    names = record.batches[0].input_names
+    controls = controls_of(names, throttle, rudder)
+    listed = None if steps is None else listed_steps(steps, names, controls, ship)
+    apart = _record(tests, ship, velocity).batches if tests else ()
+    progress("finding steady states and fitting responses", 0.1)
+    trial = identified(record, controls, seed=seed, progress=within(progress, 0.1, 0.7))
+    content = StepTrialContent(
+        trial=trial,
+        listed=listed,
+        before=ship,
+        nominal=None if ship is None else _nominal(ship, trial, names),
+        own=tuple(_validated(trial, batch) for batch in trial.batches),
+        tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
+        notes=record.notes,
+        command=_command(data, vessel, throttle, rudder, tests, steps, velocity, seed),
+        version=__version__,
+    )
+    progress("drawing the page", 0.9)
+    files: dict[str, Content] = {
+        "step-model.json": step_model_json(content),
+        "step-trial.html": partial(step_trial_html, content),
+    }
+    if content.nominal is not None:
+        files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+
+
+def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
+    """The record as measured: lags and dead times that a vessel file states are not undone, as they are to be found."""
+    return load_records(
+        list(data_files(data)),
+        vessel_inputs=None if ship is None else ship.model.inputs,
+        velocity=velocity,
+        heading_std_rad=None if ship is None else ship.sensors.heading_rad or None,
+        outputs=("u", "r"),
+        actuators=() if ship is None else ship.model.actuators,
+    )
+
+
+def _nominal(ship: Vessel, trial: StepTrial, names: Sequence[str]) -> Vessel:
+    found = nominal_vessel(ship, trial.samples, trial.delays, names)
+    return replace(with_delays(found, trial.controls, trial.delays), name=f"{ship.name}-steps")
+
+
+def _turned(batch: Sailed, trial: StepTrial) -> Sailed:
+    return replace(batch, commands=batch.commands * [1.0, trial.rudder_sign])
+
+
+def _validated(trial: StepTrial, batch: Sailed) -> Validated:
+    every = max(1, round(SIMULATED_STEP_S / batch.sample_time_s))
+    states, step_s = batch.state[::every], every * batch.sample_time_s
+    simulated = trial.model.simulated(states[0], batch.commands[::every], sample_time_s=step_s)
+    return Validated(
+        name=batch.name,
+        time_s=batch.time_s[::every],
+        measured=states,
+        simulated=simulated,
+        fit_percent=fit_percent(states, simulated),
+    )
+
+
+def _command(
+    data: Sequence[Path], vessel: Path | None, throttle: Sequence[str], rudder: Sequence[str], tests: Sequence[Path],
+    steps: Path | None, velocity: str, seed: int,
+) -> str:  # fmt: skip
+    options = {
+        "--vessel": vessel, "--throttle": tuple(throttle), "--rudder": tuple(rudder), "--test": tuple(tests),
+        "--steps": steps, "--velocity": velocity, "--seed": seed,
+    }  # fmt: skip
+    return command_text("identify-steps", data, options, usual={"--velocity": "auto", "--seed": 0})
+
+
+def _comments(content: StepTrialContent) -> tuple[str, ...]:
+    return (
+        "Nominal vessel after a step trial: parameters, standard deviations and correlations from what was known",
+        'before and from the steps. Design on with [design] prior = "parameter_std", refine with expdesign estimate.',
+        content.command,
+    )
+
+
+def _summary(content: StepTrialContent) -> dict[str, object]:
+    trial: StepTrial = content.trial
+    controls: Controls = trial.controls
+    return {
+        "throttle": controls.words[0],
+        "rudder": controls.words[1],
+        "holds": len(trial.holds),
+        "steps_that_count": len(trial.counted),
+        "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
+        "delay_throttle_s": trial.delays[0][0],
+        "delay_rudder_s": trial.delays[1][0],
+        "fit": {
+            part.name: {"U": part.fit_percent[0], "r": part.fit_percent[1]} for part in (*content.own, *content.tests)
+        },
+        "remarks": [*sentences(content), *content.notes],
+    }
+
+
+def _tables(content: StepTrialContent) -> tuple[TextTable, ...]:
+    tables = [
+        TextTable(title="The step trial", header=("finding",), rows=tuple((text,) for text in sentences(content)))
+    ]
+    if to_repeat(content):
+        tables.append(TextTable(title="Steps to repeat", header=REPEAT_HEADER, rows=tuple(repeat_rows(content))))
+    if content.nominal is not None:
+        header = ("parameter", "before", "after the steps")
+        tables.append(TextTable(title="Nominal vessel", header=header, rows=tuple(nominal_rows(content))))
+    return tuple(tables)
