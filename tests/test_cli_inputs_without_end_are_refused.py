@@ -17,9 +17,8 @@ from expdesign.cli import main
 from expdesign.errors import FileError, InputError
 from expdesign.export import build_bridge_route, find_format, write_files
 from expdesign.export.formats.check import check_rtz
-from expdesign.plan.tuning import PLAN
 from expdesign.scenario import load_scenario
-from expdesign.workflows.steps.planned import plan_problem
+from expdesign.workflows.steps.planned import MOST_RUNS, plan_problem
 from scenario_files import spoil, write_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -80,9 +79,9 @@ def test_more_runs_than_a_plan_can_have_are_refused_before_planning() -> None:
     scenario = load_scenario(SCENARIOS / "harbour.toml")
 
     class Design:
-        repeats = (PLAN.most_runs, 1)
+        repeats = (MOST_RUNS, 1)
 
-    with pytest.raises(InputError, match=f"has {PLAN.most_runs + 1} runs, expected at most {PLAN.most_runs} in one"):
+    with pytest.raises(InputError, match=f"has {MOST_RUNS + 1} runs, expected at most {MOST_RUNS} in one"):
         plan_problem(scenario, (), Design())
 
 

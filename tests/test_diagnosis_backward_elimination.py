@@ -24,6 +24,8 @@ from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_fo
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
+    ABOUT_AS_LIKELY,
+    NEARLY_AS_MUCH,
     Work,
     _best_on_held_out,
     selection_round,
@@ -283,7 +285,7 @@ def test_a_cause_with_fewer_numbers_comes_before_one_that_imitates_many():
         )
 
     wind, block = item(100.0, 3, imitates=True), item(100.0, 3)
-    near, far = (item(share * 100.0 * TUNING.nearly_as_much, 1) for share in (1.01, 0.99))
+    near, far = (item(share * 100.0 * NEARLY_AS_MUCH, 1) for share in (1.01, 0.99))
     assert simplest([wind, near]) is near
     assert simplest([wind, far, near]) is near
     assert simplest([wind, far]) is wind
@@ -298,7 +300,7 @@ def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data
     other comes first where it is better by five. Of the same cause only one with fewer numbers is a rival, where it is
     about as likely.
     """
-    about, less = (100.0 * (TUNING.about_as_likely + more) for more in (0.01, -0.01))
+    about, less = (100.0 * (ABOUT_AS_LIKELY + more) for more in (0.01, -0.01))
 
     def item(cause: str, numbers: int, fit_percent: float, gain: float) -> SimpleNamespace:
         candidate = Candidate(cause=cause, free={})

@@ -10,8 +10,7 @@ import hidden_effects as sea
 from clean_trials import SHIP_50M, at_rate, clean_trial, p_values
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis.causes.candidate import Candidate
-from expdesign.diagnosis.data.noise import Noise, fit_ar_noise, linear_basis, whitened
-from expdesign.diagnosis.data.tuning import TUNING
+from expdesign.diagnosis.data.noise import WHITE_SHARE, Noise, fit_ar_noise, linear_basis, whitened
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import (
     FitOptions,
@@ -187,7 +186,7 @@ def test_an_autoregression_with_its_white_share_is_whitened():
     for k in range(1, 4000):
         series[:, k] = 0.8 * series[:, k - 1] + white[:, k]
     noise = fit_ar_noise(series)
-    white_part = np.sqrt(TUNING.white_share * (series**2).mean()) * rng.standard_normal(series.shape)
+    white_part = np.sqrt(WHITE_SHARE * (series**2).mean()) * rng.standard_normal(series.shape)
     rest = whitened(series + white_part, noise)
     assert np.allclose(rest.std(axis=(0, 1)), 1.0, atol=4 / np.sqrt(2 * 16000))
     for lag in (1, 2, 3, 5, 10):

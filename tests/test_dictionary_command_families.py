@@ -7,8 +7,7 @@ import pytest
 
 from design_case import SCENARIOS, one_line, spec, vessel
 from expdesign.dictionary import FAMILIES, PrimitiveSpec, build_primitive, complete_settings, family
-from expdesign.dictionary.trim import lost
-from expdesign.dictionary.tuning import TUNING
+from expdesign.dictionary.trim import STEADY_CHANGE, lost
 from expdesign.errors import InputError
 from expdesign.export.files.design_files import dictionary_files
 from expdesign.information import score_primitives
@@ -50,7 +49,7 @@ def test_commands_keep_limits_and_rates_and_begin_in_equilibrium(kind, ship: str
     slack = 1e-9 * np.abs(commands).max()
     assert ((commands >= low - slack) & (commands <= high + slack)).all()
     assert (np.abs(np.diff(commands, axis=0)) <= rate * SHIPS[ship].sample_time_s + slack).all()
-    assert lost(SHIPS[ship], run.entry_velocity, run.entry_inputs) <= TUNING.steady_change
+    assert lost(SHIPS[ship], run.entry_velocity, run.entry_inputs) <= STEADY_CHANGE
     again = simulate(SHIPS[ship], run.commands, velocity=run.entry_velocity)
     np.testing.assert_allclose(again.velocity, run.trajectory.velocity, atol=1e-9)
 

@@ -20,7 +20,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.durations.maximise import Optimum, maximise, maximised
-from expdesign.durations.maximise.maximise import CVXPY, NEWTON, WORKING_SET
+from expdesign.durations.maximise.maximise import CVXPY, NEWTON, TARGET_GAP, WORKING_SET
 from expdesign.durations.solve import concave_problem
 from expdesign.durations.tuning import TUNING
 from expdesign.errors import NoAnswer
@@ -92,7 +92,7 @@ def test_cvxpy_and_the_quickest_method_agree(case: str):
     assert stated.method == CVXPY
     if task.smooth:
         assert own.method in (NEWTON, WORKING_SET)
-        assert stated.gap < TUNING.target_gap
+        assert stated.gap < TARGET_GAP
         np.testing.assert_allclose(stated.fractions, own.fractions, atol=1e-4)
     assert (task.polytope.rows @ stated.fractions <= task.polytope.limits + (1e-12 if task.smooth else 1e-8)).all()
 

@@ -20,8 +20,7 @@ from expdesign.errors import InputError
 from expdesign.export import PlannedTrack, Route, Waypoint, build_bridge_route, build_route, find_format, route_files
 from expdesign.export.formats.check import check_rtz
 from expdesign.export.routes import read_plan
-from expdesign.export.routes.chords import corridor, corridor_in_water, sides_needed
-from expdesign.export.tuning import TUNING
+from expdesign.export.routes.chords import WAYPOINT_SPACING, corridor, corridor_in_water, sides_needed
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory
 
@@ -87,7 +86,7 @@ def test_a_ship_in_the_corridor_is_in_allowed_water(route: Route) -> None:
 
 
 def test_waypoints_are_ship_lengths_apart_and_fewer_than_those_of_the_fine_route(route: Route) -> None:
-    assert spacings(route).min() >= TUNING.waypoint_spacing * SHIP_M
+    assert spacings(route).min() >= WAYPOINT_SPACING * SHIP_M
     fine = build_route(case.planned(), safe_water=case.plan().area.water)
     assert len(route.waypoints) < len(fine.waypoints) / 2
 

@@ -14,9 +14,8 @@ from expdesign.conventions import to_n_frame
 from expdesign.errors import NoPlan
 from expdesign.export.cards import cards_html
 from expdesign.export.cards.card import card_groups, run_orders, steady_s
-from expdesign.export.cards.orders import condensed, look_out
+from expdesign.export.cards.orders import FARTHEST_DANGER_M, MOST_ORDER_ROWS, ORDER_TOLERANCE, condensed, look_out
 from expdesign.export.report.content import primitive_runs
-from expdesign.export.tuning import TUNING
 
 
 @cache
@@ -116,7 +115,7 @@ def test_straight_lines_between_the_orders_give_the_commands_back(name: str) -> 
     lines = np.stack([np.interp(np.arange(len(values)), kept, column[kept]) for column in values.T], axis=1)
     span = np.maximum(np.ptp(values, axis=0), 1e-9)
     assert (np.abs(lines - values) / span)[:, np.ptp(values, axis=0) > 1e-9].max() == pytest.approx(missed, abs=1e-12)
-    assert missed <= TUNING.order_tolerance or len(kept) == TUNING.most_order_rows
+    assert missed <= ORDER_TOLERANCE or len(kept) == MOST_ORDER_ROWS
     assert (kept[0], kept[-1]) == (0, len(values) - 1)
 
 
@@ -131,7 +130,7 @@ def test_distances_to_danger_are_those_of_a_known_channel() -> None:
     assert seen.nearest_m == pytest.approx(75)
     assert seen.room_m == pytest.approx((330, 10))
     open_sea = shapely.MultiPolygon([shapely.box(-1e5, -1e5, 1e5, 1e5)])
-    assert look_out(pose, hull_b=case.tug().hull_b, water=open_sea).ahead_m == TUNING.farthest_danger_m
+    assert look_out(pose, hull_b=case.tug().hull_b, water=open_sea).ahead_m == FARTHEST_DANGER_M
 
 
 def test_no_side_is_nearer_than_the_nearest_danger() -> None:

@@ -11,7 +11,6 @@ import pytest
 
 from expdesign.export.monitor_page import Moment, MonitorContent, sentences
 from expdesign.monitoring import (
-    TUNING,
     Alarm,
     Calibration,
     Change,
@@ -27,6 +26,7 @@ from expdesign.monitoring import (
     threshold,
     watch,
 )
+from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
 from expdesign.monitoring.evidence import stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
@@ -115,7 +115,7 @@ def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
 def test_the_calibration_finds_noise_and_force(calibration: Calibration) -> None:
     assert calibration.std[0] == pytest.approx(1.0, abs=0.03)
     quick, slow = calibration.force.variance.reshape(2, FORCES)
-    total = quick + slow / (1.0 + TUNING.spare)  # ten hours show one value of what varies within half a day
+    total = quick + slow / (1.0 + SPARE)  # ten hours show one value of what varies within half a day
     assert np.all((total > 0.05) & (total < 0.5))  # 0.18 was drawn, the slow half of it once
     assert np.all(np.abs(calibration.baseline) < 5 * calibration.baseline_std)
     assert calibration.watched.all()
@@ -197,7 +197,7 @@ def test_what_a_force_surprises_by_is_one_on_average_per_component(calibration: 
 def test_the_threshold_grows_with_the_time_between_false_alarms() -> None:
     assert threshold(10, 1e4) == pytest.approx(np.log(2e5))
     assert threshold(10, 1e6) > threshold(10, 1e4) > threshold(1, 1e4)
-    assert TUNING.fewest_stretches > 0
+    assert FEWEST_STRETCHES > 0
 
 
 HOUR = 3600.0

@@ -24,6 +24,7 @@ from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advised, changes, trials
+from expdesign.plan.remedies.advice import REMEDY_WORK
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.tuning import PLAN
@@ -322,7 +323,7 @@ def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(mon
 
     monkeypatch.setattr(trials, "promising", likely)
     text = str(advised(case, refused))
-    fits = 1.0 + spent <= PLAN.remedy_work
+    fits = 1.0 + spent <= REMEDY_WORK
     assert len(made) == fits
     assert ("as much work as planning: design.excluded with deceleration" in text) != fits
 

@@ -11,9 +11,8 @@ import shapely
 from expdesign.plan.chart import GoalDistance
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search import place_runs
-from expdesign.plan.search.beam import _in_order
+from expdesign.plan.search.beam import SORTED_AT_ONCE, _in_order
 from expdesign.plan.search.local_search import clear_successors, runs_clear
-from expdesign.plan.search.tuning import SEARCH
 from plan_case import leg_water, primitive, space_of
 
 START = np.array([0.0, -400.0, 0.0])
@@ -38,7 +37,7 @@ def begun(space: SearchSpace) -> PartialPlans:
 
 
 def test_order_is_that_of_a_stable_sort_whatever_is_checked_at_once():
-    values = np.random.default_rng(0).integers(0, 500, 3 * SEARCH.sorted_at_once).astype(float)
+    values = np.random.default_rng(0).integers(0, 500, 3 * SORTED_AT_ONCE).astype(float)
     values[::7] = np.inf
     expected = np.argsort(values, kind="stable")[: np.isfinite(values).sum()]
     for at_once in (1000, len(values)):

@@ -16,8 +16,7 @@ from expdesign.plan.monte_carlo.return_paths import build_return_paths
 from expdesign.plan.monte_carlo.risk import upper_limit
 from expdesign.plan.monte_carlo.trials import CollisionCheck
 from expdesign.plan.runs.dispersion import draw_truths
-from expdesign.plan.runs.ensemble import Fleet, Truths
-from expdesign.plan.runs.tuning import RUNS
+from expdesign.plan.runs.ensemble import FEW_SHIPS, Fleet, Truths
 from expdesign.plan.values import PlanSettings
 from expdesign.plan.verify.checks import hull_clearance
 from expdesign.signals import Commands, Trajectory
@@ -84,12 +83,12 @@ def test_a_part_of_a_fleet_sails_as_it_would_in_the_whole(name):
 
 @pytest.mark.parametrize("name", RESPONSES)
 def test_many_ships_at_once_sail_as_few_do_one_by_one(name):
-    vessel, count = slow(RESPONSES[name]), 2 * RUNS.few_ships
+    vessel, count = slow(RESPONSES[name]), 2 * FEW_SHIPS
     drawn = draw_truths(vessel, Environment(current_std_mps=0.2, wind_std_mps=1.0), count, np.random.default_rng(5))
     fleet = Fleet(vessel, CALM, drawn, state=np.zeros(6), standing=np.zeros(4), rng=np.random.default_rng(0))
     some = np.arange(0, count, 3)
     few = fleet.part(some)
-    assert len(some) <= RUNS.few_ships < count
+    assert len(some) <= FEW_SHIPS < count
     for row in np.cumsum(np.random.default_rng(0).normal(0, [0.5, 0.05, 0.5, 0.05], (20, count, 4)), axis=0):
         fleet.advance(row)
         few.advance(row[some])

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control import CONTROL, Helmsman
+from expdesign.plan.control import Helmsman
+from expdesign.plan.control.ships import HELM_RUN_UP_HULLS
+from expdesign.plan.monte_carlo.procedure import YAW_RATE_SHARE
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs.ensemble import Fleet, Truths
 from expdesign.simulation import CALM
@@ -24,10 +26,10 @@ def test_a_ship_beside_the_track_is_steady_on_it_when_the_run_begins(side):
     fleet = Fleet(vessel, CALM, truths, state=start, standing=standing, rng=rng)
     helm = Helmsman(vessel=vessel, environment=CALM, ship=water.ship)
     unexplained = np.zeros((count, 3))
-    for _ in range(int(CONTROL.helm_run_up_hulls * vessel.length_m / speed / vessel.sample_time_s)):
+    for _ in range(int(HELM_RUN_UP_HULLS * vessel.length_m / speed / vessel.sample_time_s)):
         before = fleet.states
         desired = np.column_stack([before[:, :1], 0 * before[:, :2], np.full((count, 1), speed), 0 * before[:, :2]])
         fleet.advance(helm.commands(desired, before, fleet.given, unexplained=unexplained))
         unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
     assert np.abs(wrap_angle(fleet.states[:, 2])).max() < MONTE_CARLO.heading_rad
-    assert np.abs(fleet.states[:, 5]).max() < MONTE_CARLO.yaw_rate_share * water.ship.yaw_rate_radps
+    assert np.abs(fleet.states[:, 5]).max() < YAW_RATE_SHARE * water.ship.yaw_rate_radps

@@ -17,13 +17,13 @@ from expdesign.plan.local_planner.transitions import (
     DIRECTIONS,
     GOING_ON,
     LENGTHS,
+    SETTLING_SHARE,
     TURNS,
     LegTimes,
     leg_times,
     transition_losses_s,
     transitions,
 )
-from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.simulation import CALM
 from plan_case import find_leg, leg_water
 
@@ -97,7 +97,7 @@ def test_half_of_optimised_legs_take_as_long_as_the_rule_says_within_three_secon
     rng, transit = np.random.default_rng(3), water.ship.transit_speed_mps
     changes = leg_end(water.vessel, CALM, 0.0, None, top_mps=transit, yaw_rate_radps=0.3).changes
     rule = leg_times(water.vessel, water.ship, changes)
-    assert rule.settle_s == pytest.approx(LOCAL.settling_share * to_work_s(water.vessel))
+    assert rule.settle_s == pytest.approx(SETTLING_SHARE * to_work_s(water.vessel))
     off_s = []
     for _ in range(legs):
         speeds = rng.choice([0.0, 0.4, 0.8], 2) * transit

@@ -10,9 +10,8 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control.capability import capability
 from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins
-from expdesign.plan.legs._ompl import dubins_curve, search_dubins
+from expdesign.plan.legs._ompl import SEARCH_BATCHES, dubins_curve, search_dubins
 from expdesign.plan.legs.dubins import find_path
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
@@ -69,7 +68,7 @@ def test_a_search_without_a_way_on_draws_no_more_than_its_batches(monkeypatch):
     low, high = np.array([-200.0, -300.0]), np.array([500.0, 300.0])
     ends = np.zeros(3), np.array([300.0, 0.0, 0.0])
     assert search_dubins(*ends, radius_m=40.0, spacing_m=10.0, low=low, high=high, holds=free, seed=1) is None
-    assert max(drawn) == LEGS.search_batches + 1  # ended by these, not by iterations
+    assert max(drawn) == SEARCH_BATCHES + 1  # ended by these, not by iterations
 
 
 def test_a_walled_in_vessel_has_no_leg():

@@ -15,7 +15,7 @@ from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
 from expdesign.plan.monte_carlo import trials
-from expdesign.plan.monte_carlo.guidance import Guidance
+from expdesign.plan.monte_carlo.guidance import ARRIVED_HULLS, GO_AROUNDS, PARALLEL_SHARE, STANDSTILL_SHARE, Guidance
 from expdesign.plan.monte_carlo.procedure import tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
 from expdesign.plan.monte_carlo.trials import CollisionCheck, Trials, sail_trials
@@ -76,7 +76,7 @@ def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     np.testing.assert_array_equal(ends, 1)
     begun = ~np.isnan(trials.used)
     assert (trials.used[begun] <= 1.0).all()
-    assert trials.go_arounds.max() <= MONTE_CARLO.go_arounds
+    assert trials.go_arounds.max() <= GO_AROUNDS
     over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
     assert not trials.samples[1:][over].any()  # nothing is sailed after the end
 
@@ -164,7 +164,7 @@ def test_a_leg_too_short_to_return_to_is_sailed_beside_its_place_as_far_as_the_r
         assert not found.go_arounds.any()
         beside[position_m] = found.poses[-1, :, 1], found.samples
     (narrow, late), (wide, soon) = beside[40.0], beside[160.0]
-    most_m = MONTE_CARLO.standstill_share * MONTE_CARLO.parallel_share * 40.0
+    most_m = STANDSTILL_SHARE * PARALLEL_SHARE * 40.0
     assert (np.abs(wide[:2]) < 2.0).all()  # a leg long enough is returned to
     assert (np.abs(narrow[2:]) < most_m + 2.0).all()
     assert (wide[2:] * [-1, 1] > np.abs(narrow[2:])).all()
@@ -288,8 +288,8 @@ def test_ships_reach_the_goal_only_if_they_are_there():
     found = guidance.sail(fleet, np.zeros((ships, 3)))
     off_m = np.hypot(*(found.poses[-1, :, :2] - last[-1, :2]).T)
     assert 0 < found.begun.sum() < ships  # some currents are faster than the ship
-    assert off_m[found.begun].max() <= MONTE_CARLO.arrived_hulls * water.vessel.length_m
-    assert off_m[~found.begun].min() > MONTE_CARLO.arrived_hulls * water.vessel.length_m
+    assert off_m[found.begun].max() <= ARRIVED_HULLS * water.vessel.length_m
+    assert off_m[~found.begun].min() > ARRIVED_HULLS * water.vessel.length_m
 
 
 @cache

@@ -11,9 +11,9 @@ from scipy.optimize import fsolve
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.control import CONTROL, HelmShip
+from expdesign.plan.control import HelmShip
 from expdesign.plan.control.capability import capability, needs_helm
-from expdesign.plan.control.helm_capability import steady_turns
+from expdesign.plan.control.helm_capability import LATERAL_MPS2, steady_turns
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Conduct, simulate, steady_ahead, stopping, turning_circle
@@ -143,7 +143,7 @@ def test_legs_turn_no_tighter_than_the_helm_can_hold_and_never_on_the_spot():
         assert found.spot_rate_radps == 0
         assert found.turning_radius_m >= max(found.turns[0].radius_m, found.turns[-1].radius_m, 1.5 * ship.length_m)
         gentle = [turn for turn in found.turns if turn.radius_m >= found.turning_radius_m]
-        assert all(abs(turn.surge_mps * turn.yaw_rate_radps) <= CONTROL.lateral_mps2 for turn in gentle)
+        assert all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in gentle)
 
 
 def test_a_radius_that_hard_over_does_not_give_is_refused_with_both_numbers():

@@ -11,15 +11,13 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.checked import drawn_lateness_s
+from expdesign.plan.checked import LATENESS_TRIALS, drawn_lateness_s
 from expdesign.plan.control import capability
 from expdesign.plan.monte_carlo import sail_trials
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial
-from expdesign.plan.tuning import PLAN
 from expdesign.scenario import load_scenario
-from expdesign.shortest_day.prices import DraftedDay, _legs_s
-from expdesign.shortest_day.tuning import TUNING
+from expdesign.shortest_day.prices import LEAST_LEG_S, DraftedDay, _legs_s
 from expdesign.simulation import Environment
 from expdesign.workflows.steps.day import with_leg_speed
 from plan_case import acceleration, area, ship
@@ -51,7 +49,7 @@ def test_a_draft_is_expected_to_take_as_long_as_other_drawn_trials_of_it(drafted
     draft = drafted.draft
     others = sail_trials(draft.water, draft.sailed, draws=400, rng=np.random.default_rng(5))
     taken = others.samples.sum(axis=0)[others.completed] * draft.sailed.commands.sample_time_s
-    error = taken.std() * np.sqrt(1 / len(taken) + 1 / PLAN.lateness_trials)
+    error = taken.std() * np.sqrt(1 / len(taken) + 1 / LATENESS_TRIALS)
     assert drafted.expected_s == pytest.approx(drafted.day_s + draft.late_s.sum())
     assert abs(drafted.expected_s - taken.mean()) < 4 * error
 
@@ -63,7 +61,7 @@ def test_a_run_costs_what_trials_lose_on_the_leg_to_it(drafted):
     later[to_run] += 100.0
     slow = replace(drafted, draft=replace(drafted.draft, late_s=later))
     before, after = (_legs_s(("go",), [day], np.array([45.0])) for day in (drafted, slow))
-    assert before[0] > TUNING.least_leg_s
+    assert before[0] > LEAST_LEG_S
     assert after - before == pytest.approx(100.0 / 2)  # over both runs
 
 

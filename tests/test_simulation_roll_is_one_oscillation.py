@@ -11,8 +11,8 @@ from design_case import SCENARIOS
 from diagnosis_case import hidden_record, vessel_of
 from expdesign import workflows
 from expdesign.diagnosis.data.windows import cut_windows
+from expdesign.diagnosis.motion.equations_of_motion import ROLL_ANGLE_RAD
 from expdesign.diagnosis.motion.simulation import simulate_windows
-from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.dictionary.trim import drift
@@ -91,7 +91,7 @@ def test_the_diagnosis_moves_as_the_file_that_it_writes(tmp_path):
     states = simulate_windows(again, windows, start).states
     for index, inputs in enumerate(windows.batch_inputs):
         commands = Commands(sample_time_s=windows.step_s, names=SHIP.model.inputs, values=inputs)
-        parts = math.ceil(2 * math.pi / ROLL.period_s * windows.step_s / TUNING.roll_angle_rad)
+        parts = math.ceil(2 * math.pi / ROLL.period_s * windows.step_s / ROLL_ANGLE_RAD)
         sailed = simulate(extended, commands, velocity=STATE[1], substeps=parts)
         np.testing.assert_allclose(states[index, :, :3], sailed.velocity[:-1], atol=1e-9)
 

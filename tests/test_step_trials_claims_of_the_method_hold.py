@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from expdesign.export.step_trial_page.content import SIGNIFICANT
 from expdesign.step_trials.holds import Hold
 from expdesign.step_trials.regression import Sampled, ridge
 from expdesign.step_trials.responses import Transient, first_order, fit_first_order
 from expdesign.step_trials.samples import Plateau, StepSample
 from expdesign.step_trials.surfaces import Comparison, comparisons
-from expdesign.step_trials.tuning import TUNING
 
 CONSTANT_S = 4.0
 
@@ -97,7 +97,7 @@ def test_play_and_a_biased_rudder_are_found_with_their_size(kind: str, wrong: di
     for seed in range(20):
         found = rudder_finding(kind, rudder_steps(SIDES, seed, **wrong))
         assert found is not None
-        assert found.p_value < TUNING.significant
+        assert found.p_value < SIGNIFICANT
         sizes.append(abs(found.difference))
     assert np.mean(sizes) == pytest.approx(0.02, rel=0.25)
 
@@ -106,8 +106,8 @@ def test_without_them_findings_are_as_rare_as_stated() -> None:
     seeds = 200
     for kind in ("hysteresis", "asymmetry"):
         found = [rudder_finding(kind, rudder_steps(SIDES, seed)) for seed in range(seeds)]
-        rate = np.mean([one is not None and one.p_value < TUNING.significant for one in found])
-        level = TUNING.significant
+        rate = np.mean([one is not None and one.p_value < SIGNIFICANT for one in found])
+        level = SIGNIFICANT
         assert rate <= level + 3 * np.sqrt(level * (1 - level) / seeds)
 
 
@@ -115,4 +115,4 @@ def test_steps_up_alone_miss_the_play_that_steps_up_and_down_show() -> None:
     up = tuple(side * level for side in (1.0, -1.0) for level in UP_AND_DOWN[:4])
     for seed in range(10):
         found = rudder_finding("hysteresis", rudder_steps(up, seed, play=0.02))
-        assert found is None or found.p_value > TUNING.significant
+        assert found is None or found.p_value > SIGNIFICANT

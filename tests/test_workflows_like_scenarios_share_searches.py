@@ -9,12 +9,11 @@ from types import SimpleNamespace
 import pytest
 
 from expdesign.growing import GrowSettings
-from expdesign.growing.search import Measure
-from expdesign.growing.tuning import TUNING
+from expdesign.growing.search import LEADERS, OFFSPRING, STRIDES, Measure
 from expdesign.memory import Memory, remembering
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, values
-from expdesign.shortest_day.tuning import TUNING as DAY_TUNING
+from expdesign.shortest_day.values import DRAFT_POOL, DRAFT_SEARCHES
 from expdesign.workflows.steps import day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
@@ -69,11 +68,11 @@ def test_a_draft_looks_at_fewer_candidates_and_says_so(monkeypatch, evaluated):
     whole = sum(evaluated)
     evaluated.clear()
     found(replace(case, plan=replace(case.plan, draft=True)), monkeypatch)
-    steps = TUNING.leaders * TUNING.offspring * len(TUNING.strides)
-    assert 0 < sum(evaluated) <= DAY_TUNING.draft_pool + DAY_TUNING.draft_searches * steps < whole / 2
+    steps = LEADERS * OFFSPRING * len(STRIDES)
+    assert 0 < sum(evaluated) <= DRAFT_POOL + DRAFT_SEARCHES * steps < whole / 2
     plans = (SimpleNamespace(draft=draft) for draft in (True, False))
     notes = [values.ShortestDay.note.fget(SimpleNamespace(plan=plan)) for plan in plans]
-    assert f"{DAY_TUNING.draft_pool} candidates of every family" in notes[0]
+    assert f"{DRAFT_POOL} candidates of every family" in notes[0]
     assert notes[1] == ""
 
 

@@ -15,13 +15,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.assessment.tuning import TUNING
 from expdesign.estimation.output_error import ActuatorTime
 from expdesign.estimation.values import Estimate
 from expdesign.reduction import TIMES, reduced
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import RATE_UNITS, Vessel, response_values, stem, with_response_values
+
+MOST_DELIVERIES = 5  # how often data are delivered with new dead times and lags, at most
+SETTLED_CHANGE = 0.5  # change of such a time, in its standard deviations, below which it is not delivered again
+TIME_CHANGE = 0.1  # of a time, for derivatives, in samples
+
 
 Attempt = Callable[[Vessel, Record, tuple[ActuatorTime, ...]], Estimate]
 """(vessel, data, times that are estimated too) -> estimate."""
@@ -51,7 +55,7 @@ def delivered_anew(raw: Record, vessel: Vessel, attempt: Attempt, *, smoothed: b
         smoothed: as in `reduced`.
     """
     ship, record = vessel, reduced(raw, vessel, smoothed=smoothed)
-    for _ in range(TUNING.most_deliveries):
+    for _ in range(MOST_DELIVERIES):
         times = known_times(vessel, ship, record)
         if not times:
             break
@@ -59,7 +63,7 @@ def delivered_anew(raw: Record, vessel: Vessel, attempt: Attempt, *, smoothed: b
         change = max(abs(found[time.name][0] - value(ship, time.name)) / found[time.name][1] for time in times)
         ship = with_times(ship, found)
         record = reduced(raw, ship, smoothed=smoothed)
-        if change < TUNING.settled_change:
+        if change < SETTLED_CHANGE:
             break
     return ship, record
 
@@ -103,7 +107,7 @@ def considered(found: Estimate, record: Record, vessel: Vessel, again: Callable[
     for name in names:
         step_s = vessel.std[name]  # what is delivered is linear in it
         if not name.endswith("_rate"):
-            step_s = min(step_s, TUNING.time_change * record.batches[0].sample_time_s)
+            step_s = min(step_s, TIME_CHANGE * record.batches[0].sample_time_s)
         later, sooner = (
             again(replace(record, batches=tuple(_moved(batch, name, change_s) for batch in record.batches)))
             for change_s in (step_s, -step_s)

@@ -24,7 +24,6 @@ from expdesign.assessment.trials import (
     starts_of,
     tried,
 )
-from expdesign.assessment.tuning import TUNING
 from expdesign.assessment.values import (
     CONTINUOUS,
     HELD_OUT,
@@ -48,6 +47,11 @@ from expdesign.progress import Progress, in_phases, silent
 from expdesign.reduction import reduced
 from expdesign.signals import Record
 from expdesign.vessel import Vessel
+
+MOST_BY_ITSELF = 20_000  # samples, averaged, up to which output error is tried without being asked for
+# how long one method takes, predictions of what is left out and the decomposition, for the progress told
+METHOD_WORK, PREDICTION_WORK, DECOMPOSITION_WORK = 0.9, 0.9, 0.1
+
 
 NO_TESTS = Record(batches=())
 TELL_CURRENT = tuple(item.name for item in PREDICTORS if CURRENT in item.unknown or item.steady)
@@ -137,7 +141,7 @@ def assess(
         names |= dict.fromkeys(own)
     methods = [method_named(name) for name in names]
     *each, predicting, decomposing = in_phases(
-        progress, *[TUNING.method_work] * len(methods), TUNING.prediction_work, TUNING.decomposition_work
+        progress, *[METHOD_WORK] * len(methods), PREDICTION_WORK, DECOMPOSITION_WORK
     )
     trials, failures = tried(work, methods, each)
     compared: tuple[HeldOut, ...] = ()
@@ -182,10 +186,10 @@ def _output_error_too(work: Work) -> tuple[tuple[str, ...], tuple[str, ...]]:
         return (), ()
     name = "oe-air" if uses_measured_wind(work.vessel, work.record) else "oe"
     samples = sum(map(len, work.seen(work.record).batches))
-    if samples <= TUNING.most_by_itself:
+    if samples <= MOST_BY_ITSELF:
         return (name,), ()
     return (), (
-        f"Output error is not tried by itself on more than {TUNING.most_by_itself} samples, averaged to what the "
+        f"Output error is not tried by itself on more than {MOST_BY_ITSELF} samples, averaged to what the "
         f"motion asks for; there are {samples}. Ask for it with --method ls iv {name}.",
     )
 

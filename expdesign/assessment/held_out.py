@@ -30,6 +30,11 @@ from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
 
+SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
+MOST_FOLDS = 4  # into which runs are divided, to be left out in turn
+SMALLEST_ERROR = 1e-4  # over the standard deviation of an output, that count
+
+
 UNBIASED = ("iv", "oe", "ls")
 """Solvers, those first that noise biases least."""
 
@@ -79,7 +84,7 @@ def ranked(found: Sequence[HeldOut]) -> list[int]:
 
     def place(index: int) -> tuple[bool, int, float]:
         item = found[index]
-        equal = item.share <= (1.0 + TUNING.same_error) * least
+        equal = item.share <= (1.0 + SAME_ERROR) * least
         return not equal, UNBIASED.index(item.method.solver) if equal else 0, item.share
 
     return sorted(range(len(found)), key=place)
@@ -119,8 +124,8 @@ def folds(record: Record) -> Iterator[tuple[Record, Record]]:
 
     Few runs are cut, so that what is left is most of the data, but not into pieces shorter than a prediction.
     """
-    pieces = [piece for batch in record.batches for piece in _cut(batch, -(-TUNING.most_folds // len(record.batches)))]
-    count = min(len(pieces), TUNING.most_folds)
+    pieces = [piece for batch in record.batches for piece in _cut(batch, -(-MOST_FOLDS // len(record.batches)))]
+    count = min(len(pieces), MOST_FOLDS)
     for number in range(count):
         rest, apart = (
             tuple(piece for place, piece in enumerate(pieces) if (place % count == number) is left_out)
@@ -274,7 +279,7 @@ class Ahead:
         np.add.at(total, self.owners, np.where(seen, squares, 0.0).sum(axis=0))
         np.add.at(number, self.owners, seen.sum(axis=0))
         errors = np.sqrt(total / number) / np.where(self._spread > 0, self._spread, np.nan)
-        bounded = np.clip(errors, TUNING.smallest_error, TUNING.largest_error)
+        bounded = np.clip(errors, SMALLEST_ERROR, TUNING.largest_error)
         return np.where(np.isfinite(bounded) | (self._spread == 0), bounded, TUNING.largest_error)
 
 

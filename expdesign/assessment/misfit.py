@@ -32,6 +32,13 @@ from expdesign.signals import Batch, Record
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
 
+LAGS = 60  # longest lag of the autocorrelation, in samples
+SLOW_S = 20.0  # periods longer than this [s], or than 40 samples, count as slow
+UNSTABLE_GROWTH = 5.0  # growth of an error over a run above which the ship is unstable
+# share of the squared misfit above which its parts have opposite signs, and their sizes no meaning
+CANCELLING_SHARE = 1.1
+
+
 # One run, simulated with an estimated model from its first measured state and compared with the measurement.
 
 ESTIMATION, TEST = "estimation", "test"
@@ -134,7 +141,7 @@ class Limits:
     @property
     def unstable(self) -> bool:
         """Whether errors grow by themselves."""
-        return self.growth > TUNING.unstable_growth
+        return self.growth > UNSTABLE_GROWTH
 
     @property
     def doubling_s(self) -> float:
@@ -230,7 +237,7 @@ def _one_step(stretches: Stretches) -> Compiled:
 def _slow_part(values: Array, sample_time_s: float) -> Array:
     """The part with periods over `Tuning.slow_s` or 40 samples; a cosine transform is not periodic at the ends."""
     spectrum = scipy.fft.dct(values, axis=0, norm="ortho")
-    period_s = max(TUNING.slow_s, 40 * sample_time_s)
+    period_s = max(SLOW_S, 40 * sample_time_s)
     spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0
     return np.asarray(scipy.fft.idct(spectrum, axis=0, norm="ortho"))
 
@@ -278,13 +285,13 @@ def sentence(limits: Limits, run: RunCheck) -> str:
     worst = int(np.nanargmin(run.fit_percent))
     causes = (
         ("a constant unmodelled force", limits.constant[worst]),
-        (f"slow forces (periods over {TUNING.slow_s:g} s)", limits.slow[worst]),
+        (f"slow forces (periods over {SLOW_S:g} s)", limits.slow[worst]),
         ("fast forces and measurement noise", limits.quick[worst]),
     )
     if not np.isfinite([share for _, share in causes]).all():
         return tail
     parts = ", ".join(f"{round(100 * share)} % from {what}" for what, share in sorted(causes, key=lambda c: -c[1]))
-    if max(abs(share) for _, share in causes) > TUNING.cancelling_share:
+    if max(abs(share) for _, share in causes) > CANCELLING_SHARE:
         parts = "parts of opposite sign, so no single cause can be named"
     doubt = limits.parameters[worst]
     uncertain = f" Parameter uncertainty explains {f'{100 * doubt:.0f} %' if not doubt >= 1 else 'all of it'}."
@@ -366,7 +373,7 @@ def one_step(
     )
 
 
-def autocorrelation(residuals: Array, batch: Integers, step: Integers, *, lags: int = TUNING.lags) -> Array:
+def autocorrelation(residuals: Array, batch: Integers, step: Integers, *, lags: int = LAGS) -> Array:
     """(lags + 1, n) mean products of residuals so many samples apart over the mean square; 0 where no pair exists."""
     power = (residuals**2).mean(axis=0)
     power = np.where(power > 0, power, 1.0)

@@ -23,6 +23,9 @@ from expdesign.reduction import averaged, samples_of_a_mean
 from expdesign.signals import Record
 from expdesign.vessel import Vessel, VesselModel
 
+WORTH_WHOLE = 1.5  # runs so many horizons long are compared with simulations of their whole length too
+
+
 USES_WIND = {item.name: item.wind for item in PREDICTORS}
 
 
@@ -90,7 +93,7 @@ def horizons_of(work: Work) -> tuple[float | None, ...]:
     """The stated one; else that of the predictions which decide, and whole runs where these are longer."""
     options = work.options
     longest_s = max(len(batch) * batch.sample_time_s for batch in work.record.batches)
-    if options.horizon_s is not None or options.choice != HELD_OUT or longest_s < TUNING.worth_whole * TUNING.ahead_s:
+    if options.horizon_s is not None or options.choice != HELD_OUT or longest_s < WORTH_WHOLE * TUNING.ahead_s:
         return (options.horizon_s,)
     return (TUNING.ahead_s, None)
 

@@ -10,13 +10,16 @@ import numpy as np
 
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.spec import Excitation, Family, Primitive, PrimitiveSpec
-from expdesign.dictionary.trim import lost, motion_text, reach_text, trim
-from expdesign.dictionary.tuning import TUNING
+from expdesign.dictionary.trim import STEADY_CHANGE, lost, motion_text, reach_text, trim
 from expdesign.errors import InputError, NoAnswer, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, generalised_force, required_force, within_limits
+
+# deviation, as a share of the largest desired speed or yaw rate, above which a primitive is reported
+REPORTED_DEVIATION = 0.1
+FOLLOWED_SAMPLES = 300_000  # samples of desired velocities whose commands are found at a time
 
 
 def family(name: str) -> Family:
@@ -87,7 +90,7 @@ def _followed(vessel: Vessel, specs: tuple[PrimitiveSpec, ...]) -> dict[int, Exc
     found: dict[int, Excitation] = {}
     for samples, group in lengths.items():
         if samples > 2:
-            most, items = max(1, TUNING.followed_samples // samples), list(group.items())
+            most, items = max(1, FOLLOWED_SAMPLES // samples), list(group.items())
             for first in range(0, len(items), most):
                 found |= _followed_together(vessel, dict(items[first : first + most]))
     return found
@@ -97,7 +100,7 @@ def _followed_together(vessel: Vessel, desired: dict[int, Array]) -> dict[int, E
     """`_followed` for velocities (k + 1, 3) of one length by index."""
     velocities = np.array(list(desired.values()))
     inputs, values = follow(vessel, velocities)
-    held = lost(vessel, velocities[:, 0], inputs) <= TUNING.steady_change
+    held = lost(vessel, velocities[:, 0], inputs) <= STEADY_CHANGE
     return {
         index: Excitation(velocity=velocities[row, 0], inputs=inputs[row], commands=values[row])
         for row, index in enumerate(desired)
@@ -123,7 +126,7 @@ def excitation(vessel: Vessel, spec: PrimitiveSpec) -> Excitation:
         return Excitation(velocity=desired.velocity, inputs=desired.inputs, commands=values)
     velocities = desired_velocities(vessel, spec)
     inputs, values = follow(vessel, velocities)
-    if lost(vessel, velocities[0], inputs) > TUNING.steady_change:
+    if lost(vessel, velocities[0], inputs) > STEADY_CHANGE:
         raise Unreachable(_not_held(vessel, velocities[0]))
     return Excitation(velocity=velocities[0], inputs=inputs, commands=values)
 
@@ -246,7 +249,7 @@ def excite_many(vessel: Vessel, specs: Sequence[PrimitiveSpec]) -> ExcitedRuns:
         rows = np.array(list(desired))
         references = np.array(list(desired.values()))
         before, followed = follow(vessel, references)
-        possible[rows] = lost(vessel, references[:, 0], before) <= TUNING.steady_change
+        possible[rows] = lost(vessel, references[:, 0], before) <= STEADY_CHANGE
         velocity[rows], entry[rows], commands[rows] = references[:, 0], before, followed
     return ExcitedRuns(possible=possible, velocity=velocity, entry_inputs=entry, commands=commands)
 
@@ -279,4 +282,4 @@ def deviation(primitive: Primitive) -> float:
 
 def deviating(primitives: Sequence[Primitive]) -> tuple[Primitive, ...]:
     """Primitives that deviate from the desired motion by more than `Tuning.reported_deviation`."""
-    return tuple(item for item in primitives if deviation(item) > TUNING.reported_deviation)
+    return tuple(item for item in primitives if deviation(item) > REPORTED_DEVIATION)

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import Unreachable
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
+
+STEADY_CHANGE = 1e-6  # largest relative change of speed per sample of a steady state
+# shares of a desired velocity from which the search for the largest one that can be held begins
+SHARE_STARTS = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
+THRUST_STARTS = (0.05, 0.4, 0.9)  # shares of full thrust from which the search for commands of a direct model begins
 
 
 def trim(vessel: Vessel, velocity: Array) -> Array:
@@ -42,7 +46,7 @@ def hold(vessel: Vessel, velocity: Array) -> Array:
         Unreachable: the actuators cannot.
     """
     inputs = trim(vessel, velocity)
-    if lost(vessel, velocity, inputs) > TUNING.steady_change:
+    if lost(vessel, velocity, inputs) > STEADY_CHANGE:
         raise Unreachable(
             f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}"
         )
@@ -53,11 +57,11 @@ def held_share(vessel: Vessel, velocity: Array) -> float:
     """The largest share of a velocity (3,), in steps down from all of it, that the actuators hold; 0 for none."""
 
     def holds(share: float) -> bool:
-        return bool(lost(vessel, share * velocity, trim(vessel, share * velocity)) <= TUNING.steady_change)
+        return bool(lost(vessel, share * velocity, trim(vessel, share * velocity)) <= STEADY_CHANGE)
 
     if holds(1.0):
         return 1.0
-    high, low = 1.0, next((share for share in TUNING.share_starts if holds(share)), 0.0)
+    high, low = 1.0, next((share for share in SHARE_STARTS if holds(share)), 0.0)
     while low and high - low > 1e-4 * low:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -92,7 +96,7 @@ def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
         return np.asarray(np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share])
 
     ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
-    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in TUNING.thrust_starts]
+    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in THRUST_STARTS]
     found = [
         scipy.optimize.least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15)
         for start in tries

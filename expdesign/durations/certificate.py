@@ -27,6 +27,8 @@ from expdesign.durations.problem import DurationProblem
 from expdesign.durations.tuning import TUNING
 from expdesign.values import ASIDE, Array, seal
 
+LP_TOLERANCE = 1e-10  # feasibility and optimality tolerance of linear programmes
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certificate:
@@ -265,7 +267,7 @@ def _dual(
     b = np.r_[heights - tilts @ w, polytope.limits, [item.value - item.slope @ w for item in floors]]
     bounds = [*zip(polytope.least, np.maximum(polytope.most, polytope.least), strict=True), (None, None)]
     whole = np.r_[np.ones(len(w)), 0.0][None]
-    options = {"primal_feasibility_tolerance": TUNING.lp_tolerance, "dual_feasibility_tolerance": TUNING.lp_tolerance}
+    options = {"primal_feasibility_tolerance": LP_TOLERANCE, "dual_feasibility_tolerance": LP_TOLERANCE}
     answer = scipy.optimize.linprog(
         np.r_[np.zeros(len(w)), -1.0], A, b, whole, [1.0], bounds, method="highs", options=options
     )

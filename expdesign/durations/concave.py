@@ -20,6 +20,11 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import FloorOutOfReach, InputError, NotInformative
 from expdesign.values import Array
 
+COINCIDE = 1e-9  # regressors coincide whose correlation, means included, falls short of 1 by less
+NEGLIGIBLE = 1e-12  # eigenvalues of scaled information below this are rounding
+SMALL_WEIGHT = 0.05  # least weight in a null vector of a parameter that a message names
+
+
 IDLE = "(unused time)"
 T = "T"
 """Name of the criterion that is about other parameters."""
@@ -272,8 +277,8 @@ def unidentifiable(problem: DurationProblem, shares: Array) -> tuple[str, ...]:
     found = {names[i] for i in np.flatnonzero(dark) if i < len(problem.parameters)}
     if len(kept):
         values, vectors = np.linalg.eigh(scaled[np.ix_(kept, kept)])
-        null = vectors[:, values < TUNING.negligible * values[-1]]
-        found |= {names[i] for i in kept[np.linalg.norm(null, axis=1) > TUNING.small_weight]}
+        null = vectors[:, values < NEGLIGIBLE * values[-1]]
+        found |= {names[i] for i in kept[np.linalg.norm(null, axis=1) > SMALL_WEIGHT]}
     return tuple(name for name in problem.parameters if name in found)
 
 
@@ -294,7 +299,7 @@ def _scaled(problem: DurationProblem, shares: Array) -> tuple[Array, Array]:
     total = (total + total.T) / 2
     most = np.abs(np.diagonal(problem.matrices, axis1=1, axis2=2)).max(axis=0) + np.abs(np.diag(problem.prior))
     size = np.sqrt(np.clip(np.diag(total), 0.0, None))
-    dark = size <= np.sqrt(TUNING.negligible * most)
+    dark = size <= np.sqrt(NEGLIGIBLE * most)
     size = np.where(dark, 1.0, size)
     return total / np.outer(size, size), dark
 
@@ -306,7 +311,7 @@ def _merged(problem: DurationProblem, scaled: Array) -> dict[int, int]:
     found: dict[int, int] = {}
     for place, i in enumerate(nuisance):
         for j in (*range(p, problem.dimension), *nuisance[:place]):
-            if j not in found and abs(scaled[i, j]) > 1.0 - TUNING.coincide:
+            if j not in found and abs(scaled[i, j]) > 1.0 - COINCIDE:
                 found[i] = j
                 break
     return found

@@ -20,6 +20,8 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.values import Array, seal
 
+LEAST_FRACTION = 1e-9  # fractions less than this above their bound are set to it
+
 
 @dataclass(frozen=True, kw_only=True)
 class Budget:
@@ -134,8 +136,8 @@ class Polytope:
         """(q,) projected to the box, with tiny fractions set to their bound, and those between scaled to sum one."""
         room, left = np.maximum(self.most, self.least) - self.least, 1.0 - float(self.least.sum())
         above = np.clip(w - self.least, 0.0, room)
-        above = np.where(above > TUNING.least_fraction, above, 0.0)
-        between = above < room - TUNING.least_fraction
+        above = np.where(above > LEAST_FRACTION, above, 0.0)
+        between = above < room - LEAST_FRACTION
         if not 0.0 < float(above[~between].sum()) < left or not above[between].any():
             between[:] = True
         scale = (left - above[~between].sum()) / max(float(above[between].sum()), 1e-300)

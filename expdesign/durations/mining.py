@@ -20,11 +20,13 @@ from expdesign.durations.concave import Collected, symmetric_part
 from expdesign.durations.criteria import Aim
 from expdesign.durations.limits import NO_CONSTRAINTS, Constraints
 from expdesign.durations.problem import DurationProblem
+from expdesign.durations.rounding import ADDED_SHARE
 from expdesign.durations.solve import optimal_shares
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NotInformative
 from expdesign.information.recorded import BatchInformation
 from expdesign.values import Array, seal
+
+ALL_SUBSETS = 20_000  # up to this number, every subset of batches is evaluated
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,7 +86,7 @@ def best_subset(
     problem, collected = _pool(batches, parameters, mean_subtraction, aim or Aim())
     shares = problem.run_s / problem.total_s
     order = _greedy(collected, shares)
-    exact = comb(len(batches), size) <= TUNING.all_subsets
+    exact = comb(len(batches), size) <= ALL_SUBSETS
     if exact:
         chosen = max(combinations(range(len(batches)), size), key=lambda picked: _value(collected, shares, picked))
     else:
@@ -187,7 +189,7 @@ def _with_each(collected: Collected, shares: Array, taken: Array, candidates: Se
 
 def _greedy(collected: Collected, shares: Array) -> list[int]:
     """All batches in greedy order; a small share of all is added, so that small subsets are not singular."""
-    small = TUNING.added_share * shares
+    small = ADDED_SHARE * shares
     order: list[int] = []
     left = list(range(len(shares)))
     while left:

@@ -16,6 +16,14 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
 
+ADDED_SHARE = 1e-6  # share of the optimal design added to every set of runs, so that singular ones compare
+LEAST_GAIN = 1e-9  # gains of an exchange below this are rounding
+EQUAL_SHARE = 1e-9  # share of equal times added where the optimal design itself is nearly singular
+LEAST_GAIN_NEARLY_SINGULAR = 1e-6  # `least_gain` there
+NAMED_PAIRS = 3  # pairs of merged regressors that a note names
+INSERTIONS = 200  # primitives, best gain per second first, tried in an exchange of one run for several
+
+
 Indices = NDArray[np.intp]
 Totals = tuple[Array, ...]
 """(..., d, d) information collected, for each model."""
@@ -132,8 +140,8 @@ def note_on_runs(problem: DurationProblem, runs: Array) -> str:
     pairs = merged_nuisance(problem, runs * problem.run_s / problem.total_s) if problem.nuisance else ()
     if not pairs:
         return ""
-    shown = "; ".join(f"{one} with {other}" for one, other in pairs[: TUNING.named_pairs])
-    more = f" and {len(pairs) - TUNING.named_pairs} more" if len(pairs) > TUNING.named_pairs else ""
+    shown = "; ".join(f"{one} with {other}" for one, other in pairs[:NAMED_PAIRS])
+    more = f" and {len(pairs) - NAMED_PAIRS} more" if len(pairs) > NAMED_PAIRS else ""
     return (
         f"in these whole runs {len(pairs)} regressors of disturbances coincide with others, and the estimator merges "
         f"them: {shown}{more}"
@@ -176,7 +184,7 @@ class _Search:
         collected, polytope = Collected.of(problem), limits_of(problem)
         shares = np.asarray(problem.run_s / problem.total_s)
         most = np.where(polytope.most < 1.0, polytope.most, np.inf) / shares
-        small = TUNING.equal_share if collected.symmetric and _nearly_singular(collected, fractions) else 0.0
+        small = EQUAL_SHARE if collected.symmetric and _nearly_singular(collected, fractions) else 0.0
         return _Search(
             problem=problem,
             collected=collected,
@@ -184,11 +192,11 @@ class _Search:
             shares=shares,
             added=tuple(
                 piece.prior
-                + TUNING.added_share * np.tensordot(fractions, piece.matrices, axes=1)
+                + ADDED_SHARE * np.tensordot(fractions, piece.matrices, axes=1)
                 + small * np.eye(len(piece.prior))  # equal shares, in whitened coordinates
                 for piece in collected.pieces
             ),
-            gain=TUNING.least_gain_nearly_singular if small else TUNING.least_gain,
+            gain=LEAST_GAIN_NEARLY_SINGULAR if small else LEAST_GAIN,
             polytope=polytope,
             fewest=np.ceil(polytope.least / shares - 1e-9).astype(int),
             most_runs=np.floor(np.minimum(most, 1e9) + 1e-9).astype(int),
@@ -263,7 +271,7 @@ def _exchanged(search: _Search, runs: Array, accepted: Callable[[Array], bool]) 
         return None  # runs of one length: an insertion is a swap
     everything = np.flatnonzero(runs < search.most_runs)
     added = search.after(search.totals(runs), everything, 1.0)
-    for place in np.argsort(-(added - search.value_of(runs)) / search.shares[everything])[: TUNING.insertions]:
+    for place in np.argsort(-(added - search.value_of(runs)) / search.shares[everything])[:INSERTIONS]:
         index = int(everything[place])
         inserted = search.trimmed(runs + _unit(index, runs), index)
         if not search.allowed(inserted):
@@ -293,7 +301,7 @@ def _swapped(search: _Search, runs: Array, target: float, accepted: Callable[[Ar
 
 def _nearly_singular(collected: Collected, shares: Array) -> bool:
     values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
-    return any(item[0] < TUNING.added_share * item[-1] for item in values)
+    return any(item[0] < ADDED_SHARE * item[-1] for item in values)
 
 
 def _unit(index: int, runs: Array) -> Array:

@@ -51,6 +51,11 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.values import Array
 
+STARTS = 20  # random starts of a local search
+DEFINITE = 1e-10  # least eigenvalue, in scaled parameters, of a positive definite matrix
+TIGHTENED = (1.05, 1.15, 1.3, 1.6)  # factors on least information with which shares are sought whose whole runs keep it
+
+
 # Recorded or noisy primitives: B_q is not symmetric, and |det B(w)| is not concave in logarithm.
 
 
@@ -63,7 +68,7 @@ def definite_start(problem: DurationProblem, polytope: Polytope) -> Array | None
     if w is None:
         return None
     w = polytope.tidied(w)
-    return w if np.linalg.eigvalsh(prior + np.tensordot(w, matrices, axes=1))[0] > TUNING.definite else None
+    return w if np.linalg.eigvalsh(prior + np.tensordot(w, matrices, axes=1))[0] > DEFINITE else None
 
 
 def improved(problem: DurationProblem, polytope: Polytope, start: Array | None) -> Array:
@@ -79,7 +84,7 @@ def improved(problem: DurationProblem, polytope: Polytope, start: Array | None) 
     """
     q = len(problem.names)
     rng = np.random.default_rng(0)
-    starts = [start] if start is not None else [rng.dirichlet(np.ones(q)) for _ in range(TUNING.starts)]
+    starts = [start] if start is not None else [rng.dirichlet(np.ones(q)) for _ in range(STARTS)]
     matrices, prior = _unit_scaled(problem)
 
     def minus(w: Array) -> tuple[float, Array]:
@@ -192,7 +197,7 @@ def _shortfall(problem: DurationProblem) -> Callable[[Array], float]:
 def _tightened(problem: DurationProblem, fractions: Array) -> Iterator[Array]:
     """Optimal fractions (q,), then those that keep more than the least information, of which rounding takes some."""
     yield fractions
-    for factor in TUNING.tightened:
+    for factor in TIGHTENED:
         floors = tuple(replace(item, least=factor * item.least) for item in problem.floors)
         try:
             yield optimal_shares(replace(problem, floors=floors)).fractions

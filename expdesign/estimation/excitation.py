@@ -45,12 +45,14 @@ from expdesign.estimation.regression import (
     model_for,
     symbol,
 )
-from expdesign.estimation.tuning import TUNING
 from expdesign.estimation.values import Residuals
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import Operators, Sensors, VesselModel
 from expdesign.vessel.expressions import Expression
+
+WORST_CASE_SIGMAS = 3.0  # standard deviations of Gaussian noise in the excitation condition
+
 
 # The excitation condition: values inside a modulus keep their sign and exceed the worst noise.
 
@@ -82,9 +84,9 @@ class WorstCase:
 def worst_case(sensors: Sensors, *, current_mps: float = 0.0, wind_mps: float = 0.0) -> WorstCase:
     """`TUNING.worst_case_sigmas` standard deviations of the sensors, and the strongest current and wind."""
     return WorstCase(
-        velocity_mps=TUNING.worst_case_sigmas * sensors.velocity_mps,
-        yaw_rate_radps=TUNING.worst_case_sigmas * sensors.yaw_rate_radps,
-        wind_sensor_mps=TUNING.worst_case_sigmas * sensors.wind_mps,
+        velocity_mps=WORST_CASE_SIGMAS * sensors.velocity_mps,
+        yaw_rate_radps=WORST_CASE_SIGMAS * sensors.yaw_rate_radps,
+        wind_sensor_mps=WORST_CASE_SIGMAS * sensors.wind_mps,
         current_mps=current_mps,
         wind_mps=wind_mps,
     )

@@ -42,9 +42,15 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.estimation.regression import Integers, Regression, batch_slices
-from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
+
+FEEDBACK_LAGS = 8  # past samples known to the test for feedback, and later ones tested
+FEEDBACK_GAP_OF_DIFFERENCES = 3  # first later sample tested where velocities are differences of the pose
+FEEDBACK_SAMPLES = 50_000  # compared by that test at most, which bounds its time and memory
+FEEDBACK_LEVEL = 0.01  # chance below which inputs are said to follow disturbances
+FEEDBACK_ROUNDING = 1e-6  # size of a direction of inputs, relative to theirs, below which it is rounding errors
+
 
 Mask = NDArray[np.bool_]
 
@@ -68,7 +74,7 @@ class Feedback:
     @property
     def found(self) -> bool:
         """Whether chance is below the level of the test."""
-        return self.chance < TUNING.feedback_level
+        return self.chance < FEEDBACK_LEVEL
 
 
 def feedback_in(
@@ -85,7 +91,7 @@ def feedback_in(
     Returns:
         None where inputs hardly change or samples in a row are too few.
     """
-    pieces, every = [], -(-len(regression) // TUNING.feedback_samples)
+    pieces, every = [], -(-len(regression) // FEEDBACK_SAMPLES)
     for rows in batch_slices(regression.batch_of):
         batch = record.batches[int(regression.batch_of[rows.start])]
         if batch.interpolated is None and not batch.smoothed:
@@ -101,8 +107,8 @@ def feedback_in(
 
 def _windows(batch: Batch, tested: Mask, step: Integers, eps: Array, *, every: int) -> list[tuple[Array, Array, Array]]:
     """Per stretch, of every so many samples: e (t, n), what is known then (t, a), and later inputs (t, b)."""
-    lags = TUNING.feedback_lags
-    gap = TUNING.feedback_gap_of_differences if batch.derived else 1
+    lags = FEEDBACK_LAGS
+    gap = FEEDBACK_GAP_OF_DIFFERENCES if batch.derived else 1
     after = gap + lags - 1
     found = []
     edges = np.flatnonzero(np.diff(step) > 1) + 1
@@ -141,7 +147,7 @@ def _basis(columns: Array, scale: Array | None = None) -> Array:
     """Orthonormal (t, r) of columns (t, p), without directions that are rounding errors of their scale (p,)."""
     size = np.linalg.norm(columns, axis=0) if scale is None else scale
     U, s, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
-    return np.asarray(U[:, s > TUNING.feedback_rounding])
+    return np.asarray(U[:, s > FEEDBACK_ROUNDING])
 
 
 def feedback_notes(found: Feedback | None) -> Sequence[str]:

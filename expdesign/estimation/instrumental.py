@@ -18,6 +18,12 @@ from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Sensors
 
+MOST_CHOICES = 4  # of equation-wise samples, by the start and by what was estimated
+MOST_CURRENTS = 8  # guesses of an unknown steady current after the first
+EXACT_SHARE = 1e-12  # of the data's power, which residuals have at least where equations are weighed by them
+PRIOR_SHARE = 1.0  # spread of a parameter without a stated standard deviation, relative to its size
+
+
 # Choices of an estimate that most users leave alone.
 
 STARTS = ("nominal", "ls")
@@ -128,7 +134,7 @@ def _settled_current(
         found: the first one.
     """
     share = 1.0
-    for _ in range(TUNING.most_currents):
+    for _ in range(MOST_CURRENTS):
         layout, _, refined = found
         moved, old = refined.solution.values[-2:], layout.guess
         assert old is not None
@@ -151,7 +157,7 @@ def _settled_current(
         layout, rows, refined = found
         left = " and ".join(f"{value:.2g}" for value in refined.solution.values[-2:])
         note = (
-            f"the steady current did not settle in {TUNING.most_currents} steps: from the guess that the estimate is "
+            f"the steady current did not settle in {MOST_CURRENTS} steps: from the guess that the estimate is "
             f"around, it would go on by {left} m/s to north and east; intervals may be too short"
         )
         found = layout, rows, replace(refined, warnings=(*refined.warnings, note))
@@ -161,7 +167,7 @@ def _settled_current(
 def _by_residuals(rows: Rows, refined: Refined) -> tuple[float, ...]:
     """Weights of the outputs, which the current couples: one over the variance of their residuals."""
     left, data = (np.mean(values**2, axis=0) for values in (refined.solution.residuals, rows.regression.y))
-    variance = np.maximum(left, TUNING.exact_share * data)
+    variance = np.maximum(left, EXACT_SHARE * data)
     return tuple(np.where(variance > 0, variance, variance.max()) ** -1.0) if variance.any() else ()
 
 
@@ -193,7 +199,7 @@ def _with_instruments(
     if choices.samples == ALL:
         return rows, refined(rows)
     own, found = rows, None
-    for _ in range(TUNING.most_choices):
+    for _ in range(MOST_CHOICES):
         parameters = start if found is None else layout.full_parameters(found.solution.values)
         try:
             tables = [simulation.table(index, parameters) for index in range(len(record.batches))]
@@ -211,7 +217,7 @@ def _prior(layout: Layout, start: Array) -> Prior:
     """The first model, around which parameters spread as far as the vessel file states, or by their own size."""
     model = layout.model
     places = [model.names.index(name) for name in layout.parameters]
-    stated, sizes = model.parameter_std[places], TUNING.prior_share * np.abs(start[places])
+    stated, sizes = model.parameter_std[places], PRIOR_SHARE * np.abs(start[places])
     spread = np.where(stated > 0, stated, np.where(sizes > 0, sizes, np.inf))
     others = len(layout.names) - len(layout.parameters)
     return Prior(values=np.append(start[places], np.zeros(others)), spread=np.append(spread, np.full(others, np.inf)))

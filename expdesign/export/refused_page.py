@@ -22,10 +22,12 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, draw_sea
-from expdesign.export.tuning import TUNING
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+DRAFT_POSES = 2000  # of the track of a refused plan at most
+
 
 # One page and one table on a plan that was refused.
 
@@ -66,7 +68,7 @@ class Refusal:
         poses = self.error.poses
         if poses is None:
             return np.zeros((0, 3))
-        return np.asarray(poses)[:: max(1, -(-len(poses) // TUNING.draft_poses))]
+        return np.asarray(poses)[:: max(1, -(-len(poses) // DRAFT_POSES))]
 
     @property
     def where(self) -> str:

@@ -26,10 +26,14 @@ from expdesign.export.pages.figures import (
     round_ticks,
     svg,
 )
-from expdesign.export.tuning import TUNING
 from expdesign.export.words import significant
 from expdesign.rehearsal import Rehearsal, Validated
 from expdesign.values import Array
+
+# largest relative difference of standard deviations that counts as agreement, apart from sampling error
+AGREEING_STD = 0.10
+BIASED = 0.5  # bias over standard deviation beyond which an estimator does not count as consistent
+
 
 # Designs in Monte Carlo trials as JSON and sentences: which predictions hold, and which assumption fails if not.
 
@@ -78,14 +82,14 @@ def off_theory(result: Validated) -> list[str]:
     None without a prediction.
     """
     (least, most), ratio = sampling_error(result), result.found / result.theory
-    agreeing = TUNING.agreeing_std
+    agreeing = AGREEING_STD
     return _named(result, (ratio > (1.0 + agreeing) * most) | (ratio < (1.0 - agreeing) * least))
 
 
 def biased(result: Validated) -> list[str]:
     """Parameters whose bias surely is more than a share of their standard deviation."""
     standard_error = result.found / np.sqrt(len(result.estimates))
-    return _named(result, np.abs(result.bias) > TUNING.biased * result.found + _limit(result) * standard_error)
+    return _named(result, np.abs(result.bias) > BIASED * result.found + _limit(result) * standard_error)
 
 
 def surely_biased(result: Validated) -> list[str]:
@@ -134,7 +138,7 @@ def _judged(result: Validated) -> Iterator[str]:
         least, most = sampling_error(result)
         yield (
             f"{result.design.capitalize()}: every observed standard deviation is within "
-            f"{100 * TUNING.agreeing_std:g} % of the predicted one, apart from a sampling error of "
+            f"{100 * AGREEING_STD:g} % of the predicted one, apart from a sampling error of "
             f"{significant(100 * (least - 1), 2)} to +{significant(100 * (most - 1), 2)} % "
             f"({100 * CHANCE:g} % for all parameters together)."
         )

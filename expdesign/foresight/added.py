@@ -15,11 +15,15 @@ from expdesign.foresight.effects import Direction, disturbance_at, lasting
 from expdesign.foresight.information import JointInformation, allowed_by_prior, batch_information, beside_nuisance
 from expdesign.foresight.power import needed_noncentrality, power
 from expdesign.foresight.trial import Background, exact_record, run_of, weather_without_causes
-from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import AddedRuns, Foreseen
+from expdesign.foresight.values import WANTED_POWER, AddedRuns, Foreseen
 from expdesign.simulation import Environment, simulate
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+MOST_ADDED_S = 14400.0  # longest time of added runs [s]
+MOST_ADDED_RUNS = 200  # of one manoeuvre
+HEADINGS = 2  # of every manoeuvre that may be added
+
 
 ENDLESS = 1e5
 """Number of runs of every manoeuvre that stands for unlimited data."""
@@ -53,7 +57,7 @@ class Offers:
     @property
     def most(self) -> NDArray[np.int64]:
         """(q,) largest number of runs of one manoeuvre."""
-        return np.maximum(np.minimum(TUNING.most_added_s // self.run_s, TUNING.most_added_runs), 1).astype(int)
+        return np.maximum(np.minimum(MOST_ADDED_S // self.run_s, MOST_ADDED_RUNS), 1).astype(int)
 
 
 def information_of_runs(
@@ -75,7 +79,7 @@ def information_of_runs(
         sizes: of the effects.
     """
     calm = weather_without_causes(vessel, weather)
-    turns = np.arange(TUNING.headings) * (np.pi / TUNING.headings)
+    turns = np.arange(HEADINGS) * (np.pi / HEADINGS)
     sailed = []
     for primitive in primitives:
         for turn in turns.tolist():
@@ -146,7 +150,7 @@ def together(offers: Offers, needed: Array) -> AddedRuns | None:
         after = np.array([missing(runs + unit) for unit in units])
         q = int(np.argmax((left - after) / offers.run_s))
         runs = runs + units[q]
-        if runs @ offers.run_s > TUNING.most_added_s or not after[q] < left:
+        if runs @ offers.run_s > MOST_ADDED_S or not after[q] < left:
             return None
         left = float(after[q])
     for q in np.argsort(-offers.run_s):
@@ -178,7 +182,7 @@ def with_added_runs(
         blocks=tuple(joint.blocks[number] for number in lacking),
     )
     items = [found[number] for number in lacking]
-    needed = np.array([needed_noncentrality(TUNING.wanted_power, item.freedom, item.level) for item in items])
+    needed = np.array([needed_noncentrality(WANTED_POWER, item.freedom, item.level) for item in items])
     single = of_one_manoeuvre(offers, needed)
     best = [float(power(largest, item.freedom, item.level)) for item, (_, largest) in zip(items, single, strict=True)]
     c, ever = len(known.base.keys), offers.known + ENDLESS * offers.each.sum(axis=0)

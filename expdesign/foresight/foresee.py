@@ -37,12 +37,13 @@ from expdesign.foresight.power import (
 )
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
 from expdesign.foresight.trial import UNSEEN, Background, TrialRun, background
-from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import Confusion, Foreseen, Foresight
+from expdesign.foresight.values import WANTED_POWER, Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+LEAST_POWER = 0.01  # of a test, below which held-out runs are not asked, as the effect is hardly ever found
 
 
 def foresee(
@@ -89,7 +90,7 @@ def foresee(
             if cause.name not in names
         ),
         duration_s=known.windows.duration_s,
-        wanted_power=TUNING.wanted_power,
+        wanted_power=WANTED_POWER,
         random_current_mps=known.base.noise.current_std_mps,
         together=more,
         beyond=tuple(item for item in found if offers and item.needs_runs and item.added is None),
@@ -190,12 +191,12 @@ def _one(
     name, factor, unit = described(effect.directions[place], known.base.ship)
     found = power(noncentrality, freedom, level) if known_size else np.array(math.nan)
     limit = float(chi2.isf(level, freedom))
-    seldom = known_size and float(found) < TUNING.least_power
+    seldom = known_size and float(found) < LEAST_POWER
     shown = 1.0 if seldom else math.nan
     if known_size and not seldom:
         shown = share_shown(units, index, mixture, limit, np.random.default_rng(0))
     change = factor * (sizes[place].value if len(sizes) == 1 else _length(sizes, mixture))
-    least = math.sqrt(needed_noncentrality(TUNING.wanted_power, freedom, level) / max(noncentrality, 1e-300))
+    least = math.sqrt(needed_noncentrality(WANTED_POWER, freedom, level) / max(noncentrality, 1e-300))
     shift, drawn = mixture @ A[index], rivals.noise[:, index] @ mixture
     exact = (drawn + noncentrality) ** 2 / max(noncentrality, 1e-300)
     first, confusions = _against(effect, rivals, shift, exact, (noncentrality, freedom, level))

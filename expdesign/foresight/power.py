@@ -21,8 +21,11 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit import FOLDS, HeldOut, held_out_gain
 from expdesign.diagnosis.select import SELECTION_TUNING, ScoreTest, shows_for_certain, simulates_better
 from expdesign.foresight.information import SimulatedUnits, beside_nuisance
-from expdesign.foresight.tuning import TUNING
 from expdesign.values import Array
+
+DRAWS = 2000  # of score vectors, for the probability that one cause comes before another
+HELD_OUT_DRAWS = 60  # of trials, for the share in which held-out runs show what the test accepts
+
 
 SHAPES = ("roll:period", "roll:damping")
 """Fixed effects of a candidate that its fit estimates too."""
@@ -121,7 +124,7 @@ def rivals_of(
         whitening[index, start : start + root.shape[1]] = root
     values, vectors = np.linalg.eigh((A + A.T) / 2.0 / np.outer(size, size))
     spread = (vectors * np.sqrt(np.maximum(values, 0.0))).T * size
-    drawn = rng.standard_normal((TUNING.draws, len(A))) @ spread
+    drawn = rng.standard_normal((DRAWS, len(A))) @ spread
     return Rivals(
         tests=tuple(tests),
         whitening=whitening,
@@ -166,7 +169,7 @@ def share_shown(
     of_blocks = _root(units.predicted[:, kept[:, None], kept] / units.blocks)
     spread = np.linalg.pinv(_root(units.precision).T)
     drawn: list[tuple[float, tuple[Array, Array, Array, int]]] = []
-    for number in range(TUNING.held_out_draws):
+    for number in range(HELD_OUT_DRAWS):
         truth = np.concatenate([spread @ rng.standard_normal(c), mixture])
         score = A @ truth + np.einsum("kij,kj->ki", root, rng.standard_normal((count, len(kept))))
         total = score.sum(axis=0)

@@ -29,7 +29,7 @@ from expdesign.foresight.foresee import effect_name, sizes_of
 from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
 from expdesign.foresight.trial import UNSEEN, Background, background, design_runs
-from expdesign.foresight.tuning import TUNING
+from expdesign.foresight.values import WANTED_POWER
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
@@ -193,7 +193,7 @@ class _Several:
         item = self.hidden[place]
         test = next(test for test in self.known.tests if test.candidate is item.candidate)
         freedom, level = freedom_of(item.candidate), level_of(test.multiplicity)
-        least = needed_noncentrality(TUNING.wanted_power, freedom, level)
+        least = needed_noncentrality(WANTED_POWER, freedom, level)
         return self._wanted(place, (), "", (least, freedom, level))
 
     def distinguished(self, place: int, other: str) -> Wanted:
@@ -209,7 +209,7 @@ class _Several:
                 explained = cross @ np.linalg.pinv(A[np.ix_(index, index)], hermitian=True) @ cross.T
                 likeness.append((float(np.trace(explained)), number))
         beside = self.rows[max(likeness)[1]]
-        return self._wanted(place, tuple(beside.tolist()), other, (told_apart_from(TUNING.wanted_power), 1, 0.0))
+        return self._wanted(place, tuple(beside.tolist()), other, (told_apart_from(WANTED_POWER), 1, 0.0))
 
     def _wanted(self, place: int, beside: tuple[int, ...], other: str, test: tuple[float, int, float]) -> Wanted:
         precision, own = self.known.base.precision, self.rows[place]

@@ -17,13 +17,20 @@ from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import InputError, NoAnswer
 from expdesign.foresight.effects import Direction, disturbance_at, lasting
 from expdesign.foresight.trial import exact_record
-from expdesign.foresight.tuning import TUNING
 from expdesign.indices import outcomes
 from expdesign.memory import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Conduct, Environment, simulate, steady_ahead, stopping, turning_circle, zigzag
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+OUTCOME_SHARE = 0.05  # change of an outcome of the standard trials that matters, as a share of it
+LEAST_ANGLE_RAD = 0.00873  # smallest change of an overshoot that matters: trials are read no finer
+FIT_POINTS = 5.0  # loss of simulated fit that matters, mean over the outputs [points]
+SIZE_ROUNDS = 4  # of the search for the size of an effect that is not proportional to its number
+SIZE_REACH = 100.0  # sizes stay within this factor of the default
+BEYOND_STD = 3.0  # a parameter matters from so many of its stated standard deviations on
+
 
 OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoot_20_20_rad")
 """Of the standard trials, whose change matters."""
@@ -159,14 +166,14 @@ def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> S
         return usual
     there = lasting(item)
     size = default if math.isfinite(default) else 1.0
-    for _ in range(1 if item.key.startswith(PROPORTIONAL) else TUNING.size_rounds):
+    for _ in range(1 if item.key.startswith(PROPORTIONAL) else SIZE_ROUNDS):
         lost = fit_loss(trials, there, size)
         if not lost > NEGLIGIBLE:
             return usual
-        size *= TUNING.fit_points / lost
-    if math.isfinite(default) and not 1.0 / TUNING.size_reach < size / default < TUNING.size_reach:
+        size *= FIT_POINTS / lost
+    if math.isfinite(default) and not 1.0 / SIZE_REACH < size / default < SIZE_REACH:
         return usual
-    return Size(value=size, rule=f"{TUNING.fit_points:g} points of fit")
+    return Size(value=size, rule=f"{FIT_POINTS:g} points of fit")
 
 
 def fit_loss(trials: StandardTrials, item: Direction, size: float) -> float:
@@ -213,14 +220,14 @@ def _smaller(size: Size, changed: Mapping[str, float], trials: StandardTrials) -
     most, which = 1.0, ""
     for name, value in changed.items():
         known = trials.outcomes[name]
-        matters = TUNING.outcome_share * abs(known)
+        matters = OUTCOME_SHARE * abs(known)
         if name.endswith("_rad"):
-            matters = max(matters, TUNING.least_angle_rad)
+            matters = max(matters, LEAST_ANGLE_RAD)
         ratio = abs(value - known) / matters
         most, which = (ratio, name) if ratio > most else (most, which)
     if not which:
         return size
-    return Size(value=size.value / most, rule=f"{100 * TUNING.outcome_share:g} % of the {WORDS[which]}")
+    return Size(value=size.value / most, rule=f"{100 * OUTCOME_SHARE:g} % of the {WORDS[which]}")
 
 
 def _beyond_std(item: Direction, size: Size, stated_std: Mapping[str, float]) -> Size:
@@ -228,11 +235,11 @@ def _beyond_std(item: Direction, size: Size, stated_std: Mapping[str, float]) ->
     least = _least(item, stated_std)
     if not least > 0.0 or size.value >= least:
         return size
-    return Size(value=least, rule=f"{TUNING.beyond_std:g} stated standard deviations")
+    return Size(value=least, rule=f"{BEYOND_STD:g} stated standard deviations")
 
 
 def _least(item: Direction, stated_std: Mapping[str, float]) -> float:
-    return TUNING.beyond_std * max(stated_std.get(key, 0.0) / abs(share) for key, share in item.shares.items())
+    return BEYOND_STD * max(stated_std.get(key, 0.0) / abs(share) for key, share in item.shares.items())
 
 
 def default_sizes(length_m: float, speed_mps: float) -> dict[str, float]:

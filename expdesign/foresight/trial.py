@@ -14,12 +14,13 @@ from expdesign.diagnosis.motion import Motion, initial_states, simulate_from_mea
 from expdesign.diagnosis.select import ScoreTest, fit_nuisance, open_candidates, score_tests
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.dictionary import Primitive
-from expdesign.foresight.tuning import TUNING
 from expdesign.rehearsal.validation import heading_rad
 from expdesign.signals import Batch, Commands, Record, Trajectory
 from expdesign.simulation import Environment, draw_weather, measure, simulate
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+RECORDS = 12  # of a trial with nothing hidden, from which the errors of held-out runs are drawn
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,7 +178,7 @@ def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *
     base = fit_nuisance(ship, windows, initial_states(windows))
     candidates = tuple(open_candidates(base, windows))
     tests = score_tests(base, candidates, rng)
-    records = [simulated_record(vessel, runs, calm, rng) for _ in range(TUNING.records)]
+    records = [simulated_record(vessel, runs, calm, rng) for _ in range(RECORDS)]
     like = {"longest_s": windows.steps * windows.step_s, "step_s": windows.step_s}
     again = [simulate_from_measured(ship, cut_windows(ship.model, item, **like)) for item in records]
     return Background(base=base, windows=windows, again=tuple(again), candidates=candidates, tests=tests)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from expdesign.foresight.effects import HiddenEffect
 from expdesign.foresight.tuning import TUNING
 
+WANTED_POWER = 0.9  # of a cause that counts as revealed
+
 
 @dataclass(frozen=True)
 class Confusion:
@@ -93,7 +95,7 @@ class Foreseen:
     @property
     def needs_runs(self) -> bool:
         """Whether it lacks the wanted power at the size that matters."""
-        return self.sized and self.power < TUNING.wanted_power
+        return self.sized and self.power < WANTED_POWER
 
     @property
     def mistaken_for(self) -> tuple[Confusion, ...]:

@@ -16,10 +16,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from expdesign.growing.tuning import TUNING
 from expdesign.simulation import motion_rates, rk4_step
 from expdesign.values import Array, seal
 from expdesign.vessel import Operators, Vessel
+
+ITERATIONS = 300  # most iterations of the optimal control solver
+MARGIN = 0.005  # share of each range kept from the limits, for the solver's integration error
+MODULUS_ROUNDING = 1e-3  # moduli are smoothed within this share of a signal's size
+END_MOTION = 1e-3  # share of their ranges that sway and yaw rate may have at the end
+CALMNESS = 1e-4  # weight of the squared changes of commands, relative to the initial sensitivity
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +77,7 @@ def optimise_commands(problem: FreeForm) -> Array | None:
     variables = ca.vertcat(ca.vec(x), ca.vec(c))
     guess = np.r_[(problem.velocity / span).ravel(), (problem.commands / size).ravel()]
     scale = max(abs(float(ca.Function("start", [variables], [information])(guess))), 1e-12)
-    cost = -information / scale + TUNING.calmness * ca.sumsqr(changes) / k
+    cost = -information / scale + CALMNESS * ca.sumsqr(changes) / k
     solver = ca.nlpsol("freeform", "ipopt", {"x": variables, "f": cost, "g": constraints}, _options())
     lower, upper = _variable_bounds(problem, span, size)
     answer = solver(x0=np.clip(guess, lower, upper), lbx=lower, ubx=upper, lbg=-sides, ubg=sides)
@@ -87,7 +92,7 @@ def _options() -> dict[str, Any]:
         "ipopt.print_level": 0,
         "print_time": False,
         "ipopt.sb": "yes",
-        "ipopt.max_iter": TUNING.iterations,
+        "ipopt.max_iter": ITERATIONS,
         "ipopt.tol": 1e-5,
         "ipopt.constr_viol_tol": 1e-7,
         "ipopt.mu_strategy": "adaptive",
@@ -106,9 +111,9 @@ def _command_scale(problem: FreeForm) -> Array:
 def _variable_bounds(problem: FreeForm, span: Array, size: Array) -> tuple[Array, Array]:
     k = len(problem.commands)
     low, high = problem.limits.T / span
-    lows, highs = (np.tile(side, (k + 1, 1)) for side in (low + TUNING.margin, high - TUNING.margin))
+    lows, highs = (np.tile(side, (k + 1, 1)) for side in (low + MARGIN, high - MARGIN))
     lows[0] = highs[0] = problem.velocity[0] / span
-    lows[-1, 1:], highs[-1, 1:] = -TUNING.end_motion, TUNING.end_motion
+    lows[-1, 1:], highs[-1, 1:] = -END_MOTION, END_MOTION
     least, most = (np.array([getattr(x, side) for x in problem.vessel.limits]) / size for side in ("low", "high"))
     return np.r_[lows.ravel(), np.tile(least, k)], np.r_[highs.ravel(), np.tile(most, k)]
 
@@ -127,7 +132,7 @@ def _step(problem: FreeForm) -> ca.Function:
 
 
 def _operators(problem: FreeForm) -> Operators:
-    small = TUNING.modulus_rounding * float(np.abs(problem.limits[:2]).max())
+    small = MODULUS_ROUNDING * float(np.abs(problem.limits[:2]).max())
     return Operators(lambda x: ca.sqrt(x * x + small**2), ca.sin, ca.cos)
 
 

@@ -20,12 +20,14 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.growing._casadi import FreeForm, optimise_commands
 from expdesign.growing.search import Measure, Worth, best_of, pool_of, refined, violation
 from expdesign.growing.space import FamilySpace, GrowRound, GrowSettings, Growth, family_spaces
-from expdesign.growing.tuning import TUNING
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import CALM, Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+FREE_FORM_EXCESS = 1e-6  # share of a range by which optimised commands may exceed a limit
+
 
 # The D-optimal shares of a dictionary, and the sensitivity of one more run.
 
@@ -176,7 +178,7 @@ def _addition(
     scored = case.scored(free)
     over = violation(scored.primitive.trajectory.velocity[None], case.limits)[0]
     better = sensitivity(best, scored, case.mean_subtraction) > sensitivity(best, item, case.mean_subtraction)
-    return (scored, free) if better and over <= TUNING.free_form_excess else (item, spec)
+    return (scored, free) if better and over <= FREE_FORM_EXCESS else (item, spec)
 
 
 def _free_form(case: _Case, best: Optimum, item: PrimitiveInformation) -> PrimitiveSpec | None:

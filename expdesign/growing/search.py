@@ -16,13 +16,24 @@ import numpy as np
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.dictionary.build import excite_many
 from expdesign.growing.space import FamilySpace
-from expdesign.growing.tuning import TUNING
 from expdesign.information.many import bordered_runs
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+LIMIT_ROUNDING = 1e-9  # excess over a limit that counts as rounding, as a share of its range
+FEWEST_CLOSED_LOOP = 8  # least number of candidates of a closed-loop family
+# closed-loop families, simulated one by one, get this many times fewer candidates and no local steps
+CLOSED_LOOP_SHARE = 32
+BATCH = 512  # runs simulated together
+LEADERS = 4  # best candidates of each family from which local steps start
+OFFSPRING = 6  # local steps from each leader in one generation
+# size of the local steps of each generation, as a share of each setting's range
+STRIDES = (0.25, 0.15, 0.1, 0.06, 0.04, 0.025, 0.015, 0.01)
+REDRAWN = 0.3  # share of local steps that take another random draw, where the family has one
+LEAST_COST = 0.02  # least cost of a second of a run that makes way good, in seconds
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +56,7 @@ class Worth:
     def of(self, matrices: Array, made_good_m: Array, run_s: float) -> Array:
         """(n,) scores of runs with information B (n, d, d) and distances made good (n,)."""
         cost = 1.0 + (self.leg_s - self.saved_s_per_m * made_good_m) / run_s
-        return np.asarray(np.einsum("ij,nji->n", self.gradient, matrices) / np.maximum(cost, TUNING.least_cost))
+        return np.asarray(np.einsum("ij,nji->n", self.gradient, matrices) / np.maximum(cost, LEAST_COST))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,9 +112,7 @@ class Measure:
         order = np.argsort(-durations, kind="stable")
         ends = np.flatnonzero(np.diff(durations[order])) + 1
         batches = [
-            rows[first : first + TUNING.batch]
-            for rows in np.split(order, ends)
-            for first in range(0, len(rows), TUNING.batch)
+            rows[first : first + BATCH] for rows in np.split(order, ends) for first in range(0, len(rows), BATCH)
         ]
         tasks = ([specs[index] for index in rows] for rows in batches)
         found = Runs.joined(list(in_order(Measure.of_one_duration, (self,), ((some,) for some in tasks))))
@@ -180,13 +189,13 @@ class Archive:
     def merits(self, worth: Worth) -> Array:
         """(n,) worth of those within limits, minus the violation of the others."""
         found = worth.of(self.runs.matrices, self.runs.made_good_m, self.space.run_s)
-        return np.where(self.runs.excess <= TUNING.limit_rounding, found, -self.runs.excess)
+        return np.where(self.runs.excess <= LIMIT_ROUNDING, found, -self.runs.excess)
 
     def best(self, worth: Worth) -> Candidate | None:
         """The candidate within limits that is worth most, if any is within them."""
         merits = self.merits(worth)
         place = int(np.argmax(merits))
-        if self.runs.excess[place] > TUNING.limit_rounding:
+        if self.runs.excess[place] > LIMIT_ROUNDING:
             return None
         return Candidate(
             spec=self.space.spec(self.points[place]),
@@ -210,7 +219,7 @@ def pool_of(spaces: Sequence[FamilySpace], measure: Measure, pool: int, seed: in
 
     points = []
     for space in spaces:
-        count = max(TUNING.fewest_closed_loop, pool // TUNING.closed_loop_share) if space.family.closed_loop else pool
+        count = max(FEWEST_CLOSED_LOOP, pool // CLOSED_LOOP_SHARE) if space.family.closed_loop else pool
         sobol = qmc.Sobol(len(space.axes), rng=_stream(seed, space))
         points.append(sobol.random_base2(int(np.ceil(np.log2(count)))))
     return _measured(spaces, points, measure)
@@ -228,7 +237,7 @@ def refined(
     Those of one duration are simulated together, and the durations beside each other, the longest first.
     """
     progress("searching for runs that add more information", 0.0)
-    seeds = [int(rng.integers(2**32)) for _ in TUNING.strides]
+    seeds = [int(rng.integers(2**32)) for _ in STRIDES]
     durations_s = np.array([archive.space.run_s for archive in archives])
     groups = [np.flatnonzero(durations_s == run_s).tolist() for run_s in np.unique(durations_s)[::-1]]
     found = in_order(_stepped, (worth, measure, seeds), (([archives[k] for k in group],) for group in groups))
@@ -241,7 +250,7 @@ def refined(
 def _stepped(worth: Worth, measure: Measure, seeds: Sequence[int], archives: Sequence[Archive]) -> list[Archive]:
     """Archives of one duration with local steps, each generation with a seed of its own."""
     spaces, grown = [archive.space for archive in archives], list(archives)
-    for stride, seed in zip(TUNING.strides, seeds, strict=True):
+    for stride, seed in zip(STRIDES, seeds, strict=True):
         points = [_steps(archive, worth, stride, _stream(seed, archive.space)) for archive in grown]
         more = _measured(spaces, points, measure)
         grown = [archive.with_more(other) for archive, other in zip(grown, more, strict=True)]
@@ -263,13 +272,13 @@ def _steps(archive: Archive, worth: Worth, stride: float, rng: np.random.Generat
     """(n, a) points near the family's best ones."""
     if archive.space.family.closed_loop:
         return archive.points[:0]
-    order = np.argsort(-archive.merits(worth), kind="stable")[: TUNING.leaders]
-    parents = np.repeat(archive.points[order], TUNING.offspring, axis=0)
+    order = np.argsort(-archive.merits(worth), kind="stable")[:LEADERS]
+    parents = np.repeat(archive.points[order], OFFSPRING, axis=0)
     steps = stride * rng.standard_normal(parents.shape)
     moved = rng.random(parents.shape) < max(0.4, 1.0 / parents.shape[1])
     for index, axis in enumerate(archive.space.axes):
         if axis.scale == "whole":
-            redrawn = rng.random(len(parents)) < TUNING.redrawn
+            redrawn = rng.random(len(parents)) < REDRAWN
             steps[:, index] = np.where(redrawn, rng.random(len(parents)) - parents[:, index], 0.0)
             moved[:, index] = True
     return np.clip(parents + np.where(moved, steps, 0.0), 0.0, 1.0 - 1e-12)

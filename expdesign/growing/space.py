@@ -9,11 +9,14 @@ import numpy as np
 
 from expdesign.dictionary import Family, PrimitiveSpec, Setting
 from expdesign.errors import InputError
-from expdesign.growing.tuning import TUNING
 from expdesign.information import PrimitiveInformation
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel, direct_terms
+
+DRAWS = 100_000  # random draws of a family among which the search chooses
+HEADING_RAD = (0.05, 1.0)  # range of searched heading changes
+HELM_DEG = 35.0  # largest searched helm angle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,7 +101,7 @@ def _space(vessel: Vessel, family: Family, limits: Array, run_s: float) -> Famil
 def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis:
     (u_low, u_high), sway, yaw = limits.tolist()
     widest = {"sway": max(map(abs, sway)), "yaw": max(map(abs, yaw))}
-    low, high, scale, helm_rad = 0.0, 1.0, "linear", float(np.radians(TUNING.helm_deg))
+    low, high, scale, helm_rad = 0.0, 1.0, "linear", float(np.radians(HELM_DEG))
     if setting.searched == "surge":
         low, high = (0.0, (u_high - u_low) / 2) if "swing" in setting.name else (u_low, u_high)
     elif setting.searched in widest:
@@ -108,9 +111,9 @@ def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis
     elif setting.searched == "helm":
         low, high = -helm_rad, helm_rad
     elif setting.searched == "heading":
-        low, high, scale = (*TUNING.heading_rad, "log")
+        low, high, scale = (*HEADING_RAD, "log")
     elif setting.searched == "draw":
-        low, high, scale = 0.0, float(TUNING.draws), "whole"
+        low, high, scale = 0.0, float(DRAWS), "whole"
     low, high = max(low, setting.low), min(high, setting.high)
     if setting.searched == "share":
         low = max(low, 0.02)

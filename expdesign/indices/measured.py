@@ -18,11 +18,19 @@ from numpy.typing import NDArray
 from expdesign.errors import InputError
 from expdesign.indices.read import SIDE_NAMES, read_circle, read_stop, read_zigzag
 from expdesign.indices.steered_run import SteeredRun, orders
-from expdesign.indices.tuning import TUNING
 from expdesign.indices.values import Circle, Stop, ZigZag
 from expdesign.signals import Batch
 from expdesign.simulation import Helm, steady_ahead
 from expdesign.vessel import Vessel
+
+# speed by the root of the length [m^0.5/s] (a Froude number of 0.016) below which a ship is not under way
+UNDER_WAY = 0.05
+HELD_LENGTHS = 1.0  # ship lengths sailed while the helm is held at an angle of the trial, once to each side
+TOUCHED = 0.1  # share of the longest stretch of held helm below which a shorter one, or a gap in one, is steering
+LEAST_MOVE = 0.2  # share of its final angle by which the helm moves with the first order at least
+STEADY_APPROACH = 0.05  # change of speed, by the speed, over the last ship length of a steady approach at most
+CURRENT = 0.02  # uniform current, by the approach speed, that is told when it is removed
+
 
 LEAST_HELM_RAD = math.radians(2.0)
 TURNED_RAD = math.radians(80.0)
@@ -136,7 +144,7 @@ def _stretches(run: SteeredRun) -> list[Samples]:
     """
     helm = run.helm_rad
     length_s = run.length_m / max(run.median_speed_mps, 1e-9)
-    held = max(3, math.ceil(TUNING.held_lengths * length_s / run.sample_time_s))
+    held = max(3, math.ceil(HELD_LENGTHS * length_s / run.sample_time_s))
     if held > len(helm):
         return []
     top, bottom = (f(helm, held) for f in (scipy.ndimage.maximum_filter1d, scipy.ndimage.minimum_filter1d))
@@ -152,7 +160,7 @@ def _stretches(run: SteeredRun) -> list[Samples]:
             level = np.median(side * helm[np.abs(side * helm - level) <= near])  # noise raises the largest
             sides[np.abs(side * helm - level) <= near] = side
     parts = [part for part in np.split(np.arange(len(sides)), np.flatnonzero(np.diff(sides)) + 1) if sides[part[0]]]
-    shortest = TUNING.touched * max(map(len, parts), default=0)
+    shortest = TOUCHED * max(map(len, parts), default=0)
     stretches: list[Samples] = []
     for part in (part for part in parts if len(part) >= shortest):
         same = bool(stretches) and sides[stretches[-1][0]] == sides[part[0]]
@@ -172,7 +180,7 @@ def _first_order(run: SteeredRun, arrived: int, level: float) -> float | None:
     for length in range(1, arrived):
         begin, earlier = arrived - length, max(arrived - 2 * length, 0)
         moved = way[arrived] - way[begin]
-        if moved > TUNING.least_move and abs(way[begin] - way[earlier]) < moved / 4:
+        if moved > LEAST_MOVE and abs(way[begin] - way[earlier]) < moved / 4:
             before = float(np.median(way[max(arrived - math.ceil(1.5 * length), 0) : arrived - int(1.2 * length) + 1]))
             close = np.flatnonzero(way[earlier:arrived] < before + moved / 10)
             return _left(run, earlier + int(close[-1]), arrived, before * level, level)
@@ -226,7 +234,7 @@ def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
 def _removed(circle: Circle) -> tuple[str, ...]:
     """A remark on the current that was taken out, where it matters."""
     flow = math.hypot(circle.current_north_mps or 0.0, circle.current_east_mps or 0.0)
-    if flow <= TUNING.current * (circle.speed_mps or math.inf):
+    if flow <= CURRENT * (circle.speed_mps or math.inf):
         return ()
     return (f"a drift of {flow:.2g} m/s is taken for a uniform current and removed",)
 
@@ -316,7 +324,7 @@ def _approach(run: SteeredRun, order_s: float) -> _Approach:
         remarks.append(f"{recorded / length_s:.1f} ship lengths of approach are recorded, expected 1 or more")
     third = max(len(stretch) // 3, 1)
     start, end = (float(speeds[part].mean()) for part in (stretch[:third], stretch[-third:]))
-    if abs(end - start) > TUNING.steady_approach * (end + start) / 2:
+    if abs(end - start) > STEADY_APPROACH * (end + start) / 2:
         remarks.append(f"the approach is not steady: {start:.3g} m/s becomes {end:.3g} m/s over the last ship length")
     return _Approach(
         course_rad=float(run.pose[stretch, 2].mean()), speed_mps=float(speeds[stretch].mean()), remarks=tuple(remarks)
@@ -324,7 +332,7 @@ def _approach(run: SteeredRun, order_s: float) -> _Approach:
 
 
 def _slow(run: SteeredRun) -> float:
-    return TUNING.under_way * math.sqrt(run.length_m)
+    return UNDER_WAY * math.sqrt(run.length_m)
 
 
 def _astern(run: SteeredRun) -> float | None:

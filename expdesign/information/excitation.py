@@ -25,11 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.information.moments import PrimitiveInformation, signals_of
-from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment
 from expdesign.vessel import NUMPY, Vessel, VesselModel
 from expdesign.vessel.expressions import Expression, Signals
+
+LEAST_CLEAR = 0.5  # share of a run that meets the excitation condition, at least, where designs require it
+
 
 FREE, REWARDED, REQUIRED = "free", "rewarded", "required"
 EXCITATIONS = (FREE, REWARDED, REQUIRED)
@@ -121,7 +123,7 @@ def kept_runs(found: Strata) -> NDArray[np.bool_]:
     begun = np.maximum.accumulate(clear, axis=1)
     inside = begun & np.maximum.accumulate(clear[:, ::-1], axis=1)[:, ::-1]
     steady = (~inside | (found == found.max(axis=1, keepdims=True))).all(axis=1)
-    return np.asarray(steady & (clear.mean(axis=1) >= TUNING.least_clear))
+    return np.asarray(steady & (clear.mean(axis=1) >= LEAST_CLEAR))
 
 
 def excitation_refusal(model: VesselModel, information: Sequence[PrimitiveInformation], excitation: str) -> str:

@@ -30,13 +30,16 @@ from expdesign.errors import NotInformative
 from expdesign.estimation.regression import STEADY_CURRENT
 from expdesign.information.excitation import FREE, REQUIRED, kept_runs, strata_of_run
 from expdesign.information.moments import regressor_rows
-from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, delivered, relative_velocity, simulate, to_body
 from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel, VesselModel
+
+IDEAL_SHARE = 1e-12  # variance of an ideal sensor's noise, in that of the noisiest, where equations are weighed by it
+VELOCITY_STEP = 1e-6  # step of central differences, relative to the larger of 1 and the signal [m/s, rad/s]
+SINGULAR = 1e12  # condition number above which a trial counts as uninformative
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -271,7 +274,7 @@ def _weights(variance: Array) -> Array:
     """(n,) weights of the outputs, which the current couples: one over the noise variance; all alike without noise."""
     if not variance.any():
         return np.ones(len(variance))
-    return np.asarray(1.0 / np.maximum(variance, TUNING.ideal_share * variance.max()))
+    return np.asarray(1.0 / np.maximum(variance, IDEAL_SHARE * variance.max()))
 
 
 def _derivatives(
@@ -291,7 +294,7 @@ def _derivatives(
     columns = []
     for index in range(5):
         step = np.zeros_like(signals)
-        step[index] = TUNING.velocity_step * np.maximum(1.0, np.abs(signals[index]))
+        step[index] = VELOCITY_STEP * np.maximum(1.0, np.abs(signals[index]))
         columns.append((change(signals + step) - change(signals - step)) / (2 * step[index])[:, None])
     table = np.stack(columns, axis=2)
     return table[:, :, :3], table[:, :, 3:]
@@ -322,7 +325,7 @@ def _sandwich(G: Array, Omega: Array, parameters: Sequence[str]) -> Array:
     scale = np.sqrt(np.abs(np.diag(G)))
     blind = tuple(name for name, size in zip(parameters, scale, strict=True) if not size > 0)
     scaled = G / np.outer(np.where(scale > 0, scale, 1.0), np.where(scale > 0, scale, 1.0))
-    if blind or np.linalg.cond(scaled) > TUNING.singular:
+    if blind or np.linalg.cond(scaled) > SINGULAR:
         raise NotInformative(
             f"the trial contains no information about some parameters{': ' + ', '.join(blind) if blind else ''}",
             parameters=blind or tuple(parameters),

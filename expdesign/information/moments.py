@@ -15,7 +15,6 @@ import numpy as np
 
 from expdesign.dictionary.spec import Primitive
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment, relative_velocity
 from expdesign.simulation.motion import State
@@ -23,6 +22,9 @@ from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import NOT_SUPPORTED, NUMPY, Operators, VesselModel
 from expdesign.vessel.expressions import Signals
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+REGRESSOR_ROUNDING = 1e-12  # a regressor below this share of its possible size is rounding
+
 
 # The information of one primitive about the parameters.
 
@@ -117,7 +119,7 @@ def rows_of(model: VesselModel, table: Signals, shape: tuple[int, ...]) -> Array
     for row, expression in zip(rows, model.expressions, strict=True):
         row[...] = expression.evaluate(table, NUMPY)
     largest = np.maximum(rows.max(axis=1), -rows.min(axis=1))
-    rounding = largest <= TUNING.regressor_rounding * _magnitudes(model, table, shape[1:])
+    rounding = largest <= REGRESSOR_ROUNDING * _magnitudes(model, table, shape[1:])
     if rounding.any():
         np.multiply(rows, ~rounding[:, None], out=rows)
     return rows

@@ -9,11 +9,13 @@ import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.indices import outcomes
-from expdesign.information.tuning import TUNING
 from expdesign.progress import Progress, silent
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+PARAMETER_STEP = 1e-3  # relative step of central differences in a parameter
+GRADIENT_AGREEMENT = 0.05  # change of a gradient when the step is halved, relative to the outcome's largest gradient
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +79,7 @@ def outcome_gradients(
 def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: float) -> list[Array]:
     """Central differences (o,) in one parameter, with the step and with half of it."""
     slopes = []
-    for step in (TUNING.parameter_step * size, TUNING.parameter_step * size / 2):
+    for step in (PARAMETER_STEP * size, PARAMETER_STEP * size / 2):
         moved = np.zeros_like(theta)
         moved[index] = step
         slopes.append((found(theta + moved) - found(theta - moved)) / (2 * step))
@@ -86,10 +88,10 @@ def _slopes(found: Callable[[Array], Array], theta: Array, index: int, size: flo
 
 def _check_smooth(coarse: Array, fine: Array, names: Sequence[str], parameters: Sequence[str]) -> None:
     """Refuse gradients (o, p), as effects of relative changes, that depend on the step."""
-    jumps = np.argwhere(np.abs(coarse - fine) > TUNING.gradient_agreement * np.abs(fine).max(axis=1, keepdims=True))
+    jumps = np.argwhere(np.abs(coarse - fine) > GRADIENT_AGREEMENT * np.abs(fine).max(axis=1, keepdims=True))
     if len(jumps):
         o, p = jumps[0]
         raise NoAnswer(
             f"outcome {names[o]} is not smooth in {parameters[p]}: its derivative by a relative change is "
-            f"{coarse[o, p]:.3g} with a step of {TUNING.parameter_step:g} and {fine[o, p]:.3g} with half of that"
+            f"{coarse[o, p]:.3g} with a step of {PARAMETER_STEP:g} and {fine[o, p]:.3g} with half of that"
         )

@@ -11,10 +11,11 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import InputError, NoAnswer
 from expdesign.information.moments import PrimitiveInformation, estimated_parameters
 from expdesign.information.scoring import score_models
-from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
+
+REDRAWS = 5  # ratio of drawn to desired models above which the prior is refused as unstable
 
 
 def equation_noise(vessel: Vessel, parameters: Sequence[str]) -> Array:
@@ -109,7 +110,7 @@ def score_prior(
         )
         stable += [items for items, is_stable in scored if is_stable]
         unstable += sum(not is_stable for _, is_stable in scored)
-        if unstable > TUNING.redraws * samples:
+        if unstable > REDRAWS * samples:
             raise NoAnswer(
                 f"design.robust: {unstable} of {unstable + len(stable)} models drawn from the prior are unstable; "
                 "state smaller model.parameter_std"

@@ -41,6 +41,9 @@ from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 
+SIMULATED_SAMPLES = 3_000_000  # samples simulated together
+EVALUATED_SAMPLES = 500_000  # samples of regressors evaluated together
+
 
 def score_primitives(
     vessel: Vessel,
@@ -195,7 +198,7 @@ def _groups(primitives: Sequence[Primitive], copies: int) -> Iterator[list[int]]
         key = (len(primitive.commands), primitive.commands.sample_time_s)
         lengths.setdefault(key, []).append(index)
     for (samples, _), members in lengths.items():
-        size = max(1, TUNING.simulated_samples // (samples * copies))
+        size = max(1, SIMULATED_SAMPLES // (samples * copies))
         yield from (members[first : first + size] for first in range(0, len(members), size))
 
 
@@ -229,7 +232,7 @@ class _Runs:
     def moments(self, names: Sequence[str], excitation: str) -> _Moments:
         """Averages over headings, some primitives at a time."""
         samples, _, models, headings, count = self.states.shape
-        size = max(1, TUNING.evaluated_samples // (samples * models * headings))
+        size = max(1, EVALUATED_SAMPLES // (samples * models * headings))
         parts = [self._some(slice(first, first + size), names, excitation) for first in range(0, count, size)]
         columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])}
         return _Moments(**columns)

@@ -16,11 +16,12 @@ import numpy as np
 
 from expdesign.estimation.regression import STEADY_CURRENT, slopes
 from expdesign.information.moments import signals_of
-from expdesign.information.tuning import TUNING
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+UNSEEN_CURRENT = 1e-9  # correlation matrices' relative eigenvalue below which a current is not told from the means
 
 
 def current_rows(vessel: Vessel, trajectory: Trajectory, commands: Commands, environment: Environment) -> Array:
@@ -93,7 +94,7 @@ def _pseudo_inverse(M: Array) -> Array:
     """Pseudo-inverse of a positive semidefinite matrix, by its correlations."""
     scale = np.sqrt(np.diag(M))
     scale = np.where(scale > 0, scale, 1.0)
-    inverse = np.linalg.pinv(M / np.outer(scale, scale), rcond=TUNING.unseen_current, hermitian=True)
+    inverse = np.linalg.pinv(M / np.outer(scale, scale), rcond=UNSEEN_CURRENT, hermitian=True)
     return np.asarray(inverse / np.outer(scale, scale))
 
 

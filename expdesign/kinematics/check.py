@@ -19,11 +19,13 @@ from expdesign.kinematics.instruments import (
     log_against_positions,
 )
 from expdesign.kinematics.steering import against_inputs, faster_than_stated
-from expdesign.kinematics.tuning import TUNING
 from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Mounting, Sensors, Vessel, VesselModel
+
+DRIFTS = 0.2  # that distance of ships, at least, from which the drift is expected
+
 
 SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
            "wind": "winds"}  # fmt: skip
@@ -207,7 +209,7 @@ def drifts(batches: Sequence[Batch], model: VesselModel, length_m: float) -> flo
     velocity = np.concatenate([batch.velocity for batch in batches])
     u, r = velocity[np.isfinite(velocity[:, [0, 2]]).all(axis=1)][:, [0, 2]].T
     if "v" not in model.outputs or not len(u):
-        return 0.0 if "v" not in model.outputs else TUNING.drifts
+        return 0.0 if "v" not in model.outputs else DRIFTS
     still, small = np.zeros_like(u), 0.01 * np.maximum(np.abs(u), 1e-6)
     inputs = np.zeros((len(model.inputs), len(u)))
 
@@ -217,7 +219,7 @@ def drifts(batches: Sequence[Batch], model: VesselModel, length_m: float) -> flo
     damping = (sway(small) - sway(-small)) / (2.0 * small)
     steady = np.divide(-sway(still), damping, out=np.zeros_like(u), where=damping < 0)
     expected = float(-(steady @ r) / max(r @ r, 1e-300)) / length_m
-    return min(abs(expected), TUNING.drifts) if (damping < 0).any() and (sway(still) != 0).any() else TUNING.drifts
+    return min(abs(expected), DRIFTS) if (damping < 0).any() and (sway(still) != 0).any() else DRIFTS
 
 
 def _shared(noted: Sequence[tuple[str, str]]) -> list[str]:

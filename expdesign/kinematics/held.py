@@ -17,8 +17,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.kinematics.tuning import TUNING
 from expdesign.values import Array
+
+FEWEST_HELD = 40  # samples from which a signal is asked whether it is held
+MOST_CHANGES = 0.7  # share of samples that change, or bend, above which every sample may be a reading
+BEND = 2.5  # multiple of rounding above which a bend shows a reading
+UNBENT = 0.6  # share of samples between readings, whose bends are rounding
+STRAIGHT = 1e-3  # bend of a line, as a share of its usual step, above which it is none
+SINGLE = 1.5  # multiple of the usual gap between changes up to which a gap may be one interval
+TRIED = 41  # intervals that are tried around the mean of the gaps
+FEWEST_CHANGES = 8  # from which an interval is found
+WHOLE = 0.5  # standard errors within which an interval counts as a whole number of samples
+SHORTEST_INTERVAL = 1.5  # of readings [samples]
+VARIOUS = 0.3  # share of gaps of several intervals that a rounded signal must have
+EVEN = 0.95  # share of changes that an interval must explain
+UNEVEN = 0.25  # spread of the gaps, as a share of the interval, up to which a signal is held at about that interval
+PHASES = 50  # changes whose phases are tried
+ONE_SIZE = 1.5  # multiple of the smallest change below which another is of the same size
+MOSTLY_ONE = 0.8  # share of changes of one size above which a signal is rounded
+
 
 Places = NDArray[np.int64]
 
@@ -42,14 +59,14 @@ class Held:
 
 def held(values: Array) -> Held | None:
     """How a signal (k, c) is held between readings; None where every sample may be a reading."""
-    if len(values) < TUNING.fewest_held or not np.isfinite(values).all():
+    if len(values) < FEWEST_HELD or not np.isfinite(values).all():
         return None
     steps = np.diff(values, axis=0)
     changes = np.flatnonzero(np.any(steps != 0, axis=1)) + 1
-    if len(changes) <= TUNING.most_changes * len(steps):
+    if len(changes) <= MOST_CHANGES * len(steps):
         return _read_at(changes, _rounded(steps), len(values), interpolated=False)
     knots = _knots(steps)
-    if len(knots) <= TUNING.most_changes * len(steps):
+    if len(knots) <= MOST_CHANGES * len(steps):
         return _read_at(knots, False, len(values), interpolated=True)
     return None
 
@@ -68,44 +85,44 @@ def _knots(steps: Array) -> Places:
     Where lines are drawn over three samples or more, most bends are rounding alone.
     """
     bends = np.abs(np.diff(steps, axis=0))
-    rounding = TUNING.bend * np.quantile(bends, TUNING.unbent, axis=0)
-    least = np.maximum(rounding, TUNING.straight * np.median(np.abs(steps), axis=0))
+    rounding = BEND * np.quantile(bends, UNBENT, axis=0)
+    least = np.maximum(rounding, STRAIGHT * np.median(np.abs(steps), axis=0))
     return np.flatnonzero((bends > least).any(axis=1)) + 1
 
 
 def _read_at(changes: Places, rounded: bool, count: int, *, interpolated: bool) -> Held | None:
     """The interval of readings that come at these samples, where they tell one."""
-    if len(changes) < TUNING.fewest_changes:
+    if len(changes) < FEWEST_CHANGES:
         return None
     gaps = np.diff(changes)
-    single = gaps[gaps <= TUNING.single * np.median(gaps) + 0.5]
+    single = gaps[gaps <= SINGLE * np.median(gaps) + 0.5]
     several = np.maximum(np.round(gaps / single.mean()), 1.0)
     about = float(gaps.sum() / several.sum())
-    if about + 1.0 / several.sum() < TUNING.shortest_interval:  # nearly every sample is a reading
+    if about + 1.0 / several.sum() < SHORTEST_INTERVAL:  # nearly every sample is a reading
         return None
-    near = about + np.linspace(-1.0, 1.0, TUNING.tried) / several.sum()
+    near = about + np.linspace(-1.0, 1.0, TRIED) / several.sum()
     interval = float(max(near, key=lambda value: (_explained(changes, value), -abs(value - about))))
-    if abs(interval - round(interval)) * several.sum() < TUNING.whole * np.sqrt(several.sum()):
+    if abs(interval - round(interval)) * several.sum() < WHOLE * np.sqrt(several.sum()):
         interval = float(round(interval))
     if interpolated and interval != round(interval):
         return None
-    if interval < TUNING.shortest_interval or (rounded and np.mean(several > 1) < TUNING.various):
+    if interval < SHORTEST_INTERVAL or (rounded and np.mean(several > 1) < VARIOUS):
         return None
     within = np.abs(gaps - several * interval)
-    if np.mean(within < 1.0) >= TUNING.even and _explained(changes, interval) >= TUNING.even:
+    if np.mean(within < 1.0) >= EVEN and _explained(changes, interval) >= EVEN:
         return Held(interval=interval, interpolated=interpolated, even=True, changes=len(changes))
-    if np.std(gaps / several) < TUNING.uneven * interval and not rounded and not interpolated:
+    if np.std(gaps / several) < UNEVEN * interval and not rounded and not interpolated:
         return Held(interval=interval, interpolated=interpolated, even=False, changes=len(changes))
     return None
 
 
 def _explained(changes: Places, interval: float) -> float:
     """Share of the changes that fall on the first sample at or after a reading, at the best phase."""
-    phases = np.unique(np.mod(changes[: TUNING.phases], interval))
+    phases = np.unique(np.mod(changes[:PHASES], interval))
     return float((np.mod(changes - phases[:, None] + 1e-6, interval) < 1.0).mean(axis=1).max())
 
 
 def _rounded(steps: Array) -> bool:
     """Whether most changes are of one size, as those of a rounded signal are."""
     sizes = np.abs(steps[steps != 0])
-    return bool(len(sizes)) and float(np.mean(sizes < TUNING.one_size * sizes.min())) > TUNING.mostly_one
+    return bool(len(sizes)) and float(np.mean(sizes < ONE_SIZE * sizes.min())) > MOSTLY_ONE

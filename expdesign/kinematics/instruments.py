@@ -18,10 +18,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.kinematics.relation import Relation, relation
-from expdesign.kinematics.tuning import TUNING
+from expdesign.kinematics.relation import CERTAIN, SCALE_STD, Relation, relation
 from expdesign.signals import Batch
 from expdesign.values import Array
+
+LENGTHS = 1.0  # ship lengths sailed in a window
+WINDOW_SAMPLES = 5  # fewest samples of a window
+LONGEST_WINDOW_S = 60.0  # of a window [s]
+WINDOWS = 1.5  # least length of a stretch, in windows
+BLOCKS = 20  # stretches that the record is cut into, each left out in turn for the standard errors
+SCALE_MATTERS = 0.02  # change of a scale that is told
+SWAY_WITHIN = 1.5  # factor within which the scale of sway is that of surge; beyond, sway is hardly more than noise
+TURN_MATTERS_RAD = 0.0175  # misalignment that is told [rad]
+RATE_MATTERS = 0.1  # bias of a rate, as a share of its root mean square, that is told
+PLACE_STD = 0.001  # standard error of a place, at least, in ship lengths: small differences of clocks imitate that
+PLACE_MATTERS = 0.05  # distance of an instrument, in ship lengths, that is told
+DELAY_MATTERS = 0.6  # of one instrument after another, in samples, that is told; Euler's map alone gives a half
+DELAY_STD = 0.05  # standard error of a delay, at least, in samples
+DELAY_ROUNDS = 2  # in which the delay of a log is found
+WAY_MATTERS = 0.05  # steady difference of velocities, as a share of the speed, that is told
+# least share of a regressor that the others do not explain; that of a way, which is measured better than most
+TOLD_WAY = 0.002
+# share of the expected distance of the place that does not drift in turns below which a heading is one of the track
+ON_COURSE = 0.5
+ON_TRACK = 0.5  # share of the expected drift below which heading and course are the same
+TURNING = 0.02  # drift expected in turns [rad], root mean square, from which heading and course can be told apart
+
 
 DEGREE = np.pi / 180.0
 
@@ -51,7 +73,7 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
     if found is None:
         return
     rate = _rms(np.concatenate([batch.velocity[:, 2] for batch in own]))
-    if found.differs(1.0, by=TUNING.scale_matters):
+    if found.differs(1.0, by=SCALE_MATTERS):
         scale, std = found.size, found.size_std
         yield Finding(
             name="yaw_rate_scale", value=scale, std=std, rest=found.rest,
@@ -59,14 +81,14 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
             f"Where the heading is right, multiply sensors.yaw_rate_scale by {scale:.4g}.",
         )  # fmt: skip
     bias, std = float(found.others[0].real), float(found.others_std[0, 0])
-    if abs(bias) > max(TUNING.certain * std, TUNING.rate_matters * rate):
+    if abs(bias) > max(CERTAIN * std, RATE_MATTERS * rate):
         yield Finding(
             name="yaw_rate_bias_radps", value=bias, std=std, rest=found.rest,
             text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of "
             "a gyro?",
         )  # fmt: skip
     delay, std = -float(found.others[1].real), float(found.others_std[1, 0])
-    if abs(delay) > max(TUNING.certain * std, TUNING.delay_matters * own[0].sample_time_s):
+    if abs(delay) > max(CERTAIN * std, DELAY_MATTERS * own[0].sample_time_s):
         later, sooner = ("r_radps", "the heading")[:: 1 if delay > 0 else -1]
         yield Finding(
             name="yaw_rate_delay_s", value=delay, std=std, rest=found.rest,
@@ -83,14 +105,14 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
     speed = _rms(np.concatenate([np.hypot(*batch.velocity[:, :2].T) for batch in own]))
     yield from _log_scale(found)
     angle, std = -float(np.angle(found.ahead.ratio)), found.ahead.std[1] / abs(found.ahead.ratio)
-    if abs(angle) > max(TUNING.certain * std, TUNING.turn_matters_rad):
+    if abs(angle) > max(CERTAIN * std, TURN_MATTERS_RAD):
         yield Finding(
             name="heading_bias_rad", value=angle, std=std, rest=found.ahead.rest,
             text=f"the heading is {with_std(angle / DEGREE, std / DEGREE)} degrees more than positions and velocities "
             f"say: add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
         )  # fmt: skip
     drift, spread = found.of("drift")
-    if abs(drift) > max(TUNING.certain * float(np.hypot(*spread)), TUNING.way_matters * speed):
+    if abs(drift) > max(CERTAIN * float(np.hypot(*spread)), WAY_MATTERS * speed):
         toward = float(np.degrees(np.angle(drift)) % 360.0)
         yield Finding(
             name="current_mps", value=abs(drift), std=float(np.hypot(*spread)), rest=found.ahead.rest,
@@ -127,7 +149,7 @@ class _Log:
 
     def delay_std(self, name: str) -> float:
         """Standard error of a delay [s], with what sampling leaves open."""
-        return float(np.hypot(self.of(name)[1][0], TUNING.delay_std * self.sample_s))
+        return float(np.hypot(self.of(name)[1][0], DELAY_STD * self.sample_s))
 
 
 def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
@@ -143,7 +165,7 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
         x = "ahead" if "side" in names else "way"
         running = [_columns(batch, late_s) for batch in batches]
         wide = [np.column_stack([rows[name] for name in ("position", x, *names)]) for rows in running]
-        found = relation(stretches(batches, wide, length_m=length_m), told=TUNING.told_way)
+        found = relation(stretches(batches, wide, length_m=length_m), told=TOLD_WAY)
         return (
             None
             if found is None
@@ -152,7 +174,7 @@ def _log(batches: Sequence[Batch], *, length_m: float) -> _Log | None:
 
     optional = ("side", "positions", "log")
     found = _certain(related, optional) if batches else None
-    for _ in range(TUNING.delay_rounds):
+    for _ in range(DELAY_ROUNDS):
         if found is None or "log" not in found.names:
             break
         late_s += found.of("log")[0].real
@@ -177,12 +199,12 @@ def _certainty(found: _Log, name: str) -> float:
     value, spread = found.of(name)
     if name == "side":
         share = value.real / abs(found.ahead.ratio)
-        if not 1.0 / TUNING.sway_within < share < TUNING.sway_within:  # the noise of a log that hardly drifts, or none
+        if not 1.0 / SWAY_WITHIN < share < SWAY_WITHIN:  # the noise of a log that hardly drifts, or none
             return 0.0
         apart = abs(value - found.ahead.ratio)
-        return float(apart / max(TUNING.certain * np.hypot(spread[0], found.ahead.std[0]), TUNING.scale_matters))
+        return float(apart / max(CERTAIN * np.hypot(spread[0], found.ahead.std[0]), SCALE_MATTERS))
     delay_s = abs(value.real + found.late_s * (name == "log"))
-    return float(delay_s / max(TUNING.certain * found.delay_std(name), TUNING.delay_matters * found.sample_s))
+    return float(delay_s / max(CERTAIN * found.delay_std(name), DELAY_MATTERS * found.sample_s))
 
 
 def _log_scale(found: _Log) -> Iterator[Finding]:
@@ -195,8 +217,8 @@ def _log_scale(found: _Log) -> Iterator[Finding]:
     side, spread = found.of("side")
     axes = (("surge", "u_mps", scale, std), ("sway", "v_mps", 1.0 / side.real, spread[0] / side.real**2))
     for axis, column, value, error in axes:
-        error = float(np.hypot(error, TUNING.scale_std))
-        if abs(value - 1.0) > max(TUNING.certain * error, TUNING.scale_matters):
+        error = float(np.hypot(error, SCALE_STD))
+        if abs(value - 1.0) > max(CERTAIN * error, SCALE_MATTERS):
             yield Finding(
                 name=f"{axis}_scale", value=value, std=error, rest=whole.rest,
                 text=f"{column} is {with_std(value, error)} times the {axis} speed that the positions give: the scale "
@@ -209,7 +231,7 @@ def _one_scale(found: _Log) -> Iterator[Finding]:
 
     A log that is wrong in both is no likelier beforehand than one that is wrong in one, so neither has to be certain.
     """
-    if not found.ahead.differs(1.0, by=TUNING.scale_matters):
+    if not found.ahead.differs(1.0, by=SCALE_MATTERS):
         return
     excluded, nearer = (True, False) if found.apart is None else _sway_is_right(found.apart)
     whole = found.apart.ahead if nearer and found.apart is not None else found.ahead
@@ -229,8 +251,8 @@ def _one_scale(found: _Log) -> Iterator[Finding]:
 def _sway_is_right(apart: _Log) -> tuple[bool, bool]:
     """Whether a scale of one is excluded for sway, and whether sway's is nearer to one than to that of surge."""
     side, spread = apart.of("side")
-    plain = 1.0 / TUNING.sway_within < side.real < TUNING.sway_within  # not the noise of a log that hardly drifts
-    excluded = plain and abs(side.real - 1.0) > TUNING.certain * spread[0]
+    plain = 1.0 / SWAY_WITHIN < side.real < SWAY_WITHIN  # not the noise of a log that hardly drifts
+    excluded = plain and abs(side.real - 1.0) > CERTAIN * spread[0]
     return excluded, bool(plain and not excluded and abs(side.real - 1.0) < abs(side.real - abs(apart.ahead.ratio)))
 
 
@@ -255,10 +277,10 @@ def _clocks(found: _Log) -> Iterator[Finding]:
 def _place(found: _Log, sample_time_s: float, speed: float, *, length_m: float) -> Iterator[Finding]:
     """Where the positions are measured; at one speed a late clock is the same."""
     arm, spread = found.of("arm")
-    spread = np.hypot(spread, TUNING.place_std * length_m)
+    spread = np.hypot(spread, PLACE_STD * length_m)
     late = {"log", "positions"} & set(found.names)
-    little = TUNING.place_matters * length_m + (0.0 if late else TUNING.delay_matters * sample_time_s * speed)
-    if abs(arm) > max(TUNING.certain * float(np.hypot(*spread)), little):
+    little = PLACE_MATTERS * length_m + (0.0 if late else DELAY_MATTERS * sample_time_s * speed)
+    if abs(arm) > max(CERTAIN * float(np.hypot(*spread)), little):
         ahead, beside = ("forward" if arm.real >= 0 else "aft"), ("starboard" if arm.imag >= 0 else "port")
         clock = "u_mps and v_mps come" if arm.real > 0 else "the positions come"
         yield Finding(
@@ -287,9 +309,9 @@ def course_as_heading(batches: Sequence[Batch], *, length_m: float, drifts: floa
     seen = _rms(np.arctan2(aside, ahead))
     expected = _rms(drifts * length_m * turn / np.maximum(np.abs(ahead), 1e-9))
     pivot, std = -found.ratio.real / length_m, found.std[0] / length_m
-    if expected < TUNING.turning or seen > TUNING.on_track * expected:
+    if expected < TURNING or seen > ON_TRACK * expected:
         return
-    if abs(pivot) + 2.0 * std < TUNING.on_course * drifts:
+    if abs(pivot) + 2.0 * std < ON_COURSE * drifts:
         yield Finding(
             name="drift_rad", value=seen, std=std * expected / drifts, rest=found.rest,
             text="the heading column holds course over ground: in turns it keeps within "
@@ -340,8 +362,8 @@ def stretches(batches: Sequence[Batch], running: Sequence[Array], *, length_m: f
     """Changes (k, n) of running values over windows, in stretches of which one after the other is left out."""
     windows = [_window(batch, length_m) for batch in batches]
     changes = [_changes(values, window) for values, window in zip(running, windows, strict=True)]
-    alone = sum(len(part) / window for part, window in zip(changes, windows, strict=True)) / TUNING.windows
-    count = min(TUNING.blocks, int(alone))
+    alone = sum(len(part) / window for part, window in zip(changes, windows, strict=True)) / WINDOWS
+    count = min(BLOCKS, int(alone))
     size = max(1.0, sum(map(len, changes)) / max(count, 1))
     return (
         [piece for part in changes if len(part) for piece in np.array_split(part, max(1, round(len(part) / size)))]
@@ -359,8 +381,8 @@ def _changes(values: Array, window: int) -> Array:
 def _window(batch: Batch, length_m: float) -> int:
     """Samples in which the ship sails about her length."""
     speed = float(np.nanmedian(np.hypot(*batch.velocity[:, :2].T))) if np.isfinite(batch.velocity[:, :2]).any() else 0.0
-    seconds = min(TUNING.longest_window_s, TUNING.lengths * length_m / max(speed, 1e-9))
-    return max(TUNING.window_samples, round(seconds / batch.sample_time_s))
+    seconds = min(LONGEST_WINDOW_S, LENGTHS * length_m / max(speed, 1e-9))
+    return max(WINDOW_SAMPLES, round(seconds / batch.sample_time_s))
 
 
 def integral(values: Array, batch: Batch) -> Array:

@@ -18,8 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.kinematics.tuning import TUNING
 from expdesign.values import Array
+
+FEWEST_BLOCKS = 8  # with which a comparison is made
+CERTAIN = 6.0  # standard errors from what would be right at which a finding is told
+# standard error of a scale, at least: readings of several samples, rounding and filters in instruments change scales by
+# about as much
+SCALE_STD = 0.001
+# least share of a regressor that the others do not explain; that of a way, which is measured better than most
+TOLD = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,17 +61,17 @@ class Relation:
     @property
     def size_std(self) -> float:
         """Standard error of the size, with half the distance of both regressions, and what no instrument is free of."""
-        return float(np.hypot(np.hypot(self.std[0], (self.inverse - abs(self.ratio)) / 2.0), TUNING.scale_std))
+        return float(np.hypot(np.hypot(self.std[0], (self.inverse - abs(self.ratio)) / 2.0), SCALE_STD))
 
     def differs(self, value: float, *, by: float) -> bool:
         """Whether the size is certainly another than this, and by as much, whichever of x and y is noisy."""
         bounds = (abs(self.ratio), self.inverse)
         apart = [bound - value for bound in bounds]
-        certain = all(abs(gap) > TUNING.certain * self.std[0] for gap in apart)
+        certain = all(abs(gap) > CERTAIN * self.std[0] for gap in apart)
         return certain and apart[0] * apart[1] > 0 and min(map(abs, apart)) > by
 
 
-def relation(stretches: Sequence[Array], *, told: float = TUNING.told) -> Relation | None:
+def relation(stretches: Sequence[Array], *, told: float = TOLD) -> Relation | None:
     """The relation over all stretches; None where they tell too little.
 
     Args:
@@ -72,7 +79,7 @@ def relation(stretches: Sequence[Array], *, told: float = TUNING.told) -> Relati
         told: least share of the squares of x that z must leave.
     """
     moments = np.array([rows.conj().T @ rows for rows in stretches if len(rows)])
-    if len(moments) < TUNING.fewest_blocks:
+    if len(moments) < FEWEST_BLOCKS:
         return None
     whole, count = moments.sum(axis=0), sum(map(len, stretches))
     found = _solved(whole, told)

@@ -26,11 +26,21 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.estimation.regression import inputs_of
 from expdesign.kinematics.instruments import Finding, integral, stretches, with_std
-from expdesign.kinematics.relation import relation
-from expdesign.kinematics.tuning import TUNING
+from expdesign.kinematics.relation import CERTAIN, relation
 from expdesign.signals import Batch
 from expdesign.values import Array
 from expdesign.vessel import Actuator, VesselModel, column_name
+
+FASTER = 1.2  # multiple of a stated rate above which an input moves faster than stated
+RAMP, FEWEST_RAMPS = 3, 3  # samples of an even movement, and how many of them tell
+RAMPS = 0.3  # share of the fast samples that must be inside such movements
+RAMP_SPREAD = 0.15  # median deviation from their speed, as a share of it
+OPPOSED = (0.1, 10.0)  # least and most size of an answer to an input, in units of the model's, that has the wrong sign
+OPPOSED_SHARE = 0.3  # share of the changes that the input explains then
+ALIKE = 3.0  # factor from one within which an answer is that of the model
+TURNED_RAD, TURNED_SHARE = 1.6, 0.95  # turn against a held input, and its share of all turns, that count as opposed
+PUSHING = 0.1  # share of an input's largest effect below which it is not held to any side
+
 
 GROUPS = (
     ("rudder", 2, ("rudder",), "the ship turns against the rudder", "positive to port"),
@@ -73,10 +83,10 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
         names = ", ".join(own)
         question = f"Is {names} {reason}, or a sign wrong in [model.parameters]?"
         found = relation(stretches(batches, answers, length_m=length_m))
-        if found is not None and found.share >= TUNING.opposed_share:
-            low, high = TUNING.opposed
+        if found is not None and found.share >= OPPOSED_SHARE:
+            low, high = OPPOSED
             answer, std = found.ratio.real, found.std[0]
-            if answer < -TUNING.certain * std and low < -answer < high:
+            if answer < -CERTAIN * std and low < -answer < high:
                 yield Finding(
                     name=f"answer_to_{kind}", value=answer, std=std, rest=found.rest,
                     text=f"{seen}: the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel "
@@ -86,7 +96,7 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
                 times, mistake = UNITS[kind]
                 larger = [_answers(batch, model, axis, places, times) for batch in batches]
                 then = relation(stretches(batches, larger, length_m=length_m))
-                if then is not None and 1.0 / TUNING.alike < then.ratio.real < TUNING.alike:
+                if then is not None and 1.0 / ALIKE < then.ratio.real < ALIKE:
                     yield Finding(
                         name=f"unit_of_{kind}", value=answer, std=std, rest=found.rest,
                         text=f"the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel file's "
@@ -96,7 +106,7 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
         elif found is None and OUTPUTS[axis] == "r":
             turned = np.concatenate([_turned(rows) for rows in answers])
             against = -float(turned[turned < 0].sum())
-            if against > max(TUNING.turned_rad, TUNING.turned_share * float(np.abs(turned).sum())):
+            if against > max(TURNED_RAD, TURNED_SHARE * float(np.abs(turned).sum())):
                 yield Finding(
                     name=f"answer_to_{kind}", value=-against, std=0.0, rest=float(turned[turned > 0].sum()),
                     text=f"{seen}: by {np.degrees(against):.0f} degrees in all the other way than the vessel file's "
@@ -117,13 +127,13 @@ def faster_than_stated(batches: Sequence[Batch], actuators: Sequence[Actuator]) 
         for signal, response in zip(actuator.signals, actuator.responses, strict=True):
             own = [one for one in batches if signal in one.input_names and signal not in one.reached]
             speeds = [np.diff(one.inputs[:, one.input_names.index(signal)]) / one.sample_time_s for one in own]
-            ramps = [part for values in speeds for part in _ramps(values, TUNING.faster * response.rate)]
-            long = [part[1:-1] for part in ramps if len(part) >= TUNING.ramp]
+            ramps = [part for values in speeds for part in _ramps(values, FASTER * response.rate)]
+            long = [part[1:-1] for part in ramps if len(part) >= RAMP]
             inner = np.concatenate(long) if long else np.zeros(0)
-            if sum(map(len, ramps)) > len(inner) / TUNING.ramps or len(long) < TUNING.fewest_ramps:
+            if sum(map(len, ramps)) > len(inner) / RAMPS or len(long) < FEWEST_RAMPS:
                 continue
             rate, spread = float(np.median(inner)), float(np.median(np.abs(inner - np.median(inner))))
-            if spread < TUNING.ramp_spread * rate:
+            if spread < RAMP_SPREAD * rate:
                 yield Finding(
                     name=f"rate_of_{signal}", value=rate, std=spread / np.sqrt(len(long)), rest=spread,
                     text=f"{signal} moves evenly at {rate:.3g} per second in {len(long)} places, where the vessel file "
@@ -142,7 +152,7 @@ def _ramps(speeds: Array, least: float) -> list[Array]:
 def _turned(answers: Array) -> Array:
     """(n,) what the ship turns by while the inputs' share keeps its sign, counted in the sense of that share [rad]."""
     share, turn = np.diff(answers[:, 1]), np.diff(answers[:, 3])
-    sense = np.sign(share) * (np.abs(share) > TUNING.pushing * np.abs(share).max(initial=0.0))
+    sense = np.sign(share) * (np.abs(share) > PUSHING * np.abs(share).max(initial=0.0))
     ends = np.flatnonzero(np.diff(sense)) + 1
     return np.array([part.sum() for part in np.split(sense * turn, ends)])
 

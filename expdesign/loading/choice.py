@@ -17,10 +17,12 @@ from expdesign.durations import Aim, DurationDesign, DurationProblem, optimal_sh
 from expdesign.errors import NoAnswer, NotInformative
 from expdesign.loading.information import run_information
 from expdesign.loading.question import Question
-from expdesign.loading.tuning import TUNING
 from expdesign.progress import Progress, silent
 from expdesign.roll import Direction, cures, direction, open_directions
 from expdesign.values import Array, seal
+
+LEAST_EFFICIENCY = 0.9  # D-efficiency that a plan with fewer loads keeps, of the best with all candidates
+
 
 BY_VOLUME = Aim()
 """D: the volume of the confidence region of all parameters."""
@@ -213,7 +215,7 @@ def _fewer(question: Question, problems: _Problems, options: tuple[int, ...], pr
 
 def _followed(question: Question, steps: Sequence[Step], most_loads: int | None) -> Step:
     if most_loads is None:
-        return [step for step in steps if step.efficiency >= TUNING.least_efficiency][-1]
+        return [step for step in steps if step.efficiency >= LEAST_EFFICIENCY][-1]
     few = [step for step in steps if len(step.options) <= most_loads]
     if not few:
         raise NotInformative(

@@ -9,10 +9,13 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.loading.information import LoadOption
-from expdesign.loading.tuning import TUNING
 from expdesign.roll import PARAMETERS, parameters
 from expdesign.values import Array, seal
 from expdesign.vessel import NOMINAL, Load, Vessel
+
+# of a parameter's standard deviation, below which its value counts as zero; the deviation is then its size
+SMALL_SHARE = 0.01
+
 
 WEIGHED = ("m", "z_m")
 """Parameters of an unknown load."""
@@ -90,7 +93,7 @@ def build_question(
         )
     at = np.abs(theta[[PARAMETERS.index(name) for name in free]])
     deviation = np.array([std.get(name, 0.0) for name in free])
-    size = np.where(at > TUNING.small_share * deviation, at, deviation)
+    size = np.where(at > SMALL_SHARE * deviation, at, deviation)
     correlation = np.eye(len(free))
     for (one, other), value in pendulum.parameter_correlation.items():
         if one in free and other in free:

@@ -13,6 +13,22 @@ from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, j
 from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array, seal
 
+ITERATIONS = 60  # of the expectation-maximisation of noise and force
+FEWEST_STRETCHES = 40  # of a reference
+# blocks into which the reference is cut to measure how scores of neighbouring stretches correlate; the largest
+# inflation counts
+BLOCK_COUNTS = (160, 80, 40, 20)
+MISFIT_DEVIATIONS = 6.0  # standard deviations of the reference's misfit beyond which a stretch is not judged
+LARGEST_SIZE = 10.0  # of changes that are told from errors unlike the reference's, in sizes that matter
+# correlation times of the unmeasured force: first guess of the quick one, and the slow one [s]
+QUICK_S, SLOW_S = 300.0, 43200.0
+# variance of the slow part beside what the reference shows, as a multiple of it and by the number of times `slow_s`
+# that the reference covers
+SPARE = 8.0
+SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the force is learnt
+SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gain of twice the log-likelihood in one
+
+
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
 LEAST_SURPRISE = 0.1
@@ -93,10 +109,10 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
 
     Source: N. M. Laird and J. H. Ware, Biometrics 38 (1982), 963-974.
     """
-    if len(grams) < TUNING.fewest_stretches:
+    if len(grams) < FEWEST_STRETCHES:
         raise NotInformative(
             f"the reference has {len(grams)} stretches of {grams.stretch_s:g} s with a usable simulation, expected at "
-            f"least {TUNING.fewest_stretches}, {TUNING.fewest_stretches * grams.stretch_s / 3600.0:.1f} h"
+            f"least {FEWEST_STRETCHES}, {FEWEST_STRETCHES * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
     std, variance, change = _independent(grams)
@@ -121,7 +137,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         alike=whole / np.outer(own, own),
         stretches=len(grams),
         stretch_s=grams.stretch_s,
-        misfit_limit=middle + TUNING.misfit_deviations * spread,
+        misfit_limit=middle + MISFIT_DEVIATIONS * spread,
         surprise=max(float(surprises.mean()), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
     )
@@ -129,7 +145,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
 
 def misfit_of(quadratic: float, score: Array, information: Array, count: float) -> float:
     """Squared error per measured number, in standard deviations, that no change explains, large ones included."""
-    explained = np.linalg.solve(information + np.eye(len(score)) / TUNING.largest_size**2, score)
+    explained = np.linalg.solve(information + np.eye(len(score)) / LARGEST_SIZE**2, score)
     return float((quadratic - score @ explained) / max(count, 1.0))
 
 
@@ -142,7 +158,7 @@ def _independent(grams: Grams) -> tuple[Array, Array, Array]:
     own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
     variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
     change = np.zeros(m)
-    for _ in range(TUNING.iterations):
+    for _ in range(ITERATIONS):
         std, variance, change = _improved(grams, total, std, variance)
     return std, variance, change
 
@@ -175,14 +191,14 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
     """The force as it varies from stretch to stretch: variances of its quick and slow parts, and the quick time."""
     part = replace(
         stretches,
-        time_s=stretches.time_s[: TUNING.searched_stretches],
-        products=stretches.products[: TUNING.searched_stretches],
-        counts=stretches.counts[: TUNING.searched_stretches],
+        time_s=stretches.time_s[:SEARCHED_STRETCHES],
+        products=stretches.products[:SEARCHED_STRETCHES],
+        counts=stretches.counts[:SEARCHED_STRETCHES],
     )
     q = len(variance)
-    best = np.log2(np.concatenate([variance / 2, variance / 2, [TUNING.quick_s]]))
+    best = np.log2(np.concatenate([variance / 2, variance / 2, [QUICK_S]]))
     cost = float(likelihood(part, _force(best, q, stretch_s)))
-    for _ in range(TUNING.search_rounds):
+    for _ in range(SEARCH_ROUNDS):
         tried = best + np.concatenate([step * np.eye(2 * q + 1) for step in STEPS])
         costs = likelihood(part, _force(tried, q, stretch_s))
         gains = cost - costs
@@ -191,7 +207,7 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
         whole = float(likelihood(part, _force(together, q, stretch_s)))
         single = int(np.argmin(costs))
         new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
-        if cost - value < TUNING.search_gain:
+        if cost - value < SEARCH_GAIN:
             break
         best, cost = new, value
     return _force(best, q, stretch_s)
@@ -199,8 +215,8 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
 
 def _spared(force: Force, time_s: Array) -> Force:
     """The force with more variance of its slow processes, of which a short reference shows few independent values."""
-    seen = len(np.unique(np.floor((time_s - time_s[0]) / TUNING.slow_s)))
-    spare = np.repeat([1.0, 1.0 + TUNING.spare / seen], len(force.variance) // 2)
+    seen = len(np.unique(np.floor((time_s - time_s[0]) / SLOW_S)))
+    spare = np.repeat([1.0, 1.0 + SPARE / seen], len(force.variance) // 2)
     return replace(force, variance=spare * force.variance)
 
 
@@ -214,8 +230,8 @@ def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
     """The force whose parameters have these logarithms (..., 2 q + 1)."""
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
-    quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, TUNING.slow_s / 4), variance[..., :q].shape)
-    return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, TUNING.slow_s)], axis=-1))
+    quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, SLOW_S / 4), variance[..., :q].shape)
+    return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1))
 
 
 def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
@@ -252,7 +268,7 @@ def _inflation(score: Array, information: Array) -> Array:
     """(m,) the largest ratio of the variance of sums over blocks to the sum of information, at least one."""
     known = np.einsum("wii->wi", information)
     largest = np.ones(score.shape[1])
-    for count in TUNING.block_counts:
+    for count in BLOCK_COUNTS:
         edges = np.linspace(0, len(score), min(count, len(score)), endpoint=False).astype(int)
         sums, sizes = np.add.reduceat(score, edges), np.add.reduceat(known, edges)
         largest = np.maximum(largest, (sums**2).sum(axis=0) / np.maximum(sizes.sum(axis=0), 1e-300))

@@ -8,6 +8,13 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.monitoring.tuning import TUNING
 from expdesign.vessel import stem
 
+ANGLE_RAD = 0.03  # misalignment that matters [rad]
+GYRO_SHARE = 0.05  # change of the gyro's scale that matters
+# kinds of effects that a load may change, each with the standard deviation of its change in a port call, in sizes that
+# matter
+LOADS = (("inertia", 2.0), ("hull", 1.0))
+
+
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
 
 
@@ -48,7 +55,7 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
     """
     share = size / TUNING.relative_size
     model = ship.model
-    loads = {kind: std / share for kind, std in TUNING.loads}
+    loads = {kind: std / share for kind, std in LOADS}
     hull = {name for name, part in zip(model.names, ship.scaled_terms, strict=False) if part.damping}
     values = dict(zip(model.names, model.parameters.tolist(), strict=True))
     changes = [
@@ -70,14 +77,10 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
     changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words=words, whole=1.0))
     stems = dict.fromkeys(stem(name) for name in model.inputs)
     changes += [
-        Change(
-            effect=f"offset:{name}", size=share * TUNING.angle_rad, unit=(1.0, "rad"), words=f"offset of {what} angles"
-        )
+        Change(effect=f"offset:{name}", size=share * ANGLE_RAD, unit=(1.0, "rad"), words=f"offset of {what} angles")
         for name, what in (("a", "azimuth"), ("rudder", "rudder"))
         if name in stems
     ]
     if "r" not in ship.derived and "r" in model.outputs:
-        changes.append(
-            Change(effect="gyro", size=share * TUNING.gyro_share, unit=(0.01, "%"), words="scale of yaw rate")
-        )
+        changes.append(Change(effect="gyro", size=share * GYRO_SHARE, unit=(0.01, "%"), words="scale of yaw rate"))
     return tuple(changes)

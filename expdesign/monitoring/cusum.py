@@ -20,12 +20,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from expdesign.monitoring.calibration import Calibration, misfit_of
+from expdesign.monitoring.calibration import LARGEST_SIZE, Calibration, misfit_of
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Force, Judged, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step, Sums
-from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array
+
+AS_LIKELY = 3.0  # difference of log-likelihood up to which another change explains the data as well
+WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
+WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond which the weather is unlike it
+# stretches of a sum from which weather beyond the reference is told from a change of the ship, and the same where the
+# sum began in such weather
+TOLD_APART = (7, 20)
+UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
+SETTLING_STRETCHES = 20  # fewest from which the size of a change is told
+REFINED = 0.2  # change of the size, in sizes that matter, below which it is refined no further
+CLEAR = 2.0  # standard errors from which a size from the data since the last refinement takes the place of that one
+# information, in inverse squared sizes, from which a change is settled; patience: factor of it where other changes
+# explain the data as well
+SETTLED = 60.0
+PATIENCE = 10.0
+LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its load is taken for the ship's, and again
+
 
 # Port calls: the ship may carry another load afterwards, which is estimated anew and raises no alarm.
 
@@ -47,12 +63,12 @@ def called(state: State, calibration: Calibration, until_s: float) -> State:
 def with_load(state: State, calibration: Calibration) -> State:
     """Move a load that is known into the ship's model, as large effects are not linear."""
     load, loads = state.load, calibration.loads
-    due = TUNING.load_settled[load.rounds] if load.rounds < len(TUNING.load_settled) else math.inf
+    due = LOAD_SETTLED[load.rounds] if load.rounds < len(LOAD_SETTLED) else math.inf
     if not load.stay_s or load.judged < due:
         return state
     found, _ = load_of(state, calibration)
     more, load = found - load.taken, replace(load, rounds=load.rounds + 1)
-    if np.abs(more).max() < TUNING.refined:
+    if np.abs(more).max() < REFINED:
         return replace(state, load=load)
     mean = state.known.mean.copy()
     mean[len(mean) - len(loads) :] = 0.0
@@ -102,11 +118,11 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
     named = alarm.change if alarm.named else None
     alarm = _attributed(alarm, pending, calibration, state.until_s, named=named, so_far=state.shift - state.before)
     state = replace(state, alarm=alarm, pending=pending, known=known)
-    enough = pending.information[0][alarm.change, alarm.change] / calibration.common >= TUNING.settled * (
-        TUNING.patience if alarm.as_likely else 1.0
+    enough = pending.information[0][alarm.change, alarm.change] / calibration.common >= SETTLED * (
+        PATIENCE if alarm.as_likely else 1.0
     )
-    if not enough or pending.count < TUNING.settling_stretches:
-        if before.named and abs(alarm.value - before.value) < TUNING.clear * alarm.std:  # few data since the last size
+    if not enough or pending.count < SETTLING_STRETCHES:
+        if before.named and abs(alarm.value - before.value) < CLEAR * alarm.std:  # few data since the last size
             alarm = replace(alarm, value=before.value, std=before.std)
         return replace(state, alarm=alarm)
     together = np.array([alarm.change, *alarm.as_likely])
@@ -123,7 +139,7 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
         sums=state.sums.again(every, state.until_s),
         whole=state.whole.again(every[:1], state.until_s),
         shift=shift,
-        alarm=replace(alarm, named=True, settled=bool(np.abs(found).max() < TUNING.refined)),
+        alarm=replace(alarm, named=True, settled=bool(np.abs(found).max() < REFINED)),
         pending=pending.again(every[:1], state.until_s),
     )
 
@@ -153,7 +169,7 @@ def _attributed(
     gain = score[watched] ** 2 / known / (2.0 * calibration.common)
     order = np.argsort(-gain)
     best = int(order[0]) if named is None else int(np.flatnonzero(watched == named)[0])
-    rest = tuple(int(watched[k]) for k in order if k != best and gain[k] > gain[best] - TUNING.as_likely)
+    rest = tuple(int(watched[k]) for k in order if k != best and gain[k] > gain[best] - AS_LIKELY)
     inner = information[np.ix_(watched, watched)] + np.eye(len(watched))
     together = float(score[watched] @ np.linalg.solve(inner, score[watched])) / (2.0 * calibration.common)
     change = int(watched[best])
@@ -234,8 +250,8 @@ def _counted(state: State, one: Judged, surprised: float, duration_s: float, kin
 
     It is not judged where the weather is beyond the reference, unless a change that was noticed explains it.
     """
-    weather = state.weather + (surprised - state.weather) / TUNING.weather_stretches
-    beyond = weather > TUNING.weather_limit and state.alarm is None
+    weather = state.weather + (surprised - state.weather) / WEATHER_STRETCHES
+    beyond = weather > WEATHER_LIMIT and state.alarm is None
     return replace(
         state,
         judged_s=state.judged_s + duration_s * (not beyond),
@@ -274,7 +290,7 @@ def _noticed(
 def _doubtful(state: State) -> bool:
     """Whether the largest sum has too few stretches to tell a change of the ship from unusual weather."""
     sums = state.largest
-    return sums.count < TUNING.told_apart[int(sums.weather[0] > TUNING.weather_limit)]
+    return sums.count < TOLD_APART[int(sums.weather[0] > WEATHER_LIMIT)]
 
 
 def _by_weather(state: State, calibration: Calibration, forces: int) -> bool:
@@ -284,11 +300,11 @@ def _by_weather(state: State, calibration: Calibration, forces: int) -> bool:
     """
     sums = state.largest
     score, information = sums.score[0], sums.information[0]
-    inner = information + np.eye(len(score)) / TUNING.largest_size**2
+    inner = information + np.eye(len(score)) / LARGEST_SIZE**2
     surprised = float(sums.surprise[0])
     left = surprised - float(score @ np.linalg.solve(inner, score)) / calibration.surprise
     freedom = sums.count - float(np.trace(np.linalg.solve(inner, information))) / forces
-    return freedom > 1.0 and left > max(TUNING.weather_limit * freedom, TUNING.unexplained_share * surprised)
+    return freedom > 1.0 and left > max(WEATHER_LIMIT * freedom, UNEXPLAINED_SHARE * surprised)
 
 
 def _less(products: Array, change: Array) -> Array:

@@ -26,9 +26,17 @@ from expdesign.diagnosis.motion import (
     start_responses,
 )
 from expdesign.monitoring.changes import Change
-from expdesign.monitoring.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
+
+STRETCH_S = 60.0  # length of the stretches that are simulated [s], for a ship of `length_m`
+LENGTH_M = 20.0  # see there [m]
+FEWEST_SAMPLES = 15  # measured samples of a stretch that is judged
+STILL_MPS, STILL_MPS2 = 0.3, 1e-3  # speed and acceleration by propulsion below which a ship lies still [m/s, m/s2]
+# change of heading in a stretch that counts as a turn [rad], and of speed, as a share
+TURNED_RAD, GAINED_SHARE = 0.26, 0.15
+LARGEST_SPEED = 100.0  # speed beyond which a simulation has diverged [m/s, rad/s]
+
 
 STARTS = 3
 KINDS = ("steady course", "turning", "changing speed", "turning and changing speed")
@@ -169,8 +177,8 @@ def _compared(linear: LinearisedMotion) -> Array:
 
 def _usable(linear: LinearisedMotion, seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(w,) stretches with a simulation and with enough samples."""
-    calm = np.abs(linear.motion.states).max(axis=(1, 2)) < TUNING.largest_speed
-    return np.asarray(calm & (seen[..., :STARTS].any(axis=2).sum(axis=1) >= TUNING.fewest_samples))
+    calm = np.abs(linear.motion.states).max(axis=(1, 2)) < LARGEST_SPEED
+    return np.asarray(calm & (seen[..., :STARTS].any(axis=2).sum(axis=1) >= FEWEST_SAMPLES))
 
 
 def _budget(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Sequence[Change]) -> Array:
@@ -186,14 +194,14 @@ def _still(linear: LinearisedMotion, budget: Array, changes: Sequence[Change]) -
     """(w,) stretches without way and without propulsion: in port or adrift, where the model does not hold."""
     way = np.hypot(linear.motion.states[..., 0], linear.motion.states[..., 1]).mean(axis=1)
     push = np.hypot(*np.moveaxis(budget[:, [change.effect for change in changes].index("gain"), :2], -1, 0))
-    return np.asarray((way < TUNING.still_mps) & (push < TUNING.still_mps2))
+    return np.asarray((way < STILL_MPS) & (push < STILL_MPS2))
 
 
 def stretch_kinds(u: Array, r: Array, step_s: float) -> NDArray[np.int64]:
     """(w,) number in `KINDS` of stretches with surge speeds and yaw rates (w, k)."""
     turned = np.abs(r).mean(axis=1) * u.shape[1] * step_s
     gained = np.ptp(u, axis=1) / np.maximum(np.abs(u).max(axis=1), 1e-9)
-    return np.asarray((turned > TUNING.turned_rad) + 2 * (gained > TUNING.gained_share), dtype=np.int64)
+    return np.asarray((turned > TURNED_RAD) + 2 * (gained > GAINED_SHARE), dtype=np.int64)
 
 
 def joined(parts: Sequence[Grams]) -> Grams:
@@ -211,7 +219,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
 
 def stretch_length(length_m: float) -> float:
     """Length of the stretches [s] for a ship of a length [m]: its motion scales as Froude's law has it."""
-    return max(5.0, 5.0 * float(round(TUNING.stretch_s * (length_m / TUNING.length_m) ** 0.5 / 5.0)))
+    return max(5.0, 5.0 * float(round(STRETCH_S * (length_m / LENGTH_M) ** 0.5 / 5.0)))
 
 
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:

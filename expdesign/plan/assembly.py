@@ -45,6 +45,17 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import covering_discs
 
+# how many times finer the clearance grid is where the usual one is too coarse for a passage or a place
+FINER_GRID = 4.0
+FASTEST_START = 1.5  # a plan may begin so many times faster than the ship's top speed, and turn so much faster
+WIDER_REACH = 4.0  # factor on the part of the chart that is planned in where the one before had no room
+TRANSITIONS_S = 30.0  # work budget of optimising transitions; the others keep the rule for leg times [s]
+FEWER_TRIALS = 0.4  # time that trying the transitions of a plan takes, beside that of the plan before
+# how long phases take beside each other, on average of the examples on two cores: measuring the water, trying
+# transitions, placing runs, sailing them, verifying and sailing drawn trials
+WORK = (1.0, 3.0, 1.0, 2.5, 4.0)
+MORE_CORNERS = ((1.0, 700), (16.0, 12000))  # the same, where no path was found through water with so few
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanRoom:
@@ -71,7 +82,7 @@ class Phases(NamedTuple):
 
 def phases_of(problem: PlanProblem, planner: LocalPlanner, progress: Progress) -> Phases:
     """Phases of a plan by how long they take, where the planner has them."""
-    water, transitions, *others = PLAN.work
+    water, transitions, *others = WORK
     return Phases(*in_phases(progress, water, transitions * (_most_trials(problem, planner) > 0), *others))
 
 
@@ -114,7 +125,7 @@ def roomy_water(
     try:
         return water, plan_room(problem, water, progress, like, strict=True)
     except NoRoom:
-        finer = leg_water(problem, ship, finer=PLAN.finer_grid)
+        finer = leg_water(problem, ship, finer=FINER_GRID)
     if finer.field.cell_m >= 0.75 * water.field.cell_m:  # the area is too large for it
         finer = replace(finer, field=water.field)
     if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CHART.corners[1][1]:
@@ -135,7 +146,7 @@ def waters(problem: PlanProblem, ship: Capability) -> Iterator[SeaArea]:
     while area is not whole:
         if connects(area, ends):
             yield area
-        reach_m *= PLAN.wider_reach
+        reach_m *= WIDER_REACH
         area = reachable(whole, ends, reach_m)
     yield whole
 
@@ -167,7 +178,7 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
-        corners=CHART.corners if finer == 1.0 else CHART.more_corners,
+        corners=CHART.corners if finer == 1.0 else MORE_CORNERS,
         paths=problem.settings.paths,
     )
 
@@ -231,9 +242,9 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         start=problem.start,
         under_way=(through_water(problem.environment, problem.begin), problem.standing),
         made_good=path_exceeds_displacement(space, counts, problem.start),
-        budget=WorkBudget(most_s=PLAN.transitions_s),
+        budget=WorkBudget(most_s=TRANSITIONS_S),
     )
-    for part in in_phases(progress, *PLAN.fewer_trials ** np.arange(_most_trials(problem, planner))):
+    for part in in_phases(progress, *FEWER_TRIALS ** np.arange(_most_trials(problem, planner))):
         part("trying transitions between runs", 0.0)
         try:
             placements = place_runs(
@@ -292,10 +303,10 @@ def check_start(problem: PlanProblem, ship: Capability) -> None:
     if problem.under_way is None:
         return
     check_start_speed(problem.vessel, problem.environment, ship, problem.begin)
-    turn = PLAN.fastest_start * max(ship.spot_rate_radps, ship.yaw_rate_radps, _turn(problem))
+    turn = FASTEST_START * max(ship.spot_rate_radps, ship.yaw_rate_radps, _turn(problem))
     if abs(r := float(problem.under_way.velocity[2])) > turn:
         raise InputError(
-            f"start.r_radps is {r:.3g}, expected at most {turn:.3g} to either side, {PLAN.fastest_start:g} times what "
+            f"start.r_radps is {r:.3g}, expected at most {turn:.3g} to either side, {FASTEST_START:g} times what "
             f"vessel {problem.vessel.name!r} turns in its runs and on legs"
         )
 
@@ -304,12 +315,12 @@ def check_start_speed(vessel: Vessel, environment: Environment, ship: Capability
     """Raise InputError where a state (6,) to begin with is faster through water than the ship can ever be."""
     speed_mps, most_mps = (
         float(np.hypot(*through_water(environment, begin)[:2])),
-        PLAN.fastest_start * ship.top_speed_mps,
+        FASTEST_START * ship.top_speed_mps,
     )
     if speed_mps > most_mps:
         raise InputError(
             f"start.u_mps and start.v_mps are {speed_mps:.3g} m/s through the water, expected at most {most_mps:.3g}, "
-            f"{PLAN.fastest_start:g} times the top speed of vessel {vessel.name!r}"
+            f"{FASTEST_START:g} times the top speed of vessel {vessel.name!r}"
         )
 
 

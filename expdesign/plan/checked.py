@@ -18,12 +18,18 @@ from expdesign.plan.monte_carlo import (
     worst_leg,
 )
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import RiskEstimate, SailedTrial, Verification
 from expdesign.plan.verify import verify_plan
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
+
+# share of the limits below which failures in the rest of a refused plan must be for a plan without its worst run to be
+# made
+PROMISE = 0.8
+TRIALS_STREAM = 1  # random stream of the drawn trials, apart from other draws of the same seed
+# random stream, and number, of the trials whose time decides which of several days is expected to be the shortest
+LATENESS_STREAM, LATENESS_TRIALS = 2, 60
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +70,7 @@ class Refused:
         Some margin is asked for: runs placed anew fail in other places.
         """
         left, aborted = self.trials.shares([leg.name != name for leg in self.sailed.legs])
-        return shares_allowed((left / PLAN.promise, aborted / PLAN.promise), confidence)
+        return shares_allowed((left / PROMISE, aborted / PROMISE), confidence)
 
 
 def verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> Verification:
@@ -100,7 +106,7 @@ def drawn_risk(
     problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, attempt: int = 0, progress: Progress = silent
 ) -> tuple[RiskEstimate, Trials]:
     """The risk of the plan of some attempt; random streams are independent of planning and of other attempts."""
-    rng = np.random.default_rng((problem.seed, PLAN.trials_stream, attempt))
+    rng = np.random.default_rng((problem.seed, TRIALS_STREAM, attempt))
     settings = problem.settings
     draws = trials_needed(settings.confidence)
     return estimate_risk(water, sailed, rng=rng, draws=draws, aborted_most=settings.aborted_most, progress=progress)
@@ -111,8 +117,8 @@ def drawn_lateness_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial)
 
     Fewer trials than of a plan's risk, from a stream of their own: enough to compare days by their expected time.
     """
-    rng = np.random.default_rng((problem.seed, PLAN.lateness_stream))
-    trials = sail_trials(water, sailed, draws=PLAN.lateness_trials, rng=rng)
+    rng = np.random.default_rng((problem.seed, LATENESS_STREAM))
+    trials = sail_trials(water, sailed, draws=LATENESS_TRIALS, rng=rng)
     done = trials.completed
     if not done.any():
         return np.full(len(sailed.legs), np.inf)
@@ -129,7 +135,7 @@ def accepted(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budg
 
 def promising(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, budget: WorkBudget) -> bool:
     """Whether it is likelier than not that drawn trials would accept a plan, by few of them; their work is counted."""
-    rng = np.random.default_rng((problem.seed, PLAN.trials_stream))
-    trials = sail_trials(water, sailed, draws=PLAN.lateness_trials, rng=rng)
+    rng = np.random.default_rng((problem.seed, TRIALS_STREAM))
+    trials = sail_trials(water, sailed, draws=LATENESS_TRIALS, rng=rng)
     budget.sailed(trials.samples_sailed)
     return shares_allowed(trials.shares(), problem.settings.confidence)

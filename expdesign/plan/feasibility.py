@@ -18,9 +18,20 @@ from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.local_planner import LocalPlanner, RunSpace, moved
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import have_room
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.values import Array
+
+# places and headings at which a run is tried first, before boxes round them are halved
+FIRST_PLACES, FIRST_HEADINGS = 2000, 24
+FIRST_TRIES = 500  # poses drawn among these and tried before all others: in wide water one of them has room
+BOXES = 400_000  # of places and headings at most; with more of them it stays open whether the run has a place
+LEAST_SLACK_CELLS = 3.0  # slack in cells of the clearance grid at which that stays open, too
+# distances in hull lengths, and bearings off the course, at which a ship that starts under way is tried to stop
+STOP_HULLS = (16.0, 8.0, 4.0, 2.0)
+# distances in hull lengths, and bearings off the course, at which a ship that starts under way is tried to stop
+STOP_BENDS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
+LOOKUPS = 200_000  # clearances looked up at a time
+LEG_S = 40.0  # work budget of one leg [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,11 +53,11 @@ def place_of(space: RunSpace, index: int) -> Fit:
     points = np.vstack([run.discs, (0.0, 0.0), run.displacement[:2]])
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     reach_m = float(np.hypot(*(points - middle).T).max())
-    half_m, half_rad, whole = _first_half_m(space), np.pi / PLAN.first_headings, True
+    half_m, half_rad, whole = _first_half_m(space), np.pi / FIRST_HEADINGS, True
     boxes = _first_boxes(space, half_m)
     outline = _outline(run.discs)
     back = np.array([-middle[0], -middle[1], 0.0])
-    spread = moved(np.random.default_rng(0).choice(boxes, min(PLAN.first_tries, len(boxes)), replace=False), back)
+    spread = moved(np.random.default_rng(0).choice(boxes, min(FIRST_TRIES, len(boxes)), replace=False), back)
     found = _first_clear(space, index, spread)
     while found is None:
         slack_m = np.sqrt(2.0) * (half_m + space.field.cell_m) + reach_m * half_rad
@@ -59,9 +70,9 @@ def place_of(space: RunSpace, index: int) -> Fit:
         if not len(boxes):
             return Fit(impossible=whole)
         found = _first_clear(space, index, poses)
-        if found is not None or slack_m < PLAN.least_slack_cells * space.field.cell_m:
+        if found is not None or slack_m < LEAST_SLACK_CELLS * space.field.cell_m:
             break
-        most = PLAN.boxes // 8
+        most = BOXES // 8
         whole, boxes = whole and len(boxes) <= most, boxes[:: -(-len(boxes) // most)]
         half_m, half_rad = half_m / 2, half_rad / 2
         boxes = np.concatenate([boxes + np.multiply(step, (half_m, half_m, half_rad)) for step in _CORNERS])
@@ -74,7 +85,7 @@ _CORNERS = tuple((north, east, turn) for north in (-1, 1) for east in (-1, 1) fo
 def _first_half_m(space: RunSpace) -> float:
     """Half the side of the boxes of places looked at first [m]."""
     rows, columns = space.field.clearance_m.shape
-    return space.field.cell_m * max(1.0, math.sqrt(rows * columns / PLAN.first_places) / 2)
+    return space.field.cell_m * max(1.0, math.sqrt(rows * columns / FIRST_PLACES) / 2)
 
 
 def _first_boxes(space: RunSpace, half_m: float) -> Array:
@@ -84,7 +95,7 @@ def _first_boxes(space: RunSpace, half_m: float) -> Array:
         np.arange(first + half_m, first + count * space.field.cell_m + half_m, 2 * half_m)
         for first, count in zip(low, space.field.clearance_m.shape, strict=True)
     )
-    turn = (np.arange(PLAN.first_headings) + 0.5) * 2 * np.pi / PLAN.first_headings
+    turn = (np.arange(FIRST_HEADINGS) + 0.5) * 2 * np.pi / FIRST_HEADINGS
     return np.stack(np.meshgrid(north, east, turn, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -96,7 +107,7 @@ def _outline(discs: Array) -> np.ndarray:
 
 def _clear(space: RunSpace, index: int, poses: Array) -> Iterator[tuple[Array, np.ndarray]]:
     """Poses (n, 3), some at a time, and whether a run from them keeps its margins."""
-    at_once = max(1, PLAN.lookups // len(space.footprints[index].discs))
+    at_once = max(1, LOOKUPS // len(space.footprints[index].discs))
     for first in range(0, len(poses), at_once):
         some = poses[first : first + at_once]
         yield some, have_room(space, np.full(len(some), index), some)
@@ -146,7 +157,7 @@ def without_way_out(problem: PlanProblem, water: LegWater, planner: LocalPlanner
             end_inputs=rest,
             seed=problem.seed,
             before=problem.standing[None],
-            budget=WorkBudget(most_s=PLAN.leg_s),
+            budget=WorkBudget(most_s=LEG_S),
         )
         if water.holds(end[None]) and planner.leg(task, water) is not None:
             return None
@@ -165,8 +176,8 @@ def without_way_out(problem: PlanProblem, water: LegWater, planner: LocalPlanner
 def _stops(problem: PlanProblem) -> Iterator[Array]:
     """(3,) poses to stop at, the farthest first; headed as the ship would be on an arc that leads there."""
     course = problem.start[2] + float(np.arctan2(*problem.begin[4:2:-1]))
-    for hulls in PLAN.stop_hulls:
-        for bend in PLAN.stop_bends_rad:
+    for hulls in STOP_HULLS:
+        for bend in STOP_BENDS_RAD:
             step = hulls * problem.vessel.length_m * np.array([np.cos(course + bend), np.sin(course + bend)])
             yield np.array([*(problem.start[:2] + step), problem.start[2] + 2 * bend])
 

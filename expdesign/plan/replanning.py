@@ -28,6 +28,9 @@ from expdesign.plan.values import Leg, RiskEstimate
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 
+LEAST_CONFIDENCE = 0.5  # below which none is named as a remedy
+WIDENING = 1.4  # factor on a run's room then; legs get the same share of a hull length more clearance
+
 
 def worth_replanning(
     problem: PlanProblem, risk: RiskEstimate, budget: WorkBudget, *, attempt: int, before_s: float
@@ -57,7 +60,7 @@ def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: 
 def _met(problem: PlanProblem, risk: RiskEstimate) -> float | None:
     """The lower confidence that a plan would meet; None where aborted trials are the reason, or far too many leave."""
     lower = float(np.floor(1000.0 * (1.0 - risk.left - risk.error)) / 1000.0)
-    return lower if PLAN.least_confidence <= lower < problem.settings.confidence else None
+    return lower if LEAST_CONFIDENCE <= lower < problem.settings.confidence else None
 
 
 def _accepts(problem: PlanProblem, first: PlanRoom, plan: Refused, confidence: float) -> bool:
@@ -89,11 +92,10 @@ def with_more_room(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: t
     worst, space = legs[worst_leg(trials)], room.space
     if worst.kind == "primitive":
         widened = tuple(
-            replace(run, room_m=PLAN.widening * run.room_m) if run.name == worst.name else run
-            for run in space.footprints
+            replace(run, room_m=WIDENING * run.room_m) if run.name == worst.name else run for run in space.footprints
         )
         return replace(room, space=replace(space, footprints=widened))
-    clearance_m = room.water.clearance_m + (PLAN.widening - 1.0) * problem.vessel.length_m
+    clearance_m = room.water.clearance_m + (WIDENING - 1.0) * problem.vessel.length_m
     water = replace(room.water, clearance_m=clearance_m)
     try:
         found = search_space(problem, water, space.planner)

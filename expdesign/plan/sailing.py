@@ -19,16 +19,20 @@ from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.memory import in_order, recalled
 from expdesign.plan.assembly import PlanRoom, phases_of
+from expdesign.plan.feasibility import LEG_S
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_state, nearest_turns
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
 from expdesign.plan.timeline import Timeline
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import Placement, Placements, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 from expdesign.values import Array
+
+FAILURE_S = 2.0  # least cost of a failed placement [s]
+CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is stuck ends, whatever its counted work
+
 
 # Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
 
@@ -215,7 +219,7 @@ class _Failures:
     """Failed placements, counted against the time budget."""
 
     def __init__(self, budget_s: float) -> None:
-        self._budget_s, self._deadline = budget_s, time.monotonic() + PLAN.clock_budgets * budget_s
+        self._budget_s, self._deadline = budget_s, time.monotonic() + CLOCK_BUDGETS * budget_s
         self.tries, self._lost_s = 0, 0.0
 
     def placing(self) -> tuple[str, float]:
@@ -227,7 +231,7 @@ class _Failures:
     def count(self, cost_s: float, stuck: str, failed: Placement) -> None:
         """Count one failure, and raise NoPlan where it was one too many."""
         self.tries += 1
-        self._lost_s += max(PLAN.failure_s, cost_s)
+        self._lost_s += max(FAILURE_S, cost_s)
         if self._lost_s > self._budget_s or time.monotonic() > self._deadline:
             raise NoPlan(
                 f"no plan within plan.time_budget_s = {self._budget_s:g}, {self.tries} places were tried: {stuck}",
@@ -343,7 +347,7 @@ class _Voyage:
             end_inputs=end_inputs,
             seed=self.problem.seed + len(self.line.stretches) + stretches + 1,
             before=self.water.remembered(given),
-            budget=WorkBudget(most_s=PLAN.leg_s),
+            budget=WorkBudget(most_s=LEG_S),
         )
 
     @property

@@ -50,6 +50,12 @@ from expdesign.progress import Progress, never_falling, silent
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array, seal
 
+REPLAN_BUDGETS = 2.0  # time budgets of counted work within which a replan must be expected to end
+# share of the distance that the plan's time allows at top speed, beyond start and goal, from which a plan cannot return
+# in that time; half, and some for speeds that legs begin and end with
+BOUND_REACH = 0.6
+
+
 Planned = TypeVar("Planned")
 
 
@@ -153,7 +159,7 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
 
 
 def _budget(problem: PlanProblem) -> WorkBudget:
-    return WorkBudget(most_s=PLAN.replan_budgets * problem.settings.time_budget_s)
+    return WorkBudget(most_s=REPLAN_BUDGETS * problem.settings.time_budget_s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -266,7 +272,7 @@ def _bound_s(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> floa
     """Least repositioning time of any plan of the problem's runs."""
     ship, ends_s = water.ship, float(sailed.trajectory.time_s[-1])
     # plans that lead farther take longer than this one
-    area = reachable(problem.area, problem.ends, PLAN.bound_reach * top_mps(problem, ship) * ends_s)
+    area = reachable(problem.area, problem.ends, BOUND_REACH * top_mps(problem, ship) * ends_s)
     return reposition_bound_s(
         problem.vessel,
         area,

@@ -13,9 +13,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from expdesign.records.file import Table, input_name
-from expdesign.records.tuning import TUNING
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.vessel.actuators import stem
+
+LIMIT_SLACK = 0.02  # share of an actuator's limit by which a recorded input may exceed it
+MOST_BEYOND = 0.5  # share of rows beyond the limits above which a file is refused
+FAR_BEYOND = 3.0  # multiple of a limit from which another unit is thought of
+
 
 MISTAKES = {
     "n": (
@@ -47,7 +51,7 @@ def check_limits(table: Table, limits: Mapping[str, Limit]) -> Table:
     for name, values in table.columns.items():
         signal, source = input_name(name), table.sources.get(name)
         limit = limits.get(signal, Limit())
-        slack = TUNING.limit_slack * _size(limit)
+        slack = LIMIT_SLACK * _size(limit)
         beyond = (values < limit.low - slack) | (values > limit.high + slack)
         if source is None or not beyond.any():
             continue
@@ -55,7 +59,7 @@ def check_limits(table: Table, limits: Mapping[str, Limit]) -> Table:
         bounds = " to ".join(f"{bound / source.factor:.4g}" for bound in (limit.low, limit.high))
         where = f"beyond the vessel's limits of {bounds} in {math.ceil(100 * np.mean(beyond))} % of the rows"
         cause = _cause(signal, values[values != 0], limit, header=source.header, plain=source.factor == 1.0)
-        if np.mean(beyond) > TUNING.most_beyond or (cause and np.mean(beyond[values != 0]) > TUNING.most_beyond):
+        if np.mean(beyond) > MOST_BEYOND or (cause and np.mean(beyond[values != 0]) > MOST_BEYOND):
             found = f"is {table.value(name, most)} in row {most + table.first_row}, {where}"
             raise table.error(name, "; ".join(filter(None, (found, cause))))
         found = f"{source.header} is {where} ({table.rows(beyond)}), as far as {table.value(name, most)}"
@@ -71,8 +75,8 @@ def _size(limit: Limit) -> float:
 
 def _cause(signal: str, values: np.ndarray, limit: Limit, *, header: str, plain: bool) -> str:
     """The mistake that puts all values within the limits, in words; "" where none does."""
-    slack = TUNING.limit_slack * _size(limit)
-    if not plain or np.abs(values).max() < TUNING.far_beyond * _size(limit):
+    slack = LIMIT_SLACK * _size(limit)
+    if not plain or np.abs(values).max() < FAR_BEYOND * _size(limit):
         return ""
     for words, factor in MISTAKES["tau" if signal.startswith("tau") else stem(signal.rpartition("_")[0])]:
         right = factor * (limit.high if factor == 0.01 else 1.0) * values

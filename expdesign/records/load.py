@@ -48,10 +48,13 @@ from expdesign.records.pose import (
     with_continuous_angles,
     with_metres,
 )
-from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY, Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, column_name
+
+HELD_SHARE = 0.5  # share of repeated positions of a moving ship above which they count as held values
+SIDEWAYS_RATIO = 2.0  # sway over surge (root mean square) above which the axes of the pose are questioned
+
 
 UNCHECKED = ("time_s", "batch", "depth_m", "lat_deg", "lon_deg")
 
@@ -65,7 +68,7 @@ def table_remarks(table: Table) -> Iterator[str]:
         yield f"{table.sources[name].header} is {table.value(name, 0)} in all rows, {what}"
     if "north_m" in table.columns:
         still = np.all(np.diff(table.stack("north_m", "east_m"), axis=0) == 0, axis=1)
-        if TUNING.held_share < np.mean(still) < 1:
+        if HELD_SHARE < np.mean(still) < 1:
             yield f"the position repeats in {np.mean(still):.0%} of the rows: differences of held values are inaccurate"
 
 
@@ -74,7 +77,7 @@ def motion_remarks(batches: list[Batch], origins: Mapping[str, str]) -> Iterator
     if any(origins.get(output, MEASURED) == MEASURED for output in ("u", "v")):
         return
     u, v = np.sqrt(np.mean(np.vstack([batch.velocity[:, :2] for batch in batches]) ** 2, axis=0))
-    if v > TUNING.sideways_ratio * u:
+    if v > SIDEWAYS_RATIO * u:
         found = f"the ship moves sideways at {v:.3g} m/s and ahead at {u:.3g} m/s, root mean square"
         yield f"{found}: are the axes of the pose what their names say?"
 

@@ -20,6 +20,11 @@ from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch, Delivered, Record
 from expdesign.values import Array
 
+LONGEST_MEAN_S = 1.0  # over which samples are averaged, at most [s]
+# of the time in which the ship sails, or turns through, her length, over which they are, at most. Her own times are a
+# third of it and more
+MEAN_SHARE = 0.1
+
 
 def averaged(record: Record, count: int) -> Record:
     """The record with so many samples averaged to one; the record itself for 1.
@@ -39,14 +44,14 @@ def samples_of_a_mean(record: Record, length_m: float) -> int:
     if len({batch.sample_time_s for batch in record.batches}) != 1:
         return 1
     sample_s = record.batches[0].sample_time_s
-    slow = max(1, int(TUNING.longest_mean_s / sample_s + 1e-9))
+    slow = max(1, int(LONGEST_MEAN_S / sample_s + 1e-9))
     rows = np.concatenate([_block_means(batch.velocity, slow) for batch in record.batches])
     rows = rows[np.isfinite(rows).all(axis=1)]
     if not len(rows):
         return 1
     u, v, r = np.sqrt(np.mean(rows**2, axis=0)).tolist()
     speed = float(np.hypot(np.hypot(u, v), length_m * r))
-    mean_s = min(TUNING.longest_mean_s, TUNING.mean_share * length_m / max(speed, 1e-9))
+    mean_s = min(LONGEST_MEAN_S, MEAN_SHARE * length_m / max(speed, 1e-9))
     return max(1, int(mean_s / sample_s + 1e-9))
 
 

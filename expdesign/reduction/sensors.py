@@ -26,10 +26,14 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.records import central_difference, smoothed_velocity
-from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch
 from expdesign.values import Array
 from expdesign.vessel import Mounting, Sensors
+
+ON_TIME = 1e-6  # difference of two times, in samples, below which they count as equal
+HELD_SHARE = 0.9  # share of changes of a signal that a stated interval must explain
+PHASES = 50  # changes from which the time of the readings within an interval is searched for
+
 
 # Readings of a sensor at the times at which they were taken, and the signal between them.
 
@@ -59,7 +63,7 @@ class Readings:
         """(k, c) the signal at other times (k,) [samples]; nan before the first and after the last reading."""
         place, count = (times - self.first) / self.interval, len(self.values)
         nearest = np.clip(np.round(place), 0, max(count - 1, 0)).astype(int)
-        exact = np.abs(place - nearest) * self.interval < TUNING.on_time
+        exact = np.abs(place - nearest) * self.interval < ON_TIME
         result = np.full((len(times), self.values.shape[1]), np.nan)
         if not count:
             return result
@@ -105,9 +109,9 @@ def readings(values: Array, mounting: Mounting, *, sample_time_s: float) -> tupl
     as_stated = interval <= 1.0 or arrivals is not None
     if arrivals is None:
         arrivals, interval = np.arange(len(values), dtype=float), 1.0
-    arrivals = arrivals[arrivals - delay >= -TUNING.on_time]
+    arrivals = arrivals[arrivals - delay >= -ON_TIME]
     first = float(arrivals[0] - delay) if len(arrivals) else 0.0
-    return Readings(first, interval, values[np.ceil(arrivals - TUNING.on_time).astype(int)]), as_stated
+    return Readings(first, interval, values[np.ceil(arrivals - ON_TIME).astype(int)]), as_stated
 
 
 def _arrivals(values: Array, delay: float, interval: float) -> Array | None:
@@ -116,20 +120,20 @@ def _arrivals(values: Array, delay: float, interval: float) -> Array | None:
     step = np.diff(values, axis=0)
     changes = np.flatnonzero(np.any(np.isfinite(step) & (step != 0), axis=1)) + 1
     best, most = delay % interval, -1
-    for phase in (delay % interval, *np.unique(np.mod(changes[: TUNING.phases], interval))):
+    for phase in (delay % interval, *np.unique(np.mod(changes[:PHASES], interval))):
         matched = int(_explained(changes, phase, interval).sum())
         if matched > most:
             best, most = float(phase), matched
-    if most < TUNING.held_share * len(changes):
+    if most < HELD_SHARE * len(changes):
         return None
     arrivals = best + interval * np.arange(-1, int(count / interval) + 2)
-    places = np.ceil(arrivals - TUNING.on_time)
+    places = np.ceil(arrivals - ON_TIME)
     return np.asarray(arrivals[(places >= 0) & (places < count)])
 
 
 def _explained(changes: NDArray[np.int64], phase: float, interval: float) -> NDArray[np.bool_]:
     """Which changes fall on the first sample at or after an arrival."""
-    since = np.mod(changes - phase + TUNING.on_time, interval)
+    since = np.mod(changes - phase + ON_TIME, interval)
     return np.asarray(since < 1.0)
 
 

@@ -31,10 +31,13 @@ from expdesign.estimation.replay import (
     instrument_wind,
 )
 from expdesign.progress import Progress, silent
-from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Record
 from expdesign.values import Array, seal
 from expdesign.vessel import VesselModel
+
+SINGULAR = 1e-12  # least singular value of scaled equations, as a share of the largest, that still gives an estimate
+DEGENERATE_SHARE = 1.0  # simulation errors above this share of the motion make a model degenerate
+
 
 Subset = tuple[int, ...]
 """Numbers of the chosen pieces, ascending."""
@@ -87,7 +90,7 @@ class Pieces:
             return None
         scaled = H / np.outer(left, right)
         values = np.linalg.svd(scaled, compute_uv=False)
-        if not values[-1] > TUNING.singular * values[0]:
+        if not values[-1] > SINGULAR * values[0]:
             return None
         return np.asarray(np.linalg.solve(scaled, h / left) / right)
 
@@ -255,7 +258,7 @@ def _tried(pieces: Pieces, subset: Subset) -> tuple[Array, float]:
         return np.full(outputs, np.inf), 1.0
     weights = _weights(pieces.labels, subset)
     mean, motion = weights @ errors, weights @ pieces.motion
-    return np.sqrt(mean), float((mean > TUNING.degenerate_share**2 * motion).any())
+    return np.sqrt(mean), float((mean > DEGENERATE_SHARE**2 * motion).any())
 
 
 def _weights(labels: Sequence[str], used: Subset) -> Array:

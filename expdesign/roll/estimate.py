@@ -29,6 +29,14 @@ from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, first_moment
 
+FARTHEST = 10.0  # typical sizes from zero, beyond which no parameter is sought
+AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
+MOST_ROUNDS = 12  # of instruments and noise models
+SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
+LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
+UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
+
+
 METHODS = ("iv", "ls")
 
 
@@ -62,9 +70,9 @@ class RollProblem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest parameters (9,): many times their typical size; an inertia is positive."""
-        low, high = -TUNING.farthest * self.scale, TUNING.farthest * self.scale
+        low, high = -FARTHEST * self.scale, FARTHEST * self.scale
         place = PARAMETERS.index("A_x")
-        low[place] = self.scale[place] / TUNING.farthest**2
+        low[place] = self.scale[place] / FARTHEST**2
         return np.minimum(low, self.start), np.maximum(high, self.start)
 
     @property
@@ -169,7 +177,7 @@ class RollEstimate:
     def reached(self) -> tuple[str, ...]:
         """Free parameters that stand at a bound of the search, where no interval holds."""
         low, high = self.problem.bounds
-        near = TUNING.at_bound * (high - low)
+        near = AT_BOUND * (high - low)
         at = (self.theta <= low + near) | (self.theta >= high - near)
         return tuple(name for name in self.problem.free if name not in self.held and at[PARAMETERS.index(name)])
 
@@ -187,7 +195,7 @@ class RollEstimate:
     @property
     def answering(self) -> bool:
         """Whether the rudder answers what rolls the ship, so that it is no instrument."""
-        return self.unanswered < TUNING.least_unanswered
+        return self.unanswered < LEAST_UNANSWERED
 
 
 def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
@@ -211,7 +219,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
         history.append(theta)
         settled = len(history) > 1 and _little(problem, theta - before, sensed)
-        if settled or len(history) == TUNING.most_rounds:
+        if settled or len(history) == MOST_ROUNDS:
             break
         values = [*_sampled(problem, theta)]
     covariance = _covariance(problem, weighted, theta, sensed, held, method)
@@ -258,7 +266,7 @@ def _held(problem: RollProblem) -> tuple[str, ...]:
 
     def rank(names: list[str]) -> int:
         sensitivity = relative_sensitivity(generic, problem.body, loads, names)
-        return int(np.linalg.matrix_rank(sensitivity, tol=TUNING.unseen * np.linalg.norm(sensitivity)))
+        return int(np.linalg.matrix_rank(sensitivity, tol=UNSEEN * np.linalg.norm(sensitivity)))
 
     most = rank(kept)
     for name in ("k", "z_f", "K_vd", *PARAMETERS):
@@ -319,7 +327,7 @@ def _slopes(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) ->
 
 def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
     """Whether a change of the parameters moves no weighted residual by more than a small part of its deviation."""
-    return bool(np.linalg.norm(sensed @ change[problem.places]) <= TUNING.settled * np.sqrt(len(problem.free)))
+    return bool(np.linalg.norm(sensed @ change[problem.places]) <= SETTLED * np.sqrt(len(problem.free)))
 
 
 def _covariance(

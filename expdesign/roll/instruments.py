@@ -46,9 +46,17 @@ from expdesign.roll.regression import (
     spectrum,
     without_start,
 )
-from expdesign.roll.runs import Case, Run
-from expdesign.roll.tuning import TUNING
+from expdesign.roll.runs import LEFT_OUT_SAMPLES, Case, Run
 from expdesign.values import Array
+
+BLACK_BOX = (24, 25)  # orders (past outputs, inputs) of the models from rudder to each signal
+FOLDS = 3  # parts of the record, each of which has black boxes that were fitted to the others
+LAGS = 4  # of each simulated signal among the instruments
+RUDDER_LAGS = 2  # of the rudder's difference
+NOISE_ORDER = 12  # of the autoregression in the noise model of a case
+REPEATED = 1e-10  # share of variance below which a combination of instruments repeats others
+LEADS = 8  # to which the rudder is looked at, up to a period of roll later, to see whether it answers
+
 
 BlackBox = tuple[Array, Array]
 """Numerator and denominator in powers of the delay."""
@@ -81,7 +89,7 @@ def folds(runs: Sequence[Run]) -> list[list[Fold]]:
 
 def _parts(lengths: Sequence[int]) -> list[list[tuple[int, slice]]]:
     """For each run the numbers of its folds, with their samples."""
-    count = TUNING.folds
+    count = FOLDS
     if len(lengths) >= count:
         return [[(place % count, slice(0, length))] for place, length in enumerate(lengths)]
     edges = [np.linspace(0, length, count + 1).astype(int).tolist() for length in lengths]
@@ -92,26 +100,26 @@ def _boxes(
     inputs: Sequence[Array], outputs: Sequence[Array], parts: Sequence[Sequence[tuple[int, slice]]]
 ) -> list[BlackBox]:
     """For each fold the black box that is fitted to the other folds."""
-    triangles: list[list[Array]] = [[] for _ in range(TUNING.folds)]
+    triangles: list[list[Array]] = [[] for _ in range(FOLDS)]
     for u, y, own in zip(inputs, outputs, parts, strict=True):
         table = _arx_table(u, y)
         for number, part in own:
-            inner = table[part][max(TUNING.black_box) :]  # whose past does not reach into another part
+            inner = table[part][max(BLACK_BOX) :]  # whose past does not reach into another part
             triangles[number].append(np.asarray(np.linalg.qr(inner, mode="r")))
     return [
         _solved(np.concatenate([R for other, own in enumerate(triangles) if other != number for R in own]))
-        for number in range(TUNING.folds)
+        for number in range(FOLDS)
     ]
 
 
 def _arx_table(u: Array, y: Array) -> Array:
     """(k, o + w + 1) past outputs, inputs and the output."""
-    past, width = TUNING.black_box
+    past, width = BLACK_BOX
     return np.column_stack([-delayed(y, range(1, past + 1)), delayed(u, range(width)), y])
 
 
 def _solved(table: Array) -> BlackBox:
-    past = TUNING.black_box[0]
+    past = BLACK_BOX[0]
     found = np.asarray(np.linalg.lstsq(table[:, :-1], table[:, -1], rcond=None)[0], dtype=float)
     return found[past:], inside(np.concatenate([[1.0], found[:past]]))
 
@@ -124,9 +132,9 @@ def _simulated(source: Array, boxes: Sequence[BlackBox]) -> Array:
 def instrument_columns(simulated: Array) -> Array:
     """(k, q) lags of simulated signals (k, 4): the regressors without noise, and some more."""
     roll_rate, *others = np.column_stack([simulated[:, :1], difference(simulated[:, 1:])]).T
-    lags = [TUNING.lags, TUNING.lags, TUNING.rudder_lags]
+    lags = [LAGS, LAGS, RUDDER_LAGS]
     parts = [delayed(signal, range(count)) for signal, count in zip(others, lags, strict=True)]
-    return np.column_stack([delayed(roll_rate, range(1, 1 + TUNING.lags)), *parts])
+    return np.column_stack([delayed(roll_rate, range(1, 1 + LAGS)), *parts])
 
 
 def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> Array:
@@ -137,7 +145,7 @@ def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> 
 
     Source: E. J. Hannan, in Time Series Analysis (M. Rosenblatt, ed., 1963), 17-37.
     """
-    first = TUNING.left_out_samples
+    first = LEFT_OUT_SAMPLES
     divided = [(fold.part, left.divided(noise.whitened(fold.columns)[first:])) for fold in own]
     return without_start(_stitched(divided, first), noise)
 
@@ -175,7 +183,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
     elif instruments is None:
         model, rows, left = WHITE, plain, flat_spectrum([one.residuals(values) for one in plain])
     else:
-        model = noise_model([one.residuals(values) for one in plain], values[:2], TUNING.noise_order)
+        model = noise_model([one.residuals(values) for one in plain], values[:2], NOISE_ORDER)
         rows = tuple(build_rows(run, model) for run in case.runs)
         left = spectrum([one.residuals(values) for one in rows])
     by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
@@ -193,7 +201,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
 
 def _hidden(rows: Sequence[Rows], instruments: Sequence[Sequence[Fold]], noise: NoiseModel) -> tuple[Array, ...]:
     """(n, 5) parts of the regressors of each run that instruments do not explain."""
-    first = TUNING.left_out_samples
+    first = LEFT_OUT_SAMPLES
     found = []
     for own in instruments:
         parts = [(fold.part, noise.whitened(fold.columns)[first:]) for fold in own]
@@ -208,7 +216,7 @@ def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
     there = np.diag(power) > 0
     size = np.sqrt(np.diag(power)[there])
     powers, axes = np.linalg.eigh(power[np.ix_(there, there)] / np.outer(size, size))
-    kept = powers > TUNING.repeated * powers[-1:]
+    kept = powers > REPEATED * powers[-1:]
     return tuple(Z[:, there] / size @ (axes[:, kept] / np.sqrt(powers[kept])) for Z in columns)
 
 
@@ -234,7 +242,7 @@ def chance_of_answers(
     """
     spectra = [spectrum(own) for own in residuals]
     columns = [_later(*one) for one in zip(cases, weighted, spectra, periods, strict=True)]
-    moments, moved = np.zeros(TUNING.leads), np.zeros((TUNING.leads, sensed.shape[1]))
+    moments, moved = np.zeros(LEADS), np.zeros((LEADS, sensed.shape[1]))
     for part, own, by, jacobian in zip(weighted, columns, residuals, jacobians, strict=True):
         for W, rows, noise in zip(own, part.rows, by, strict=True):
             moments += W.T @ noise
@@ -244,18 +252,18 @@ def chance_of_answers(
     if not (size > 0).all():
         return 1.0
     powers, axes = np.linalg.eigh(power / np.outer(size, size))
-    kept = powers > TUNING.repeated * powers[-1]
+    kept = powers > REPEATED * powers[-1]
     seen = axes[:, kept].T @ (moments / size) / np.sqrt(powers[kept])
     return float(scipy.stats.chi2.sf(seen @ seen, np.count_nonzero(kept)))
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:
     """(n, l) rudder changes of each run up to a period of roll later; the last one repeats past its end."""
-    first = TUNING.left_out_samples
+    first = LEFT_OUT_SAMPLES
     result = []
     for run in case.runs:
         rudder = difference(run.source)
-        ahead = np.rint(period / TUNING.leads * np.arange(1, TUNING.leads + 1)).astype(int)
+        ahead = np.rint(period / LEADS * np.arange(1, LEADS + 1)).astype(int)
         places = np.minimum(np.arange(len(rudder))[:, None] + ahead, len(rudder) - 1)
         weighed = left.divided(part.noise.whitened(rudder[places])[first:])
         result.append(without_start(weighed, part.noise))

@@ -19,11 +19,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.roll.estimate import RollEstimate, RollProblem
+from expdesign.roll.estimate import UNSEEN, RollEstimate, RollProblem
 from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
-from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import Body, Load
+
+OPEN_SIZES = 5.0  # change along an open direction that is counted with, in sizes of the parameter that it moves most
+FAINT_STD = 1.0  # relative standard deviation along a direction from which data are said not to determine it
+SMALL_SHARE = 0.01  # of a direction's largest relative change, below which a parameter is not named
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +125,7 @@ def _singular(matrix: Array) -> tuple[Array, Array]:
 
 
 def _rank(sizes: Array) -> int:
-    return int(np.sum(sizes > TUNING.unseen * sizes[0]))
+    return int(np.sum(sizes > UNSEEN * sizes[0]))
 
 
 def direction(free: Sequence[str], theta: Array, relative: Array, size: float) -> Direction:
@@ -135,14 +138,14 @@ def direction(free: Sequence[str], theta: Array, relative: Array, size: float) -
     named_ = {
         name: float(change * value)
         for name, change, value in zip(free, moved, values, strict=True)
-        if abs(change) > TUNING.small_share * 0.1
+        if abs(change) > SMALL_SHARE * 0.1
     }
     return Direction(change=named_, size=size)
 
 
 def _undetermined(estimate: RollEstimate, theta: Array, open_rows: Array) -> tuple[str, ...]:
     moves = np.abs(open_rows / np.abs(open_rows).max(axis=1, keepdims=True)) * np.abs(theta[estimate.problem.places])
-    moves *= TUNING.open_sizes
+    moves *= OPEN_SIZES
     return tuple(name for name, move in zip(estimate.std, moves.T, strict=True) if (move > estimate.std[name]).any())
 
 
@@ -155,7 +158,7 @@ def _faint(problem: RollProblem, theta: Array, sensed: Array, open_rows: Array) 
     return tuple(
         direction(problem.free, theta, row, float(size))
         for size, row in zip(sizes[:kept], rows[:kept], strict=True)
-        if size < 1.0 / TUNING.faint_std
+        if size < 1.0 / FAINT_STD
     )
 
 

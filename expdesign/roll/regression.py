@@ -11,9 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll.runs import Run
+from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
+
+LARGEST_POLE = 0.999  # of these models; larger ones are moved inside
+SPECTRAL_SEGMENTS = 4  # least number of segments in all runs of a case, where spectra of residuals are estimated
+SAMPLES_PER_SEGMENT = 1600.0  # there are as many segments as the root of all samples over this
+LEAST_DENSITY = 1e-14  # of that of its peak, in such a spectrum, below which no frequency weighs more
 
 
 def delayed(signal: Array, lags: Sequence[int]) -> Array:
@@ -56,7 +61,7 @@ def build_rows(run: Run, noise: NoiseModel) -> Rows:
     table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
     table[:2] = 0.0
     table[:, :3] = unwarped(table[:, :3], run.unwarped)
-    table = without_start(noise.whitened(table)[TUNING.left_out_samples :], noise)
+    table = without_start(noise.whitened(table)[LEFT_OUT_SAMPLES:], noise)
     return Rows(y=table[:, 0], X=table[:, 1:])
 
 
@@ -162,7 +167,7 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     density = cross_spectrum(residuals, residuals).real
     steps = _segments(residuals)
     return Spectrum(
-        density=np.maximum(density, max(TUNING.least_density * float(density.max()), 1e-100)),
+        density=np.maximum(density, max(LEAST_DENSITY * float(density.max()), 1e-100)),
         length=_transform_length(residuals),
         freedom=sum(_freedom(len(e) // (n // 2) - 1) for e, n in zip(residuals, steps, strict=True)),
     )
@@ -181,7 +186,7 @@ def cross_spectrum(first: Sequence[Array], second: Sequence[Array]) -> Array:
 def _segments(signals: Sequence[Array]) -> list[int]:
     """Samples of a segment in each run: resolution and degrees of freedom both grow with the root of the record."""
     total = sum(map(len, signals))
-    count = max(TUNING.spectral_segments, round(float(np.sqrt(total / TUNING.samples_per_segment))))
+    count = max(SPECTRAL_SEGMENTS, round(float(np.sqrt(total / SAMPLES_PER_SEGMENT))))
     return [min(len(e), total // count) for e in signals]
 
 
@@ -262,5 +267,5 @@ def inside(polynomial: Array) -> Array:
     """The polynomial in powers of the delay, with roots beyond the largest allowed circle mirrored at it."""
     roots = np.roots(polynomial)
     sizes = np.maximum(np.abs(roots), 1e-9)
-    wanted = np.minimum(np.minimum(sizes, 1.0 / sizes), TUNING.largest_pole)
+    wanted = np.minimum(np.minimum(sizes, 1.0 / sizes), LARGEST_POLE)
     return np.asarray(np.poly(roots * (wanted / sizes)).real)

@@ -21,6 +21,14 @@ from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import Load
 
+SAMPLES_PER_PERIOD = 80.0  # of roll, at least; fewer bias the bilinear map by a share of about (pi / samples)^2 / 3
+UNWARPED_PERIODS = 3.0  # frequencies, in that of roll, up to which the bilinear map is made exact; none above twice it
+MOST_UNWARPED = 0.45  # of these, in half the sample rate
+CUTOFF_SHARE = 0.4  # of the rate after thinning out, at which the low-pass filter before it leaves half
+TAPS_PER_PERIOD = 2.0  # length of that filter, in periods of its cut-off, to each side
+LEAST_SAMPLES = 100  # in a run, beside those that are left out
+LEFT_OUT_SAMPLES = 50  # at the beginning of a run, where lags reach before it
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
@@ -96,7 +104,7 @@ class LowPass:
     @property
     def least_samples(self) -> int:
         """Fewest samples of a run that can be filtered."""
-        return len(self.taps) + self.every * (TUNING.left_out_samples + TUNING.least_samples)
+        return len(self.taps) + self.every * (LEFT_OUT_SAMPLES + LEAST_SAMPLES)
 
     @property
     def samples_per_period(self) -> float:
@@ -122,14 +130,14 @@ def low_pass(cases: Sequence[Case], *, roll_hz: float, cutoff_hz: float | None =
             f"roll has about {roll_hz:.3g} Hz and the data have {1.0 / step_s:.3g} samples in a second, "
             f"expected {TUNING.least_samples_per_period:g} or more in a period; record faster"
         )
-    every = max(1, int(1.0 / (roll_hz * step_s) / TUNING.samples_per_period))
+    every = max(1, int(1.0 / (roll_hz * step_s) / SAMPLES_PER_PERIOD))
     if cutoff_hz is None and every == 1:
         return LowPass(taps=np.ones(1), every=1, roll_hz=roll_hz, passed=1.0, bandwidth_hz=0.5 / step_s, step_s=step_s)
-    wanted = TUNING.cutoff_share / (every * step_s) if cutoff_hz is None else cutoff_hz
+    wanted = CUTOFF_SHARE / (every * step_s) if cutoff_hz is None else cutoff_hz
     if not 0 < wanted < 0.5 / step_s:
         raise InputError(f"the cut-off is {wanted:g} Hz, expected less than half the sample rate, {0.5 / step_s:g} Hz")
-    every = every if cutoff_hz is None else max(1, min(every, int(TUNING.cutoff_share / (wanted * step_s))))
-    taps = scipy.signal.firwin(2 * int(TUNING.taps_per_period / (wanted * step_s)) + 1, wanted, fs=1.0 / step_s)
+    every = every if cutoff_hz is None else max(1, min(every, int(CUTOFF_SHARE / (wanted * step_s))))
+    taps = scipy.signal.firwin(2 * int(TAPS_PER_PERIOD / (wanted * step_s)) + 1, wanted, fs=1.0 / step_s)
     found = LowPass(
         taps=taps, every=every, roll_hz=roll_hz, passed=_gain(taps, roll_hz, step_s),
         bandwidth_hz=_bandwidth(taps, step_s), step_s=every * step_s,
@@ -156,7 +164,7 @@ def _prepared(run: Run, filter_: LowPass, name: str) -> Run:
         raise NotInformative(
             f"{name} has a run of {len(run.signals)} samples, expected {filter_.least_samples} or more"
         )
-    exact = min(TUNING.unwarped_periods * 2.0 / filter_.samples_per_period, TUNING.most_unwarped)
+    exact = min(UNWARPED_PERIODS * 2.0 / filter_.samples_per_period, MOST_UNWARPED)
     if len(filter_.taps) == 1:
         return replace(run, unwarped=exact)
     planned = None if run.planned is None else _passed(run.planned[:, None], filter_)[:, 0]

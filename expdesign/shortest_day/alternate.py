@@ -28,6 +28,13 @@ from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayBound, DayParts, DayTried, ShortestDay
 from expdesign.values import Array
 
+NEAREST = 3  # days to the accuracy, from which the next is sought
+# margin that is asked for besides where the cheapest runs were tried already, at most so many times
+LEVEL_STEP, LEVEL_STEPS = 0.05, 10
+PRUNED = 1  # days, the shortest first, from which runs are left out in the end
+# information, in shares of what is needed, for which the day is estimated
+CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
+
 
 def shortest_day(
     problem: PlanProblem,
@@ -178,8 +185,8 @@ class _Search:
         offer = self.offer(prices)
         left_s = day_s - prices.way_s - self.late_s(days, prices)
         level, spare = fullest_level(self.accuracy, offer, left_s), list[Choice]()
-        for step in range(TUNING.level_steps):
-            choice = cheapest_runs(self.accuracy, offer, level=level - step * TUNING.level_step)
+        for step in range(LEVEL_STEPS):
+            choice = cheapest_runs(self.accuracy, offer, level=level - step * LEVEL_STEP)
             if all(choice.repeats != earlier.repeats for earlier in tried):
                 if choice.cost_s <= left_s:
                     return choice
@@ -195,8 +202,8 @@ class _Search:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
-        for step in range(TUNING.level_steps):
-            margin = step * TUNING.level_step
+        for step in range(LEVEL_STEPS):
+            margin = step * LEVEL_STEP
             try:
                 found = self.choices(prices, days, tried, margin=margin)
             except NoAnswer:
@@ -221,7 +228,7 @@ class _Search:
             NoAnswer: none within the limits do.
         """
         offer, tangents, found = self.offer(prices), tried[-1].tangents if tried else (), list[tuple[Choice, float]]()
-        for day in sorted(days, key=lambda day: abs(day.margin))[: TUNING.nearest]:
+        for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
                 level = margin + self.accuracy.margin(day.whole) - day.margin
@@ -244,7 +251,7 @@ class _Search:
 
     def pruned(self, days: Sequence[DraftedDay]) -> list[DraftedDay]:
         """The shortest days that reach the accuracy, less runs that it does not need; none of which all are needed."""
-        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[: TUNING.pruned]
+        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[:PRUNED]
         return [other for day in reached if (other := self.drafting.without_spare_runs(day)) is not day]
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
@@ -341,7 +348,7 @@ class _Search:
 
         def costs_s(day: DraftedDay) -> Iterator[Array]:
             level = self.accuracy.margin(offer.information(np.array(day.repeats, dtype=float))) - day.margin
-            levels = (level + np.log(TUNING.curve_shares)).tolist()
+            levels = (level + np.log(CURVE_SHARES)).tolist()
             return in_order(shares_costs_s, (self.accuracy, offer), ((levels,),))
 
         begun = {day.repeats: costs_s(day) for day in best[:1]}
@@ -349,7 +356,7 @@ class _Search:
         def curve(repeats: Sequence[int]) -> Array:
             day = next(day for day in days if day.repeats == tuple(repeats))
             beside_s = day.day_s - offer.total_s(np.array(day.repeats, dtype=float))
-            points = np.column_stack([beside_s + next(begun.get(day.repeats) or costs_s(day)), TUNING.curve_shares])
+            points = np.column_stack([beside_s + next(begun.get(day.repeats) or costs_s(day)), CURVE_SHARES])
             return np.asarray(points[np.isfinite(points[:, 0])])
 
         return curve

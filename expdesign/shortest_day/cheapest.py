@@ -37,9 +37,17 @@ from scipy.optimize import linprog
 
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.prices import Offer
+from expdesign.shortest_day.prices import MOST_RUNS, Offer
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
+
+LEAST_LEVEL, LEVEL_HALVINGS = -4.0, 12  # least margin of a day of a given length, and steps in search of the largest
+CUTS = 200  # most linear bounds on the accuracy in the choice of runs, not whole
+TANGENTS = 60  # most of them carried over to a like choice
+HALVINGS = 12  # of the way to inner runs, in search of the boundary
+REACHED = 1e-9  # shortfall of the accuracy's margin that counts as reached
+EXCHANGED = 24  # most manoeuvres of which runs are left out, and put in, in the search for whole runs
+
 
 # Whole runs that reach an accuracy at little cost, from those of the continuous problem.
 
@@ -53,7 +61,7 @@ def exchanged(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Ar
 
 def _cheaper(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Iterator[Array]:
     """(q,) runs one exchange away that reach the level and are cheaper, the cheapest first."""
-    least = level - TUNING.reached
+    least = level - REACHED
     M = offer.information(runs)
     slope = offer.matrices.reshape(len(offer.matrices), -1) @ accuracy.supergradient(M).ravel()
     out, put = _exchanges(offer, runs, slope)
@@ -78,8 +86,8 @@ def _exchanges(offer: Offer, runs: Array, slope: Array) -> tuple[Array, Array]:
     Of many manoeuvres only those are left out that tell least in their time, and those put in that tell most.
     """
     order = np.argsort(slope / offer.cost_s, kind="stable")
-    spare = order[runs[order] > offer.fewest[order]][: TUNING.exchanged]
-    free = order[runs[order] < offer.most[order]][::-1][: TUNING.exchanged]
+    spare = order[runs[order] > offer.fewest[order]][:EXCHANGED]
+    free = order[runs[order] < offer.most[order]][::-1][:EXCHANGED]
     out, put = _multisets(spare, (1, 2, 3), len(runs)), _multisets(free, (0, 1, 2), len(runs))
     return out[(runs - out >= offer.fewest).all(axis=1)], put[(runs + put <= offer.most).all(axis=1)]
 
@@ -186,9 +194,9 @@ def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
 
     Levels are searched from `Tuning.least_level` to that of the most runs; the least where even it costs more.
     """
-    low, high = TUNING.least_level, accuracy.margin(offer.information(offer.most))
+    low, high = LEAST_LEVEL, accuracy.margin(offer.information(offer.most))
     tangents: tuple[Tangent, ...] = ()
-    for _ in range(TUNING.level_halvings):
+    for _ in range(LEVEL_HALVINGS):
         middle = (low + high) / 2
         try:
             found = cheapest_shares(accuracy, offer, level=middle, tangents=tangents)
@@ -214,7 +222,7 @@ def shares_costs_s(accuracy: Accuracy, offer: Offer, levels: Sequence[float]) ->
 
 def _refuse(accuracy: Accuracy, information: Array) -> None:
     name, margin = accuracy.scarcest(information), accuracy.margin(information)
-    most = f"with {TUNING.most_runs} runs of every manoeuvre, or as many as the limits on durations allow"
+    most = f"with {MOST_RUNS} runs of every manoeuvre, or as many as the limits on durations allow"
     if not name:
         raise NoAnswer(
             f"design.accuracy cannot be reached: {most}, there is {np.exp(margin):.3g} times the information needed; "
@@ -238,7 +246,7 @@ class _Cuts:
         """
         self.accuracy, self.offer, self.level = accuracy, offer, level
         most = offer.information(offer.most)
-        if accuracy.margin(most) < level - TUNING.reached:
+        if accuracy.margin(most) < level - REACHED:
             _refuse(accuracy, most)
         count = len(offer.cost_s)
         self.cost_s = np.r_[offer.cost_s, -1.0]
@@ -284,7 +292,7 @@ class _Cuts:
         def excess(part: int) -> float:
             return self.accuracy.margin(self.offer.information(runs + part / most * (inner - runs))) - level
 
-        most = 2**TUNING.halvings
+        most = 2**HALVINGS
         low, high, below = 0, most, excess(0)
         if below >= 0:
             return runs
@@ -313,7 +321,7 @@ def _relaxed(cuts: _Cuts) -> Relaxed:
     """The continuous problem, which leaves its tangents among the cuts."""
     offer, (low, high) = cuts.offer, cuts.bounds
     best = Relaxed(runs=offer.most, bound_s=-np.inf, worth=np.zeros_like(offer.known), worth_of_saved=0.0)
-    for _ in range(TUNING.cuts):
+    for _ in range(CUTS):
         A, b = cuts.rows
         found = linprog(cuts.cost_s, A_ub=-A, b_ub=-b, bounds=np.column_stack([low, high]), method="highs")
         if found.x is None:
@@ -325,7 +333,7 @@ def _relaxed(cuts: _Cuts) -> Relaxed:
             bound_s=bound_s,
             worth=cuts.worth(multipliers),
             worth_of_saved=min(float(multipliers[0]), 1.0),
-            tangents=tuple(cuts.tangents[-TUNING.tangents :]),
+            tangents=tuple(cuts.tangents[-TANGENTS:]),
         )
         if cuts.accuracy.margin(offer.information(runs)) >= cuts.level - TUNING.choice_gap / 10:
             break

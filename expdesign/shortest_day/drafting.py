@@ -24,6 +24,9 @@ from expdesign.shortest_day.prices import DraftedDay, fewest_runs, lost_s, with_
 from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array
 
+LEFT_OUT = 4  # runs that are tried to be left out of a day, one at a time, before none is
+FORESEEN = 0.1  # shortfall of the margin that is expected of a day without a run, up to which it is tried
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drafting:
@@ -116,5 +119,5 @@ def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]
     margins = np.array([accuracy.margin(day.whole - told[place]) + spare for place in runs])
     placed = list(draft.sailed.placements)
     worth = saved_s / np.maximum(day.margin - margins, TUNING.choice_gap)
-    order = [row for row in np.argsort(-worth).tolist() if margins[row] > -TUNING.foreseen and saved_s[row] > 0]
-    return [placed[:row] + placed[row + 1 :] for row in order[: TUNING.left_out]]
+    order = [row for row in np.argsort(-worth).tolist() if margins[row] > -FORESEEN and saved_s[row] > 0]
+    return [placed[:row] + placed[row + 1 :] for row in order[:LEFT_OUT]]

@@ -19,9 +19,18 @@ from expdesign.information.many import bordered_runs
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft
-from expdesign.shortest_day.tuning import TUNING
 from expdesign.signals import Trajectory
 from expdesign.values import Array, seal
+
+FIRST_SHARE = 0.4  # information from runs in the first day, as a share of what is needed; legs tell the rest
+COURSES = 4  # on which runs are taken to be sailed
+COURSE_SPREAD_RAD = 0.5  # of these to both sides of the straight line, before a day has been planned
+FIRST_LEG_S = 15.0  # time of repositioning for each run, before a day has been planned [s]
+OTHER_RUNS = 1  # of each manoeuvre that it has more or fewer, at most
+AVERAGE_LEGS = 2.0  # legs to one manoeuvre that the average of all legs counts as, once days have been planned
+LEAST_LEG_S = 5.0  # least of it once days have been planned [s]
+MOST_RUNS = 200  # of one primitive
+
 
 # What runs tell that make way good from start to goal: their headings follow from the way.
 
@@ -54,14 +63,14 @@ def straight_courses(problem: PlanProblem) -> Array:
     away = problem.goal[:2] - problem.start[:2]
     longest_m = max(float(np.hypot(*item.displacement[:2])) for item in problem.primitives)
     if np.hypot(*away) <= longest_m:
-        return np.asarray(2 * np.pi * np.arange(TUNING.courses) / TUNING.courses)
-    spread = np.linspace(-1.0, 1.0, TUNING.courses)
-    return np.asarray(np.arctan2(away[1], away[0]) + TUNING.course_spread_rad * spread)
+        return np.asarray(2 * np.pi * np.arange(COURSES) / COURSES)
+    spread = np.linspace(-1.0, 1.0, COURSES)
+    return np.asarray(np.arctan2(away[1], away[0]) + COURSE_SPREAD_RAD * spread)
 
 
 def courses_of(track: Trajectory) -> Array:
     """(c,) of equally long parts of a track [rad]."""
-    places = track.pose[np.linspace(0, len(track) - 1, TUNING.courses + 1).round().astype(int), :2]
+    places = track.pose[np.linspace(0, len(track) - 1, COURSES + 1).round().astype(int), :2]
     away = np.diff(places, axis=0)
     return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
 
@@ -172,13 +181,13 @@ def first_prices(problem: PlanProblem) -> Prices:
     transit_mps = ship_on_legs(problem).transit_speed_mps
     runs = runs_along(problem, straight_courses(problem))
     return Prices(
-        cost_s=problem.design.problem.run_s + TUNING.first_leg_s,
+        cost_s=problem.design.problem.run_s + FIRST_LEG_S,
         saved_s=_made_good_s(problem.primitives, transit_mps),
         way_s=float(np.hypot(*(problem.goal - problem.start)[:2])) / transit_mps,
         runs=runs,
         leg=np.zeros_like(runs[0]),
         goal=np.zeros_like(runs[0]),
-        level=float(np.log(TUNING.first_share)),
+        level=float(np.log(FIRST_SHARE)),
     )
 
 
@@ -196,7 +205,7 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
     barred = set(limits.excluded) - set(free)
     most_s = np.array([0.0 if name in barred else limits.most_s.get(name, np.inf) for name in names])
     fewest = fewest_runs(problem)
-    most = np.minimum(np.floor(most_s / run_s), TUNING.most_runs)
+    most = np.minimum(np.floor(most_s / run_s), MOST_RUNS)
     return Offer(
         matrices=prices.runs + prices.leg,
         cost_s=prices.cost_s,
@@ -231,8 +240,8 @@ def near_day(offer: Offer, runs: Array, day: DraftedDay, names: Sequence[str]) -
         offer,
         matrices=matrices,
         known=day.whole - told,
-        fewest=np.clip(had - TUNING.other_runs, offer.fewest, offer.most),
-        most=np.clip(had + TUNING.other_runs, offer.fewest, offer.most),
+        fewest=np.clip(had - OTHER_RUNS, offer.fewest, offer.most),
+        most=np.clip(had + OTHER_RUNS, offer.fewest, offer.most),
     )
 
 
@@ -297,8 +306,8 @@ def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) ->
             beyond_s.append(float(beyond[first : place + 1].sum()) - own_s)
     average_s, count = np.mean(beyond_s), np.bincount(into, minlength=len(names))
     sums_s = np.bincount(into, weights=beyond_s, minlength=len(names))
-    learnt_s: Array = (TUNING.average_legs * average_s + sums_s) / (TUNING.average_legs + count)
-    return np.asarray(np.maximum(learnt_s, TUNING.least_leg_s))
+    learnt_s: Array = (AVERAGE_LEGS * average_s + sums_s) / (AVERAGE_LEGS + count)
+    return np.asarray(np.maximum(learnt_s, LEAST_LEG_S))
 
 
 def lost_s(draft: Draft) -> Array:

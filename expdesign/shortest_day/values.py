@@ -9,8 +9,9 @@ import numpy as np
 
 from expdesign.durations import DurationDesign
 from expdesign.plan.values import Plan
-from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array, seal
+
+DRAFT_POOL, DRAFT_SEARCHES = 8, 1  # candidates of every family, and searches, of a draft, at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +147,7 @@ class ShortestDay:
         if not self.plan.draft:
             return ""
         return (
-            f"as a draft, it is the first day tried, and manoeuvres to add were searched for {TUNING.draft_searches} "
-            f"time at most, from {TUNING.draft_pool} candidates of every family, and no transitions between runs were "
+            f"as a draft, it is the first day tried, and manoeuvres to add were searched for {DRAFT_SEARCHES} "
+            f"time at most, from {DRAFT_POOL} candidates of every family, and no transitions between runs were "
             "tried; the whole job searches more, and finds a day that is shorter or tells more"
         )

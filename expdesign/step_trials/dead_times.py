@@ -11,8 +11,12 @@ import numpy as np
 from expdesign.progress import Progress, silent, within
 from expdesign.step_trials.holds import Hold, Sailed
 from expdesign.step_trials.responses import Transient, shared_delay
-from expdesign.step_trials.samples import Delays, StepSample, step_samples, without_outliers
+from expdesign.step_trials.samples import LEAST_GROUP, Delays, StepSample, step_samples, without_outliers
 from expdesign.step_trials.tuning import TUNING
+
+# beginning of a response to the rudder, from which its dead time is found, in time constants, and the least of it
+ENTRY_CONSTANTS, LEAST_ENTRY_SAMPLES = 2.0, 10
+
 
 SPEED_DEGREE = 3
 """Degree of the polynomial in time that the speed follows during a response."""
@@ -52,7 +56,7 @@ def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
 def _rudder_delay(batches: Sequence[Sailed], samples: Sequence[StepSample]) -> tuple[float, float]:
     """Dead time of the rudder from responses of one shape, where there are enough of them."""
     own = [one for one in samples if one.counts and one.hold.channel == 1]
-    if len(own) < TUNING.least_group:
+    if len(own) < LEAST_GROUP:
         return _delay(samples, 1)
     return shared_delay([turn_entry(batches[one.hold.batch], one) for one in own], most_s=TUNING.most_delay_s)
 
@@ -69,8 +73,8 @@ def turn_entry(batch: Sailed, step: StepSample) -> Transient:
     assert before is not None
     assert after is not None
     assert step.first_order is not None
-    until = max(TUNING.least_entry_samples, int(np.searchsorted(
-        data.time_s, TUNING.entry_constants * step.first_order.time_constant_s
+    until = max(LEAST_ENTRY_SAMPLES, int(np.searchsorted(
+        data.time_s, ENTRY_CONSTANTS * step.first_order.time_constant_s
     )))  # fmt: skip
     speed = batch.state[step.hold.begin : step.hold.begin + len(data.time_s), 0]
     speed = np.polynomial.Polynomial.fit(data.time_s, speed, SPEED_DEGREE)(data.time_s)

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.step_trials.surfaces import Surface, ValidityRegion
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
+
+LEAST_INERTIA_SHARE = 0.5  # of the smallest measured inertia, below which a surface is cut off
+SUBSTEP_SHARE = 0.2  # of the shortest time constant, one step of the simulated model
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +50,7 @@ class TwoDofModel:
 
     def _mass(self, channel: int, u: float, r: float) -> float:
         surface = self.inertia[channel]
-        return min(max(surface.at(u, r), TUNING.least_inertia_share * surface.least), surface.most)
+        return min(max(surface.at(u, r), LEAST_INERTIA_SHARE * surface.least), surface.most)
 
     @property
     def quickest_s(self) -> float:
@@ -69,7 +71,7 @@ class TwoDofModel:
             ],
             axis=1,
         )
-        parts = max(1, int(np.ceil(sample_time_s / max(TUNING.substep_share * self.quickest_s, 1e-3))))
+        parts = max(1, int(np.ceil(sample_time_s / max(SUBSTEP_SHARE * self.quickest_s, 1e-3))))
         states = np.empty((len(commands), 2))
         states[0] = state = np.asarray(start, float)
         for k, given in enumerate(acting[:-1]):

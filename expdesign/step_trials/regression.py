@@ -16,8 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
+
+# of ridge and lasso that cross-validation compares, on columns of unit size
+PENALTIES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+FOLDS = 10  # of cross-validation where there is no closed form
+
 
 SMALLEST = 1e-11
 """Eigenvalue of the normal equations, relative to the largest, below which smaller ones are raised."""
@@ -71,7 +75,7 @@ def best_fit(samples: Sampled) -> Fit:
     return min((ridge(samples), lasso(samples)), key=lambda fit: fit.held_out)
 
 
-def ridge(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> Fit:
+def ridge(samples: Sampled, penalties: tuple[float, ...] = PENALTIES) -> Fit:
     """Ridge regression with the penalty of the least leave-one-out error, in closed form."""
     errors = [_left_out_error(samples, penalty) for penalty in penalties]
     best = int(np.argmin(errors))
@@ -79,9 +83,9 @@ def ridge(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> 
     return Fit(method="ridge", penalty=penalties[best], coefficients=solution, held_out=errors[best])
 
 
-def lasso(samples: Sampled, penalties: tuple[float, ...] = TUNING.penalties) -> Fit:
+def lasso(samples: Sampled, penalties: tuple[float, ...] = PENALTIES) -> Fit:
     """Lasso with the penalty of the least error in folds; zeros are exact."""
-    folds = np.arange(float(len(samples.values))) % min(TUNING.folds, len(samples.values))
+    folds = np.arange(float(len(samples.values))) % min(FOLDS, len(samples.values))
     largest = _largest_penalty(samples)
     errors = [_fold_error(samples, folds, penalty * largest) for penalty in penalties]
     best = int(np.argmin(errors))

@@ -27,6 +27,12 @@ from expdesign.step_trials.responses import (
 from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
 
+VISIBLE_DEVIATIONS = 5.0  # change of a steady value, in its standard errors, below which a step is too small
+MISFIT = 0.2  # distance of plateau and end of transient, as a share of the step, from which they disagree
+OUTLIER = 3.5  # modified z-score from which a value is an outlier (B. Iglewicz and D. Hoaglin, 1993)
+LEAST_GROUP = 5  # samples of one command level among which outliers are sought
+PREFERRED = 10.0  # decrease of Akaike's criterion from which a second order response is preferred
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plateau:
@@ -211,7 +217,7 @@ def _with_response(own: StepSample, batch: Sailed, hold: Hold, steady: int, dela
         return replace(own, problems=("the steady part, or that before, is too short for a mean",))
     size = own.plateau.state[channel] - own.before.state[channel]
     error = math.hypot(own.plateau.std[channel], own.before.std[channel])
-    if not abs(size) > TUNING.visible_deviations * error:
+    if not abs(size) > VISIBLE_DEVIATIONS * error:
         return replace(own, problems=(f"the {name} changed by {abs(size) / error:.1f} standard errors only",))
     data = Transient(
         time_s=batch.time_s[: steady + 1 - hold.begin],
@@ -253,7 +259,7 @@ def _fitted(own: StepSample, batch: Sailed, hold: Hold, data: Transient, delay_s
 def _preferred(data: Transient, first: Response, delay_s: tuple[float, float]) -> Response:
     """First order, or the second order of sway and yaw together where the data clearly want it."""
     second = fit_second_order(data, first, delay_s=delay_s)
-    return second if preference(first, second) > TUNING.preferred and second.time_constant_s > 0 else first
+    return second if preference(first, second) > PREFERRED and second.time_constant_s > 0 else first
 
 
 def _problems(own: StepSample, hold: Hold, data: Transient, response: Response) -> list[str]:
@@ -261,7 +267,7 @@ def _problems(own: StepSample, hold: Hold, data: Transient, response: Response) 
     tail = data.values[-max(3, len(data.values) // 10) :]
     noise = standard_error(tail) if len(tail) > 3 else response.rms
     apart = abs(float(tail.mean()) - data.after)
-    if apart > TUNING.misfit * abs(data.size) and apart > 3 * math.hypot(noise, data.after_std):
+    if apart > MISFIT * abs(data.size) and apart > 3 * math.hypot(noise, data.after_std):
         found.append("the plateau does not continue the transient (a current, or no whole turn)")
     if response.time_constant_s > float(data.time_s[-1]):
         found.append("the response is slower than the hold is long")
@@ -301,7 +307,7 @@ def without_outliers(samples: Sequence[StepSample]) -> tuple[StepSample, ...]:
         for channel in range(len(CHANNELS))
         for group in _groups(samples, channel)
         for place, score in zip(group, modified_scores(_logs(samples, group)).tolist(), strict=True)
-        if abs(score) > TUNING.outlier
+        if abs(score) > OUTLIER
     }
     return tuple(
         replace(one, problems=(*one.problems, "its inertia is an outlier among the steps at the same level"))
@@ -323,4 +329,4 @@ def _groups(samples: Sequence[StepSample], channel: int) -> list[list[int]]:
             level = one.hold.commands[1 - channel]
             near = next((key for key in levels if abs(key - level) <= 0.05 * max(abs(key), abs(level), 1e-9)), level)
             levels.setdefault(near, []).append(place)
-    return [group for group in levels.values() if len(group) >= TUNING.least_group]
+    return [group for group in levels.values() if len(group) >= LEAST_GROUP]

@@ -29,6 +29,15 @@ from expdesign.step_trials.responses import Transient, fit_first_order
 from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 
+STEADY_SHARE = 1 / 3  # end of a hold that is taken as steady before any test is calibrated
+LOWER_QUANTILE, UPPER_QUANTILE = 0.9, 0.999  # of the ratio in steady data, for its thresholds
+UPPER_FACTOR = 2.0  # least ratio of the thresholds
+QUICKER = 3.0  # filters of both variances forget so many times as fast
+DWELL_MEMORIES = 1.0  # time below the lower threshold after which the vessel is steady, in filter memories
+SURROGATES = 40  # of the steady data, to find these quantiles
+LONGEST_INTERVAL_SHARE = 0.2  # of the filter's memory, between samples of the ratio test
+
+
 WAITING, TRANSIENT, STEADY = "waiting", "transient", "steady"
 """States of a signal: before its response is seen, while it lasts, and after it."""
 
@@ -60,7 +69,7 @@ class RatioTest:
     @property
     def variance_rate(self) -> float:
         """l2 = l3, per averaged sample."""
-        return min(0.5, TUNING.quicker * self.rate)
+        return min(0.5, QUICKER * self.rate)
 
     @property
     def memory_s(self) -> float:
@@ -130,7 +139,7 @@ def _judged(state: Watched, test: RatioTest) -> Watched:
     below_s = state.below_s + test.interval_s if ratio <= test.lower else 0.0
     if state.mode == STEADY:
         return replace(state, below_s=below_s, mode=TRANSIENT if ratio >= test.upper else STEADY)
-    steady = below_s >= TUNING.dwell_memories * test.memory_s
+    steady = below_s >= DWELL_MEMORIES * test.memory_s
     return replace(state, below_s=below_s, mode=STEADY if steady else TRANSIENT)
 
 
@@ -162,7 +171,7 @@ def calibrated(
     Raises:
         NotInformative: the stretches are too short for the memory.
     """
-    longest = max(1, int(TUNING.longest_interval_share * memory_s / sample_time_s))
+    longest = max(1, int(LONGEST_INTERVAL_SHARE * memory_s / sample_time_s))
     flat = [_without_trend(part) for part in steady if len(part) > 4]
     averaged = min(longest, max(1, round(_correlation_samples(flat))))
     parts = [part for part in (_means(part, averaged) for part in flat) if len(part) > 4]
@@ -176,8 +185,8 @@ def calibrated(
     blank = RatioTest(
         sample_time_s=sample_time_s, averaged=averaged, rate=rate, lower=math.inf, upper=math.inf, noise=noise
     )
-    low, high = np.quantile(_steady_ratios(parts, blank, rng), [TUNING.lower_quantile, TUNING.upper_quantile]).tolist()
-    return replace(blank, lower=low, upper=max(high, TUNING.upper_factor * low))
+    low, high = np.quantile(_steady_ratios(parts, blank, rng), [LOWER_QUANTILE, UPPER_QUANTILE]).tolist()
+    return replace(blank, lower=low, upper=max(high, UPPER_FACTOR * low))
 
 
 def _steady_ratios(parts: Sequence[Array], blank: RatioTest, rng: np.random.Generator) -> Array:
@@ -185,7 +194,7 @@ def _steady_ratios(parts: Sequence[Array], blank: RatioTest, rng: np.random.Gene
     joined = np.concatenate(parts)
     alike = replace(blank, averaged=1)
     settled = min(len(joined) // 2, math.ceil(3.0 / blank.rate))
-    return np.concatenate([ratios(_surrogate(joined, rng), alike)[settled:] for _ in range(TUNING.surrogates)])
+    return np.concatenate([ratios(_surrogate(joined, rng), alike)[settled:] for _ in range(SURROGATES)])
 
 
 def _surrogate(values: Array, rng: np.random.Generator) -> Array:
@@ -252,7 +261,7 @@ def _calibrated(batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, 
 
 
 def _end(batch: Sailed, hold: Hold, channel: int) -> Array:
-    first = hold.end - max(4, int(TUNING.steady_share * (hold.end - hold.settled)))
+    first = hold.end - max(4, int(STEADY_SHARE * (hold.end - hold.settled)))
     return np.asarray(batch.state[first : hold.end, channel])
 
 

@@ -24,10 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from expdesign.monitoring.evidence import STRETCH_S
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.monitoring import (
-    TUNING,
     Alarm,
     Calibration,
     Change,
@@ -112,7 +113,7 @@ def gone_on(
     def linearised() -> Grams:
         effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
         changed = ship.with_effects(effects)
-        return grams_of(changed, record, changes, begins_s=[begin_s], stretch_s=TUNING.stretch_s)
+        return grams_of(changed, record, changes, begins_s=[begin_s], stretch_s=STRETCH_S)
 
     grams = linearised()
     while first < len(grams):
@@ -147,7 +148,7 @@ def ports(trials: int) -> None:
     """Alarms after a port call that brought another load, and after thrust is lost an hour later."""
     vessel = tender()
     changes, calibration = calibrated(vessel)
-    rules = Rules(limit=threshold(int(calibration.watched.sum()), 30.0 * DAY / TUNING.stretch_s), port_s=6.0 * HOUR)
+    rules = Rules(limit=threshold(int(calibration.watched.sum()), 30.0 * DAY / STRETCH_S), port_s=6.0 * HOUR)
     print("| load | trials | alarms | without port calls | thrust - 5 % found | named first |")
     print("|---|---|---|---|---|---|")
     for name, with_load in LOADS:
@@ -190,7 +191,7 @@ def weathers(trials: int) -> None:
     """Voyages with a false alarm, and time that is not judged, at one false alarm in 30 days."""
     vessel = tender()
     changes, calibration = calibrated(vessel)
-    limit = threshold(int(calibration.watched.sum()), 30.0 * DAY / TUNING.stretch_s)
+    limit = threshold(int(calibration.watched.sum()), 30.0 * DAY / STRETCH_S)
     print("| weather | voyages of 6 h | with a false alarm | not judged |")
     print("|---|---|---|---|")
     for name, weather in WEATHERS:
@@ -209,7 +210,7 @@ def calibrated(vessel: Vessel) -> tuple[tuple[Change, ...], Calibration]:
     ship = extended_model(vessel, references[0])
     changes = watched_changes(ship)
     parts = [
-        grams_of(ship, reference, changes, begins_s=[3.0 * HOUR * number], stretch_s=TUNING.stretch_s)
+        grams_of(ship, reference, changes, begins_s=[3.0 * HOUR * number], stretch_s=STRETCH_S)
         for number, reference in enumerate(references)
     ]
     return changes, calibrate(joined(parts), load=np.array([change.load for change in changes]))
@@ -221,7 +222,7 @@ def study(trials: int, days: float) -> None:
     changes, calibration = calibrated(vessel)
     number = int(calibration.watched.sum())
     voyages = max(1, round(days * 2))
-    limits = {between: threshold(number, between * DAY / TUNING.stretch_s) for between in (0.25, 1.0, 30.0)}
+    limits = {between: threshold(number, between * DAY / STRETCH_S) for between in (0.25, 1.0, 30.0)}
     false = dict.fromkeys(limits, 0)
     for seed in range(voyages):
         record = voyage_record(vessel, 12 * HOUR, seed=1000 + seed)

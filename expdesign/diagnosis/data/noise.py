@@ -9,8 +9,15 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.values import Array
+
+AR_ORDERS = (1, 2, 3, 4, 6, 8, 12)  # of the autoregressions that are tried
+SAMPLES_PER_ORDER = 6  # of a window, for each order of its autoregression, at least
+LAGS = (1, 2)  # of differences of white noise that are tried [samples]; one for those of means whose samples meet
+# of the remainder's variance that is always taken as white. No model is right at every frequency, and smoothed data
+# would otherwise give the fastest motions, of which they show nothing, the most weight
+WHITE_SHARE = 0.05
+
 
 NO_DIFFERENCE = 0.0, 1
 
@@ -117,10 +124,10 @@ def fit_ar_noise(remainder: Array, *, order: int | None = None, shares: Sequence
         order: None to choose it by Schwarz's criterion; zero for white noise.
         shares: of the differences of white noise that yaw rates may have, chosen by the same criterion.
     """
-    longest = remainder.shape[1] // TUNING.samples_per_order
-    orders = [p for p in TUNING.ar_orders if p <= max(1, longest)] if order is None else [order]
+    longest = remainder.shape[1] // SAMPLES_PER_ORDER
+    orders = [p for p in AR_ORDERS if p <= max(1, longest)] if order is None else [order]
     most = max(orders)
-    turning = (NO_DIFFERENCE, *((share, lag) for share in shares for lag in TUNING.lags if most))
+    turning = (NO_DIFFERENCE, *((share, lag) for share in shares for lag in LAGS if most))
     kinds = ((NO_DIFFERENCE,), (NO_DIFFERENCE,), turning, turning)
     tried = [_in_sums(remainder[..., channel], most, kind) for channel, kind in enumerate(kinds)]
     best: tuple[float, Noise] | None = None
@@ -175,7 +182,7 @@ def _without_beginnings(sums: Array, share: float, lag: int) -> Array:
 def _autoregression(rows: Array, order: int) -> tuple[Array, float]:
     """(p,) coefficients and the variance of the rest, with the white share of the variance in `rows`."""
     target, past = rows[:, 0], rows[:, 1 : order + 1]
-    floor = TUNING.white_share * float(np.mean(target**2))
+    floor = WHITE_SHARE * float(np.mean(target**2))
     moments = past.T @ past + floor * len(rows) * np.eye(order)
     taps = np.asarray(np.linalg.lstsq(moments, past.T @ target, rcond=None)[0]) if order else np.zeros(0)
     return taps, float(np.mean((target - past @ taps) ** 2)) + floor * (1.0 + float(taps @ taps))

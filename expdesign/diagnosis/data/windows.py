@@ -25,12 +25,17 @@ from expdesign.diagnosis.data.sampled_batch import (
     has_heading,
     has_position,
 )
-from expdesign.diagnosis.data.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.estimation.regression import inputs_of
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
+
+COARSEST_STEP_S = 1.0  # integrator step, at most [s]; faster data are averaged over it
+STEP_SHARE = 0.4  # integrator step as a share of the ship's shortest time constant, at most
+LONGEST_WINDOW = 700  # compared samples, at most
+FEWEST_IN_WINDOW = 4  # compared samples, at least
+SAME_TIME = 1e-6  # relative difference up to which sample times count as equal
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,7 +176,7 @@ class Windows:
                 parts[name].append(values[name] if name in values else getattr(self, name)[:, index])
         joined: dict[str, Any] = {name: np.concatenate(items) for name, items in parts.items()}
         whole = replace(self, **joined)
-        return whole.selected(np.isfinite(whole.measured[..., :3]).any(axis=2).sum(axis=1) >= TUNING.fewest_in_window)
+        return whole.selected(np.isfinite(whole.measured[..., :3]).any(axis=2).sum(axis=1) >= FEWEST_IN_WINDOW)
 
 
 BATCH = ", batch "
@@ -199,7 +204,7 @@ def fastest_rate(model: VesselModel, record: Record) -> float:
 
 def _slowly(batch: Batch) -> Array:
     """(k, 3) velocities averaged over the samples of an integrator step, if there are several."""
-    count = int(TUNING.coarsest_step_s / batch.sample_time_s + 1e-9)
+    count = int(COARSEST_STEP_S / batch.sample_time_s + 1e-9)
     whole = len(batch) // max(count, 1) * count
     if count <= 1 or not whole:
         return batch.velocity
@@ -222,11 +227,11 @@ def cut_windows(
     """
     sample_s = _sample_time(record)
     if step_s is None:
-        step_s = min(TUNING.coarsest_step_s, TUNING.step_share / fastest_rate(model, record))
+        step_s = min(COARSEST_STEP_S, STEP_SHARE / fastest_rate(model, record))
     merged = max(1, int(step_s / sample_s + 1e-9))
     between = max(1, int(np.ceil(merged * sample_s / step_s - 1e-9)))
     parts = [SampledBatch(model, batch, merged, between) for batch in record.batches]
-    limit = TUNING.longest_window if longest_s is None else max(12, round(longest_s / (merged * sample_s)))
+    limit = LONGEST_WINDOW if longest_s is None else max(12, round(longest_s / (merged * sample_s)))
     pieces = [(b, low, high) for b, part in enumerate(parts) for low, high in _cut(part.samples, limit)]
     size = max(high - low for _, low, high in pieces)
     derived = derived_outputs(record)
@@ -262,7 +267,7 @@ def cut_windows(
 
 def _sample_time(record: Record) -> float:
     times = sorted({batch.sample_time_s for batch in record.batches})
-    if times[-1] > (1 + TUNING.same_time) * times[0]:
+    if times[-1] > (1 + SAME_TIME) * times[0]:
         found = ", ".join(f"{time:g} s" for time in times)
         raise InputError(f"the batches have different sample times, found {found}; a diagnosis takes one for all")
     return record.batches[0].sample_time_s
@@ -271,7 +276,7 @@ def _sample_time(record: Record) -> float:
 def _cut(samples: int, limit: int) -> list[tuple[int, int]]:
     count = -(-samples // limit)
     edges = np.linspace(0, samples, count + 1).round().astype(int).tolist()
-    return [(low, high) for low, high in itertools.pairwise(edges) if high - low >= TUNING.fewest_in_window]
+    return [(low, high) for low, high in itertools.pairwise(edges) if high - low >= FEWEST_IN_WINDOW]
 
 
 def _filled(values: Array, size: int) -> Array:

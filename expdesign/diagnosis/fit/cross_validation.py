@@ -32,7 +32,7 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import HeldOut
-from expdesign.diagnosis.fit.output_error import fit_output_error
+from expdesign.diagnosis.fit.output_error import FOLD_STEPS, fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import LinearisedMotion, simulate_from_measured
@@ -40,6 +40,8 @@ from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
+
+PARTS = 5  # of every run, in the cross-validation of short stretches
 
 
 def validation_units(windows: Windows) -> Array:
@@ -194,7 +196,7 @@ class _Folds:
 def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
     windows = given.windows
     names, parts = np.unique(given.unit), np.unique(given.part)
-    most = TUNING.parts if given.in_stretches else TUNING.folds
+    most = PARTS if given.in_stretches else TUNING.folds
     folds = [names[index::most] for index in range(min(most, len(names)))]
     columns = [OUTPUTS.index(name) for name in given.ship.model.outputs]
     error = np.zeros((len(parts), len(columns)))
@@ -260,7 +262,7 @@ def _parts_of_runs(short: Windows) -> Array:
     for batch in np.unique(short.batch):
         mine = np.flatnonzero(short.batch == batch)
         place = np.argsort(np.argsort(short.first[mine]))
-        part[mine] = (place * TUNING.parts // len(mine) + batch) % TUNING.parts
+        part[mine] = (place * PARTS // len(mine) + batch) % PARTS
     return part
 
 
@@ -273,7 +275,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
     options = FitOptions(
         noise=found.noise,
         ar_order=found.noise.order,
-        steps=TUNING.fold_steps,
+        steps=FOLD_STEPS,
         warm_start=found.selected(train),
         fixed_weights=True,
     )

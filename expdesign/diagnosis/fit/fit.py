@@ -28,10 +28,19 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
+
+STEPS = 8  # Gauss-Newton steps of a fit, at most
+SMALLEST_FACTOR_CHANGE = -0.8  # factors of inertia, thrust, log and gyro stay above one plus this
+LARGEST_RATIO = 3.0  # times and widths change by this factor in a step, at most
+BEYOND_STD_LEVEL = 1e-3  # of the test whether parameters are within their stated standard deviations
+LEAST_CORRELATION_EIGENVALUE = 1e-6  # of stated parameters; smaller ones count as rounded
+FORCE_SPACING_S = 60.0  # between the knots of a force that nobody measured [s]
+# sizes of such a force that are tried, as ridge penalties
+FORCE_PENALTIES = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
+
 
 POSITIVE = ("lag:", "delay:", "slew:")
 """Effects that are times, from zero on."""
@@ -127,12 +136,12 @@ class FitOptions:
 
     noise: Noise | None = None
     ar_order: int | None = None
-    steps: int = TUNING.steps
+    steps: int = STEPS
     warm_start: Fit | None = None
     fixed_weights: bool = False
 
 
-def continuing(found: Fit, *, steps: int = TUNING.steps) -> FitOptions:
+def continuing(found: Fit, *, steps: int = STEPS) -> FitOptions:
     """Options of a fit that starts from another one: its noise, its order, its motion."""
     return FitOptions(noise=found.noise, ar_order=found.noise.order, warm_start=found, steps=steps)
 
@@ -160,7 +169,7 @@ def _prior_whitening(ship: ExtendedModel, keys: tuple[str, ...], free: int) -> A
     std = np.array([0.0] * free + [known.get(key, 0.0) for key in keys[free:]])
     index = np.flatnonzero(std > 0)
     values, vectors = np.linalg.eigh(_prior_correlation(ship, [keys[place] for place in index]))
-    root = (vectors / np.sqrt(np.maximum(values, TUNING.least_correlation_eigenvalue))) @ vectors.T
+    root = (vectors / np.sqrt(np.maximum(values, LEAST_CORRELATION_EIGENVALUE))) @ vectors.T
     whitening = np.zeros((len(keys), len(keys)))
     whitening[np.ix_(index, index)] = root / std[index]
     return whitening
@@ -271,11 +280,11 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
     for key, value in effects.items():
         kind = key.split(":")[0]
         if kind in ("lag", "delay", "slew", "deadband") or key in ("roll:period", "roll:damping"):
-            before, ratio = ship.get(key), TUNING.largest_ratio
+            before, ratio = ship.get(key), LARGEST_RATIO
             least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
             value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
         elif kind in ("inertia", "gain", "gyro", "log", "scale"):
-            value = max(value, TUNING.smallest_factor_change)
+            value = max(value, SMALLEST_FACTOR_CHANGE)
         result[key] = value
     return result
 
@@ -298,7 +307,7 @@ def within_stated_std(found: Fit) -> bool:
     whitening = _prior_whitening(found.ship, found.keys, found.free_count)
     apart = np.abs(whitening @ deviations_of(found.ship, found.keys))
     stated = int((np.diag(whitening) > 0).sum())
-    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated, 1) > TUNING.beyond_std_level).all())
+    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated, 1) > BEYOND_STD_LEVEL).all())
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:
@@ -334,7 +343,7 @@ def unmeasured_force_share(linear: LinearisedMotion, outputs: tuple[str, ...]) -
     """(n,) share of the root mean square error of every output that the force takes away; 0 for nothing."""
     motion = linear.motion
     shape = (*motion.states.shape[:1], motion.states.shape[1] - 1, motion.states.shape[2])
-    basis = linear_basis(shape[1], motion.windows.step_s, TUNING.force_spacing_s)
+    basis = linear_basis(shape[1], motion.windows.step_s, FORCE_SPACING_S)
     columns = [OUTPUTS.index(name) for name in outputs]
     found = build_sensitivities(
         linear, [_pushing(axis, row, shape) for axis in columns for row in basis], random_current=False
@@ -360,7 +369,7 @@ def _smoothed(found: Sensitivities, grams: GramMatrices) -> Array:
     along = np.einsum("wcz,wc->wz", vectors, grams.Xe / scale)
     rows = int(np.isfinite(found.error).sum())
     best: tuple[float, float] = (np.inf, 0.0)
-    for penalty in TUNING.force_penalties:
+    for penalty in FORCE_PENALTIES:
         shrunk = values / (values + penalty)
         explained = (along**2 / (values + penalty) * (2.0 - shrunk)).sum()
         freedom = shrunk.sum() + grams.effect_starts.shape[0] * grams.effect_starts.shape[1]

@@ -30,7 +30,6 @@ from expdesign.diagnosis.fit.linear_model import (
     sensitivities_beside,
     sensitivities_to,
 )
-from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import (
     LinearisedMotion,
@@ -41,6 +40,20 @@ from expdesign.diagnosis.motion import (
     simulate_windows,
 )
 from expdesign.values import Array
+
+CONVERGED_BELOW = 0.05  # a fit has converged when the next step would lower the cost by less than this
+ALLOWED_RISE = 1.0  # a step may raise the cost by this, because the noise is an estimate
+HALVINGS = 5  # of a step that raises the cost
+FIRST_NOISE_PASSES = 3  # alternations between effects and noise without a first guess of the noise
+# standard deviations of the random current that are tried [m/s]
+CURRENT_STDS_MPS = (0.0, 0.005, 0.01, 0.02, 0.035, 0.06, 0.1, 0.2)
+CURRENT_TIMES_S = (60.0, 150.0, 400.0, 1000.0)  # correlation times of the random current that are tried [s]
+# of differences of white noise, as noise of yaw rates, that are tried; shares_beside_current: beside a random current,
+# which leaves some noise at low frequencies, as it is known at its knots alone
+SHARES = (0.9, 1.0)
+SHARES_BESIDE_CURRENT = (0.95,)
+NUMBERS_AT_ONCE = 200_000  # in matrices of random currents that are tried together, at most
+
 
 # Noise of the remainder, estimated together with a fit: autoregressions and a random current.
 
@@ -75,11 +88,11 @@ def estimate_noise(
     passes = 1
     if noise is None:
         size = channel_std(found.error)
-        noise, passes, grams = white_noise(np.where(size > 0, size, np.inf)), TUNING.first_noise_passes, None
+        noise, passes, grams = white_noise(np.where(size > 0, size, np.inf)), FIRST_NOISE_PASSES, None
     for number in range(passes):
         grams = gram_matrices(found, noise) if grams is None or number else grams
         noise = _estimate_random_current(grams, found, noise, prior)
-        shares = TUNING.shares_beside_current if noise.current_std_mps else TUNING.shares
+        shares = SHARES_BESIDE_CURRENT if noise.current_std_mps else SHARES
         ar_noise = fit_ar_noise(_remainder(grams, found, noise, prior), order=ar_order, shares=shares)
         noise = replace(ar_noise, current_std_mps=noise.current_std_mps, current_time_s=noise.current_time_s)
     return noise
@@ -105,11 +118,11 @@ def _under_random_currents(
     """The noise with every random current that is tried, first none, and the information under it."""
     still, *others = [
         replace(noise, current_std_mps=std_mps, current_time_s=time_s)
-        for std_mps in TUNING.current_stds_mps
-        for time_s in (TUNING.current_times_s if std_mps else TUNING.current_times_s[:1])
+        for std_mps in CURRENT_STDS_MPS
+        for time_s in (CURRENT_TIMES_S if std_mps else CURRENT_TIMES_S[:1])
     ]
     yield still, marginalised(grams, found, still)
-    at_once = max(1, TUNING.numbers_at_once // (len(grams.XX) * (2 * found.knot_count) ** 2))
+    at_once = max(1, NUMBERS_AT_ONCE // (len(grams.XX) * (2 * found.knot_count) ** 2))
     for low in range(0, len(others), at_once):
         part = others[low : low + at_once]
         yield from zip(part, marginalised_under(grams, found, part), strict=True)
@@ -260,7 +273,7 @@ def _weighted(problem: _Problem, point: _Point | Fit, noise: Noise) -> Fit:
         precision=problem.precision,
         step=step,
         gain=gain,
-        converged=gain < TUNING.converged_below,
+        converged=gain < CONVERGED_BELOW,
     )
 
 
@@ -295,11 +308,11 @@ def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
     held = problem.options.fixed_weights
     effects = np.broadcast_to(best.step, (len(best.starts), len(best.step)))
     start_step = _resized(best.grams.initial_state_steps(effects), best.ship.states)
-    for halvings in range(TUNING.halvings + 1):
+    for halvings in range(HALVINGS + 1):
         share = 0.5**halvings
-        if halvings and share * (2.0 - share) * best.gain < TUNING.converged_below:
+        if halvings and share * (2.0 - share) * best.gain < CONVERGED_BELOW:
             return None, halvings
-        limit = best.cost + (0.0 if halvings else TUNING.allowed_rise)
+        limit = best.cost + (0.0 if halvings else ALLOWED_RISE)
         ship = best.ship.with_effects(after_step(best.ship, best.keys, share * best.step))
         starts = best.starts + share * start_step
         motion = simulate_nearby(ship, problem.windows, starts, best.linear)
@@ -313,7 +326,7 @@ def _line_search(problem: _Problem, best: Fit) -> tuple[Fit | None, int]:
         ahead = None if point is None else _weighted(problem, point, best.noise)
         if ahead is not None and (held or ahead.cost <= limit):
             return ahead, halvings + 1
-    return None, TUNING.halvings + 1
+    return None, HALVINGS + 1
 
 
 def _cost_with_weights_of(problem: _Problem, best: Fit, ship: ExtendedModel, error: Array) -> float:

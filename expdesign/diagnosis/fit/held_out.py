@@ -40,6 +40,10 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import linearise, simulate_from_measured
 from expdesign.values import Array
 
+LEAST_FIT = 0.0  # of simulations of whole held-out units [%]; where one is worse, the stretches count
+BOOTSTRAP_DRAWS = 1000  # of units, for intervals
+
+
 # Errors of models on data that they were not fitted to, and their comparison, with intervals by the bootstrap.
 
 
@@ -96,7 +100,7 @@ def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
 
 def leads_away(held: HeldOut) -> bool:
     """Whether a model simulates some output of whole units worse than a constant."""
-    return not (held.fit >= TUNING.least_fit).all()
+    return not (held.fit >= LEAST_FIT).all()
 
 
 def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
@@ -120,7 +124,7 @@ def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut,
     decisions and for reports.
     """
     runs = (0,) * len(before.squared_error) if before.run is None else tuple(before.run.tolist())
-    times = _times_drawn(runs, TUNING.bootstrap_draws, seed)
+    times = _times_drawn(runs, BOOTSTRAP_DRAWS, seed)
     first, second = (
         HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
         for item in (before, after)

@@ -34,6 +34,12 @@ from expdesign.diagnosis.motion import (
 )
 from expdesign.values import Array
 
+KNOT_SPACING_S = 20.0  # of the random current, at least [s]
+MOST_KNOTS = 24  # of the random current in a window
+TILE = 64  # edge of blocks of matrix products; for up to 64 x 64 x 64 multiplications OpenBLAS uses one thread
+LARGEST_SENSITIVITY = 1e30  # beyond it the model counts as unstable
+
+
 # The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
 
 
@@ -68,7 +74,7 @@ class Sensitivities:
     def unbounded(self) -> bool:
         """The linearised motion has diverged."""
         sizes = (float(np.abs(item).max(initial=0.0)) for item in (self.values, self.starts))
-        return not all(size < TUNING.largest_sensitivity for size in sizes)
+        return not all(size < LARGEST_SENSITIVITY for size in sizes)
 
 
 def build_sensitivities(
@@ -76,7 +82,7 @@ def build_sensitivities(
 ) -> Sensitivities:
     """Sensitivities to disturbances, to the initial states and perhaps to a random current."""
     motion = linear.motion
-    spacing = max(TUNING.knot_spacing_s, motion.windows.steps * motion.windows.step_s / TUNING.most_knots)
+    spacing = max(KNOT_SPACING_S, motion.windows.steps * motion.windows.step_s / MOST_KNOTS)
     extra: list[Disturbance] = []
     if random_current:
         basis = linear_basis(motion.windows.steps - 1, motion.windows.step_s, spacing)
@@ -98,7 +104,7 @@ def in_groups(linear: LinearisedMotion, count: int) -> Iterator[tuple[NDArray[np
     Beside each group its windows, as a mask (w,).
     """
     windows, samples = linear.motion.predicted.shape[:2]
-    columns = count + 2 * TUNING.most_knots
+    columns = count + 2 * MOST_KNOTS
     each = columns * (4 * samples + columns)  # sensitivities and their inner products
     groups = min(windows, -(-windows * each // TUNING.sensitivities_at_once))
     if groups < 2:
@@ -250,9 +256,9 @@ def _gram(rows: Array) -> Array:
     """
     m, w, s = rows.shape[1:]
     result = np.zeros((w, m, m))
-    tiles = [slice(low, low + TUNING.tile) for low in range(0, m, TUNING.tile)]
-    for channel, low in itertools.product(range(len(rows)), range(0, s, TUNING.tile)):
-        block = np.swapaxes(rows[channel, :, :, low : low + TUNING.tile], 0, 1)
+    tiles = [slice(low, low + TILE) for low in range(0, m, TILE)]
+    for channel, low in itertools.product(range(len(rows)), range(0, s, TILE)):
+        block = np.swapaxes(rows[channel, :, :, low : low + TILE], 0, 1)
         other = np.swapaxes(block, 1, 2).copy()
         for number, tile in enumerate(tiles):
             for earlier in tiles[: number + 1]:

@@ -18,6 +18,9 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, longest_windows, simulate_from_measured, stable_windows
 from expdesign.signals import Record
 
+FOLD_STEPS = 6  # Gauss-Newton steps from the fit to all units to the fit without a fold
+LONGER_BY = 1.4  # factor of the length of windows from one fit of a diverging model to the next
+
 
 def fit_output_error(ship: ExtendedModel, windows: Windows, free: tuple[str, ...]) -> Fit:
     """Effects `free`, and parameters within their standard deviations, fitted to windows that begin as measured.
@@ -25,7 +28,7 @@ def fit_output_error(ship: ExtendedModel, windows: Windows, free: tuple[str, ...
     Raises:
         FloatingPointError: the simulation diverges at the start of the fit.
     """
-    options, part = FitOptions(steps=TUNING.fold_steps), replace(windows, white_noise=True)
+    options, part = FitOptions(steps=FOLD_STEPS), replace(windows, white_noise=True)
     return fit(ship, part, free, starts=initial_states(windows, ship.states), options=options)
 
 
@@ -81,7 +84,7 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
     try:
         while length_s < TUNING.ahead_s:
             found = fit_output_error(found, cut_windows(ship.model, record, longest_s=length_s), ()).ship
-            length_s *= TUNING.longer_by
+            length_s *= LONGER_BY
         found = fit_output_error(found, cut_windows(ship.model, record, longest_s=TUNING.ahead_s), ()).ship
     except (FloatingPointError, np.linalg.LinAlgError):
         return as_given

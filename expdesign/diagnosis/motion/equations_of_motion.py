@@ -11,11 +11,18 @@ from scipy.linalg.lapack import dtbtrs
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.inputs import ExogenousInputs
-from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.simulation.motion import rates_over_ground
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel.structures import SHOAL
+
+DIFFERENCE = 1e-5  # step of finite differences of the rates by the state
+# of all windows whose rates are differentiated at once, at most: small arrays cost their number, large ones leave the
+# processor's cache
+SAMPLES_AT_ONCE = 16_000
+ROLL_ANGLE_RAD = 0.25  # of a roll oscillation in one part of an integrator step, at most
+MOST_ROLL_PARTS = 16  # parts of an integrator step for roll
+
 
 # Equations of motion of an extended model.
 
@@ -116,7 +123,7 @@ def runge_kutta_step(
 def parts_of_step(ship: ExtendedModel, h: float) -> int:
     """How many parts a step has, so that roll turns little in each."""
     turn = 0.0 if ship.roll is None else 2 * math.pi * h / ship.roll.period_s
-    return min(max(1, math.ceil(turn / TUNING.roll_angle_rad)), TUNING.most_roll_parts)
+    return min(max(1, math.ceil(turn / ROLL_ANGLE_RAD)), MOST_ROLL_PARTS)
 
 
 def _rk4_part(
@@ -140,15 +147,15 @@ def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInput
     """(..., n, n) derivatives of the rates, by central differences; as many at once as keep memory small."""
     n = ship.states
     columns = np.moveaxis(states, -1, 0)[:, None]
-    moves = TUNING.difference * np.concatenate([np.eye(n), -np.eye(n)]).reshape(2 * n, n, *[1] * (states.ndim - 1))
-    at_once = max(1, TUNING.samples_at_once // max(1, states[..., 0].size))
+    moves = DIFFERENCE * np.concatenate([np.eye(n), -np.eye(n)]).reshape(2 * n, n, *[1] * (states.ndim - 1))
+    at_once = max(1, SAMPLES_AT_ONCE // max(1, states[..., 0].size))
     rates = np.empty((2 * n, n, *states.shape[:-1]))
     for low in range(0, 2 * n, at_once):
         part = moves[low : low + at_once]
         moved = tuple(column + part[:, axis] for axis, column in enumerate(columns))
         for column, rate in enumerate(state_rates(ship, moved, exogenous)):
             rates[low : low + at_once, column] = rate
-    jacobian = (rates[:n] - rates[n:]) / (2 * TUNING.difference)
+    jacobian = (rates[:n] - rates[n:]) / (2 * DIFFERENCE)
     return np.ascontiguousarray(np.moveaxis(jacobian, (0, 1), (-1, -2)))
 
 

@@ -14,13 +14,16 @@ import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind, response_effect
-from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.simulation import deliver, keeps_to, positions
 from expdesign.simulation.motion import to_body
 from expdesign.simulation.tape import evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Response, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+
+# parts of an integrator step in which moving actuators are followed, at least; forces are not linear in angles
+ACTUATOR_SUBSTEPS = 4
+
 
 # Inputs as the actuators of an extended model deliver them.
 
@@ -36,7 +39,7 @@ def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tupl
     inputs = ship.model.inputs
     rows = _slewed(ship, rows, windows)
     moving = any(key.startswith(("delay:", "lag:")) and value for key, value in ship.effects.items())
-    parts = -(-TUNING.actuator_substeps // windows.rows_per_step) if moving else 1
+    parts = -(-ACTUATOR_SUBSTEPS // windows.rows_per_step) if moving else 1
     delivered = np.repeat(rows, parts, axis=0)
     finer = parts * windows.rows_per_step
     for kind, field in RESPONSES.items():

@@ -26,8 +26,11 @@ from expdesign.diagnosis.motion.equations_of_motion import (
     transition_matrices,
 )
 from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
-from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.values import Array
+
+LARGEST_SPEED = 60.0  # state beyond which a simulation has diverged [m/s, rad/s]
+NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
+
 
 # A simulation of all windows, and its linearisation.
 
@@ -71,7 +74,7 @@ class Motion:
     @property
     def diverged_windows(self) -> NDArray[np.bool_]:
         """(w,) in which windows it does."""
-        return np.asarray(~(np.abs(self.states).max(axis=(1, 2)) < TUNING.largest_speed))
+        return np.asarray(~(np.abs(self.states).max(axis=(1, 2)) < LARGEST_SPEED))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -237,7 +240,7 @@ def linearised_like(motion: Motion, near: LinearisedMotion | None) -> Linearised
         return None
     differ = any(motion.ship.get(key) != near.motion.ship.get(key) for key in _differing(motion.ship, near.motion.ship))
     apart = np.abs(motion.states - near.motion.states).max()
-    return None if differ or not apart < TUNING.newton_tolerance else replace(near, motion=motion)
+    return None if differ or not apart < NEWTON_TOLERANCE else replace(near, motion=motion)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

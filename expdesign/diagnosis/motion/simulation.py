@@ -16,6 +16,8 @@ from expdesign.diagnosis.motion.equations_of_motion import (
 )
 from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
 from expdesign.diagnosis.motion.linearisation import (
+    LARGEST_SPEED,
+    NEWTON_TOLERANCE,
     LinearisedMotion,
     Motion,
     linearise,
@@ -23,9 +25,20 @@ from expdesign.diagnosis.motion.linearisation import (
     ship_velocities,
     start_responses,
 )
-from expdesign.diagnosis.motion.tuning import TUNING
 from expdesign.signals import Record
 from expdesign.values import Array
+
+NEWTON_ROUNDS = 12  # of a simulation of all steps at once
+NEWTON_DIVERGENCE = 5.0  # growth of the correction that counts as divergence
+NEWTON_REFRESH = 3e-3  # correction above which the transition matrices are updated
+NEWTON_SAFETY = 0.1  # share of the tolerance below which the next correction must lie not to be made
+START_SAMPLES = 5  # samples that measured initial states are estimated from
+FEWEST_START_SAMPLES = 3  # of them that are measured, for a state to be fitted to them
+FEWEST_WINDOWS = 4  # into which data are cut
+WINDOW_ROUNDS = 4  # of shortening the windows of an unstable model
+FEWEST_WINDOW_SAMPLES = 30  # of shortened windows
+LARGEST_GROWTH = 6.0  # of an error of the initial state within a window
+
 
 # Simulation of all windows at once.
 
@@ -149,19 +162,19 @@ def _newton_over_all_steps(
     and G. Wanner, Solving Ordinary Differential Equations II (1996), IV.8, for when to end.
     """
     middle, last = exogenous.without_last_step, np.inf
-    for number in range(TUNING.newton_rounds):
+    for number in range(NEWTON_ROUNDS):
         made = np.stack(
             runge_kutta_step(ship, tuple(np.moveaxis(states[:, :-1], -1, 0)), middle, windows.step_s)[0], axis=-1
         )
         change = propagated(transition, start - states[:, 0], made - states[:, 1:])
         size = float(np.abs(change).max())
-        if not size < min(TUNING.newton_divergence * last, TUNING.largest_speed):
+        if not size < min(NEWTON_DIVERGENCE * last, LARGEST_SPEED):
             return None
         states, next_size = states + change, size * size / last if number else size
-        if min(size, next_size / TUNING.newton_safety) < TUNING.newton_tolerance:
+        if min(size, next_size / NEWTON_SAFETY) < NEWTON_TOLERANCE:
             return states
         last = size
-        if size > TUNING.newton_refresh and number < TUNING.newton_rounds / 2:
+        if size > NEWTON_REFRESH and number < NEWTON_ROUNDS / 2:
             transition = _transition(ship, windows, middle, states)
     return None
 
@@ -181,15 +194,15 @@ def initial_states(windows: Windows, states: int = 3) -> Array:
 
 def _first_line(windows: Windows) -> tuple[Array, Array]:
     """(w, 3) value at the first sample and (w, 3) rise per sample of straight lines through the first samples."""
-    rows = windows.measured[:, : TUNING.start_samples, :3]
+    rows = windows.measured[:, :START_SAMPLES, :3]
     seen = np.isfinite(rows)
     count = np.maximum(seen.sum(axis=1), 1)  # (w, 3)
     time = np.where(seen, np.arange(rows.shape[1], dtype=float)[:, None], 0.0)
     middle, mean = time.sum(axis=1) / count, np.where(seen, rows, 0.0).sum(axis=1) / count
     apart = np.where(seen, time - middle[:, None], 0.0)
     slope = (apart * np.where(seen, rows, 0.0)).sum(axis=1) / np.maximum((apart**2).sum(axis=1), 1e-300)
-    slope = np.where(count >= TUNING.fewest_start_samples, slope, 0.0)
-    return np.where(count >= TUNING.fewest_start_samples, mean - slope * middle, mean), slope
+    slope = np.where(count >= FEWEST_START_SAMPLES, slope, 0.0)
+    return np.where(count >= FEWEST_START_SAMPLES, mean - slope * middle, mean), slope
 
 
 def simulate_from_measured(ship: ExtendedModel, windows: Windows, warm_start: LinearisedMotion | None = None) -> Motion:
@@ -208,7 +221,7 @@ def fitted_start(ship: ExtendedModel, windows: Windows) -> Array:
 
 def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInputs) -> Array:
     """One step of Newton's method from the straight line, which is near."""
-    head = windows.begun(TUNING.start_samples)
+    head = windows.begun(START_SAMPLES)
     first, rise = _first_line(windows)
     modelled = np.isin(OUTPUTS, ship.model.outputs)
     line = np.zeros((len(first), head.steps, ship.states))
@@ -223,7 +236,7 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
         gaps = np.stack(made, axis=-1) - line[:, 1:]
         motion = _motion(ship, head, inputs, line + propagated(transition, np.zeros_like(line[:, 0]), gaps))
     seen = np.isfinite(motion.error[..., :3])
-    fitted = (seen.sum(axis=1) >= TUNING.fewest_start_samples) & modelled & ~motion.diverged_windows[:, None]  # (w, 3)
+    fitted = (seen.sum(axis=1) >= FEWEST_START_SAMPLES) & modelled & ~motion.diverged_windows[:, None]  # (w, 3)
     weight = seen * np.array([1.0, 1.0, ship.length_m / 2.0])  # a yaw rate counts as the speed of the bow
     by_start = start_responses(motion, transition)[..., :3] * weight * fitted.T[:, :, None, None]
     table = np.nan_to_num(np.moveaxis(by_start, 0, -1), posinf=0.0, neginf=0.0).reshape(len(first), -1, 3)
@@ -239,7 +252,7 @@ def _fitted_start(ship: ExtendedModel, windows: Windows, exogenous: ExogenousInp
 def stable_windows(ship: ExtendedModel, record: Record) -> Windows:
     """Windows of a record: as long as possible, but at least a few, and short enough for an unstable model."""
     windows = longest_windows(ship, record)
-    for _ in range(TUNING.window_rounds):
+    for _ in range(WINDOW_ROUNDS):
         stable_s = _stable_time(ship, windows)
         if stable_s >= windows.steps * windows.step_s:
             break
@@ -250,10 +263,10 @@ def stable_windows(ship: ExtendedModel, record: Record) -> Windows:
 def longest_windows(ship: ExtendedModel, record: Record) -> Windows:
     """Windows of a record for a stable model."""
     windows = cut_windows(ship.model, record)
-    if len(windows.batch) >= TUNING.fewest_windows:
+    if len(windows.batch) >= FEWEST_WINDOWS:
         return windows
     total_s = sum(len(batch) * batch.sample_time_s for batch in record.batches)
-    return cut_windows(ship.model, record, longest_s=total_s / TUNING.fewest_windows)
+    return cut_windows(ship.model, record, longest_s=total_s / FEWEST_WINDOWS)
 
 
 def _stable_time(ship: ExtendedModel, windows: Windows) -> float:
@@ -266,7 +279,7 @@ def _stable_time(ship: ExtendedModel, windows: Windows) -> float:
     by_start = start_responses(motion, linearise(motion).transition)
     answers = np.moveaxis(by_start[..., :3], 0, -1) * scale / scale[:, None]
     growth = np.linalg.norm(answers, axis=(2, 3)) / np.sqrt(3.0)
-    unstable = (growth > TUNING.largest_growth).any(axis=0)
+    unstable = (growth > LARGEST_GROWTH).any(axis=0)
     if not unstable.any():
         return windows.steps * windows.step_s
-    return max(int(np.argmax(unstable)), TUNING.fewest_window_samples) * windows.sample_s
+    return max(int(np.argmax(unstable)), FEWEST_WINDOW_SAMPLES) * windows.sample_s

@@ -39,8 +39,13 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
 from expdesign.diagnosis.remainder.kinds import WORDS, Kind, kinds
-from expdesign.diagnosis.remainder.stability_selection import Chosen, UnitInformation, stable_selection, term_dictionary
-from expdesign.diagnosis.remainder.tuning import TUNING
+from expdesign.diagnosis.remainder.stability_selection import (
+    MOST_TERMS,
+    Chosen,
+    UnitInformation,
+    stable_selection,
+    term_dictionary,
+)
 from expdesign.diagnosis.select import (
     FittedCandidate,
     Selection,
@@ -51,6 +56,17 @@ from expdesign.diagnosis.select import (
 )
 from expdesign.values import Array
 from expdesign.vessel import Term
+
+WINDOW_S, FEWEST_SAMPLES = 30.0, 20  # length of the windows that the search simulates
+STEPS = 3  # of the fit in these
+WHOLE = (0.6, 1.4)  # sizes between which an effect counts as there or not is there
+REGRESSORS = 300  # about so many are tried, by which p-values are multiplied
+MOST_UNITS = 200  # that one or two runs are divided into
+LEVEL = 0.025  # of the p-value of a size, adjusted for the number of regressors
+LEAST_SHARE = 0.02  # of the whitened squared error of held-out data that a kind of effect must take away to be named
+AS_GOOD = 0.8  # share of the likelihood gained by causes from which on a kind of effect is named beside them
+LEAST_REDUCTION = 0.05  # share by which the error of some output must fall on held-out data
+
 
 # What remains beside all causes: terms to add to the model, or the kind of what is missing.
 
@@ -116,8 +132,8 @@ def _missing_from(base: Fit, rng: np.random.Generator) -> tuple[Missing, ...]:
     listed, surely = [wider.library[name] for name in names], list[Missing]()
     for item, (value, std) in zip(chosen, sizes, strict=True):
         factor, freedom = known.alone
-        p_value = of_several(tail(item.statistic, 1, factor, freedom), TUNING.regressors)
-        if not p_value <= TUNING.level:
+        p_value = of_several(tail(item.statistic, 1, factor, freedom), REGRESSORS)
+        if not p_value <= LEVEL:
             break  # what was chosen later stands beside this
         wider_std = std * float(np.sqrt(factor) * few_runs_factor(freedom))
         surely.append(_missing(listed, others, item, value, wider_std, size))
@@ -143,10 +159,10 @@ def _between_units(given: UnitInformation, chosen: Sequence[int]) -> Dispersion:
 
 def _begun_anew(base: Fit, windows: Windows) -> Fit:
     """The fit in windows of `Tuning.window_s`: simulated from what is measured, the path stays near the ship's own."""
-    short = windows.cut_shorter(max(TUNING.fewest_samples, round(TUNING.window_s / windows.sample_s)))
+    short = windows.cut_shorter(max(FEWEST_SAMPLES, round(WINDOW_S / windows.sample_s)))
     starts = initial_states(short, base.ship.states)
     try:
-        return fit(base.ship, short, base.free_keys, starts=starts, options=FitOptions(steps=TUNING.steps))
+        return fit(base.ship, short, base.free_keys, starts=starts, options=FitOptions(steps=STEPS))
     except (FloatingPointError, np.linalg.LinAlgError):
         return base
 
@@ -160,14 +176,14 @@ def as_good_as_causes(first: Fit, last: Fit, windows: Windows, rng: np.random.Ge
     if not found or found[0].term is not None:
         return ()
     gain = log_likelihood_gain(_begun_anew(first, windows), _begun_anew(last, windows))
-    return found[:1] if found[0].chosen.statistic > TUNING.as_good * gain else ()
+    return found[:1] if found[0].chosen.statistic > AS_GOOD * gain else ()
 
 
 def _impossible(given: UnitInformation, terms: int, others: tuple[Kind, ...]) -> list[int]:
     """Places of kinds that act as a whole or not at all, and whose size is far from one."""
     A, s = given.beside_nuisance(np.ones(len(given.A), dtype=bool))
     sizes = s / np.maximum(np.diag(A), 1e-300)
-    low, high = TUNING.whole
+    low, high = WHOLE
     return [terms + at for at, kind in enumerate(others) if kind.whole and not low < sizes[terms + at] < high]
 
 
@@ -185,7 +201,7 @@ def _units(windows: Windows) -> NDArray[np.int64]:
     if len(runs) >= 3:
         return np.searchsorted(runs, windows.batch)
     count = len(windows.batch)
-    return np.arange(count) * min(count, TUNING.most_units) // count
+    return np.arange(count) * min(count, MOST_UNITS) // count
 
 
 def _added_by_unit(
@@ -293,7 +309,7 @@ def with_unlisted_terms(
     instead = as_good_as_causes(kept.first, kept.last, windows, rng) if kept.steps else ()
     result = Remainder(kept=kept, held=[*held], kinds=(), instead=_visible(instead))
     result = _with_terms_for_parameters(result, windows, validation, rng, seed)
-    for _ in range(TUNING.most_terms):
+    for _ in range(MOST_TERMS):
         found = missing_effects(result.kept.last, windows, rng)
         if rejected and not result.kept.steps:
             found = _surer(found, missing_effects(rejected[0], windows, rng))
@@ -346,7 +362,7 @@ def _added(
         likelihood_gain=statistic,
         penalised_gain=statistic,
         keys=(key,),
-        multiplicity=float(TUNING.regressors),
+        multiplicity=float(REGRESSORS),
     )
     p_value = p_value_between_runs(chosen, None, kept.dispersion)
     step = Step(chosen=chosen, p_value=p_value, alternatives=(), before=kept.last, tests=())
@@ -384,12 +400,12 @@ def _surer(found: tuple[Missing, ...], other: tuple[Missing, ...]) -> tuple[Miss
     if not other or other[0].term is not None:
         return found
     statistic = found[0].chosen.statistic if found else 0.0
-    return other if statistic < TUNING.as_good * other[0].chosen.statistic else found
+    return other if statistic < AS_GOOD * other[0].chosen.statistic else found
 
 
 def _visible(found: Sequence[Missing]) -> tuple[Missing, ...]:
     """Kinds that take a visible share off the error of held-out data."""
-    return tuple(item for item in found if item.term is None and item.share > TUNING.least_share)
+    return tuple(item for item in found if item.term is None and item.share > LEAST_SHARE)
 
 
 def _without_redundant(steps: list[Step], windows: Windows) -> list[Step]:
@@ -407,4 +423,4 @@ def _clear_gain(before: HeldOut, after: HeldOut, seed: int) -> bool:
     _, (low, _) = held_out_gain(before, after, seed)
     one, other = on_common_units(before, after)
     lost, left = one.squared_error.sum(axis=0), other.squared_error.sum(axis=0)
-    return low > 0.0 and bool((left <= (1.0 - TUNING.least_reduction) ** 2 * lost).any())
+    return low > 0.0 and bool((left <= (1.0 - LEAST_REDUCTION) ** 2 * lost).any())

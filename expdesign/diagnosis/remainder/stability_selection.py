@@ -16,11 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.diagnosis.model import is_thrust
-from expdesign.diagnosis.remainder.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Term, VesselModel
 from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+
+MOST_TERMS = 3  # of the sum
+LEAST_STATISTIC = 25.0  # of a regressor; one of 300 reaches it by chance in one of 1000 trials
+LEAST_OWN_SHARE = 1e-4  # of a regressor that nothing else imitates
+ROUNDING = 1e-11  # share of a regressor's information that is rounding, where the rest is imitated by what is estimated
+HALF_SAMPLES = 50  # of the units, for stability selection
+STABLE = 0.5  # share of them that must choose a regressor, or one that looks like it
+ALIKE = 0.8  # correlation from which on regressors look alike
+FOLDS = 4  # of the held-out likelihood
+LEAST_HELD_OUT = 15.0  # gain of held-out likelihood, as a statistic
+MOST_LOST = 0.25  # share of it that single units may lose
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +60,7 @@ class UnitInformation:
         own = A[:n, :n] + self.precision
         solved = np.linalg.lstsq(own, np.column_stack([A[:n, n:], s[:n] - self.precision @ self.offset]), rcond=None)[0]
         left, scores = A[n:, n:] - A[n:, :n] @ solved[:, :-1], s[n:] - A[n:, :n] @ solved[:, -1]
-        imitated = np.diag(left) <= TUNING.rounding * np.diag(A)[n:]
+        imitated = np.diag(left) <= ROUNDING * np.diag(A)[n:]
         left[imitated], left[:, imitated], scores[imitated] = 0.0, 0.0, 0.0
         return left, scores
 
@@ -77,9 +87,9 @@ def stable_selection(given: UnitInformation, rng: np.random.Generator) -> tuple[
     """Regressors that are chosen from most half samples and raise the likelihood of held-out units, best first."""
     units = len(given.A)
     whole = given.beside_nuisance(np.ones(units, dtype=bool))
-    alike = _correlation(whole[0]) > TUNING.alike
+    alike = _correlation(whole[0]) > ALIKE
     path = greedy(*whole)
-    halves = [_half(units, rng) for _ in range(TUNING.half_samples)]
+    halves = [_half(units, rng) for _ in range(HALF_SAMPLES)]
     drawn = [[index for index, _ in greedy(*given.beside_nuisance(half))] for half in halves]
     found: list[Chosen] = []
     for number, (index, statistic) in enumerate(path):
@@ -92,7 +102,7 @@ def stable_selection(given: UnitInformation, rng: np.random.Generator) -> tuple[
             lost=float(-np.minimum(gains, 0.0).sum()),
             frequency=float(np.mean([alike[index, some].any() for some in drawn])),
         )
-        if item.frequency < TUNING.stable or not _holds(item) or number != len(found):
+        if item.frequency < STABLE or not _holds(item) or number != len(found):
             break
         found.append(item)
     return tuple(found)
@@ -100,18 +110,18 @@ def stable_selection(given: UnitInformation, rng: np.random.Generator) -> tuple[
 
 def _holds(item: Chosen) -> bool:
     """Whether held-out units agree: what begins late or acts in few runs gains nothing in others, but loses little."""
-    return item.held_out > TUNING.least_held_out and item.lost < TUNING.most_lost * item.held_out
+    return item.held_out > LEAST_HELD_OUT and item.lost < MOST_LOST * item.held_out
 
 
 def greedy(A: Array, s: Array) -> list[tuple[int, float]]:
     """Indices and statistics of the regressors that explain most, each beside those before it (matching pursuit)."""
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))
     A, s, path = A / np.outer(size, size), s / size, list[tuple[int, float]]()
-    for _ in range(TUNING.most_terms):
+    for _ in range(MOST_TERMS):
         own = np.diag(A)
-        statistic = np.where(own > TUNING.least_own_share, s**2 / np.maximum(own, TUNING.least_own_share), 0.0)
+        statistic = np.where(own > LEAST_OWN_SHARE, s**2 / np.maximum(own, LEAST_OWN_SHARE), 0.0)
         index = int(np.argmax(statistic))
-        if statistic[index] < TUNING.least_statistic:
+        if statistic[index] < LEAST_STATISTIC:
             break
         path.append((index, float(statistic[index])))
         s = s - A[:, index] * (s[index] / own[index])
@@ -127,8 +137,8 @@ def _held_out(given: UnitInformation, chosen: list[int]) -> Array:
     gains, own = np.zeros(units), np.eye(len(keep)) * 0.0
     own[:n, :n] = given.precision
     prior = np.concatenate([given.precision @ given.offset, np.zeros(len(chosen))])
-    for fold in range(min(TUNING.folds, units)):
-        test = np.arange(units) % TUNING.folds == fold
+    for fold in range(min(FOLDS, units)):
+        test = np.arange(units) % FOLDS == fold
         step = np.linalg.lstsq(A[~test].sum(axis=0) + own, s[~test].sum(axis=0) - prior, rcond=None)[0]
         gains[test] = 2.0 * s[test] @ step - np.einsum("i,wij,j->w", step, A[test], step)
     return gains

@@ -36,6 +36,11 @@ from expdesign.diagnosis.motion import linearise, simulate_windows
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, start_nearer
 from expdesign.diagnosis.select.tuning import TUNING
 
+PROFILE_POINTS, PROFILE_ROUNDS = 9, 9  # values per round of a profile likelihood, and rounds, at most
+EQUIVALENT_COST = 1.0  # values of a profile count as equally likely up to this cost: one standard error of a Gaussian
+EQUIVALENT_VALUES = 3  # this many equally likely values in a round end the search
+
+
 # Candidates fitted together with the findings so far, and their likelihood gains.
 
 
@@ -209,22 +214,22 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
     centre, span, limits = found.value(key), 4.0 * std, _limits(found, key)
     costs: dict[float, float] = {}
     low = high = centre
-    for _ in range(TUNING.profile_rounds):
-        values = np.clip(centre + span * np.linspace(-1.0, 1.0, TUNING.profile_points), *limits)
+    for _ in range(PROFILE_ROUNDS):
+        values = np.clip(centre + span * np.linspace(-1.0, 1.0, PROFILE_POINTS), *limits)
         for value in values.tolist():
             if value not in costs:
                 costs[value] = _cost(found, key, value)
         least = min(costs.values())
-        likely = [value for value, cost in costs.items() if cost < least + TUNING.equivalent_cost]
+        likely = [value for value, cost in costs.items() if cost < least + EQUIVALENT_COST]
         low, high, best = min(likely), max(likely), min(costs, key=lambda value: costs[value])
-        spacing = 2.0 * span / (TUNING.profile_points - 1)
+        spacing = 2.0 * span / (PROFILE_POINTS - 1)
         if best in (values[0], values[-1]) and best not in limits:
             centre = best
         elif (low <= values[0] > limits[0]) or (
             high >= values[-1] < limits[1]
         ):  # the plateau continues beyond these values
             centre, span = (low + high) / 2, 2.5 * span
-        elif sum(low <= value <= high for value in values) >= TUNING.equivalent_values:
+        elif sum(low <= value <= high for value in values) >= EQUIVALENT_VALUES:
             break
         else:
             centre, span = (low + high) / 2, (high - low) / 2 + spacing

@@ -27,6 +27,7 @@ from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import (
     FURTHER,
+    NEARLY_AS_MUCH,
     Work,
     best_step,
     has_rivals,
@@ -38,6 +39,11 @@ from expdesign.diagnosis.select.selection_round import (
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import Estimated
 from expdesign.values import Array
+
+NUISANCE_STEPS = 12  # Gauss-Newton steps of the fit before anything is tested, at most
+MOST_FINDINGS = 6  # causes, at most
+MOST_REJECTED = 4  # causes that are removed again, at most
+MOST_EXCHANGES = 2  # of a cause for another that gains more beside the rest, at most
 
 
 def select_forward(
@@ -72,7 +78,7 @@ def select_forward(
         if (
             step is None
             and sum(gains) > 1
-            and exchanges < TUNING.most_exchanges
+            and exchanges < MOST_EXCHANGES
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
             exchanges += 1
@@ -80,14 +86,14 @@ def select_forward(
             if exchanged is not None:
                 steps, base = exchanged, exchanged[-1].chosen.fit
                 continue
-        if step is None or len(steps) == TUNING.most_findings:
+        if step is None or len(steps) == MOST_FINDINGS:
             steps = _with_joint_profiles(steps)
             found = Selection(steps=tuple(steps), first=first, last=base, last_tests=tests, untried=tuple(work.untried))
             return found.with_steps(tuple(steps))
         steps += _smaller_causes(step, search) if _is_block(step.chosen) else [step]
-        del steps[TUNING.most_findings :]
+        del steps[MOST_FINDINGS:]
         base = steps[-1].chosen.fit
-        redundant = _to_reject(steps, search) if len(rejected) < TUNING.most_rejected else None
+        redundant = _to_reject(steps, search) if len(rejected) < MOST_REJECTED else None
         if redundant is not None:
             rejected.append(steps[redundant].chosen.candidate)
             without = None if work.allows(FURTHER) else without_step(steps, redundant, windows)
@@ -127,7 +133,7 @@ def to_take_out(steps: Sequence[Step], redundant: int) -> int:
     if not last.candidate.imitates or simple.candidate.imitates or len(simple.keys) >= len(last.keys):
         return redundant
     both = simple.likelihood_gain + last.likelihood_gain
-    return len(steps) - 1 if simple.likelihood_gain >= TUNING.nearly_as_much * both else redundant
+    return len(steps) - 1 if simple.likelihood_gain >= NEARLY_AS_MUCH * both else redundant
 
 
 def _to_reject(steps: list[Step], search: _Search) -> int | None:
@@ -189,12 +195,12 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     Noise that was estimated on the way holds some of what the parameters explain since, as a random current or slow
     noise that hides causes; so it is estimated from white noise on, too, and the likelier one kept.
     """
-    found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=TUNING.nuisance_steps))
+    found = fit(ship, windows, (), starts=starts, options=FitOptions(steps=NUISANCE_STEPS))
     if not found.keys:
         return found
-    options = FitOptions(noise=found.noise, steps=TUNING.nuisance_steps, warm_start=found)
+    options = FitOptions(noise=found.noise, steps=NUISANCE_STEPS, warm_start=found)
     found = fit(found.ship, windows, (), starts=found.starts, options=options)
-    anew = FitOptions(steps=TUNING.nuisance_steps, warm_start=found)
+    anew = FitOptions(steps=NUISANCE_STEPS, warm_start=found)
     return min(found, fit(found.ship, windows, (), starts=found.starts, options=anew), key=lambda item: item.deviance)
 
 
@@ -206,7 +212,7 @@ def _is_block(chosen: FittedCandidate) -> bool:
 def _smaller_causes(block: Step, search: _Search) -> list[Step]:
     """Causes with fewer effects, one after the other, if they gain more than a block of parameters; else the block."""
     size, base, path, count = len(block.chosen.keys), block.before, list[Step](), 0
-    while count < size and len(path) < TUNING.most_findings:
+    while count < size and len(path) < MOST_FINDINGS:
         step, _ = search.round(base, most=size - 1)
         if step is None:
             break

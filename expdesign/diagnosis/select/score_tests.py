@@ -44,6 +44,11 @@ from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbanc
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.values import Array
 
+DRAWS = 2000  # of the null distribution, for adjusted p-values
+# share of a candidate's sensitivity that nothing else in the model can imitate, at least, for it to be tested
+LEAST_OWN_SHARE = 1e-5
+
+
 # Disturbances of a candidate along a simulated path, per unit of each of its effects.
 
 
@@ -188,7 +193,7 @@ def scored_between_runs(
         size = scores.size[index]
         block = scores.A[np.ix_(index, index)] / np.outer(size, size)
         values, vectors = np.linalg.eigh(block)
-        if values[0] < TUNING.least_own_share or not np.isfinite(block).all():
+        if values[0] < LEAST_OWN_SHARE or not np.isfinite(block).all():
             continue  # indistinguishable from the effects that the model already has
         root = vectors / np.sqrt(values)
         z = root.T @ (scores.s[index] / size)
@@ -277,7 +282,7 @@ def _effective_tests(
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))  # sizes may span more digits than floating-point numbers
     values, vectors = np.linalg.eigh((A + A.T) / 2 / np.outer(size, size))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    drawn = rng.standard_normal((TUNING.draws, len(A))) @ root.T * size
+    drawn = rng.standard_normal((DRAWS, len(A))) @ root.T * size
     causes = [item.cause.split(":")[0] for item in candidates]
     largest: dict[tuple[str, int, bool], Array] = {}
     for cause, candidate, (index, own_root) in zip(causes, candidates, roots, strict=True):

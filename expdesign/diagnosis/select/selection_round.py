@@ -34,6 +34,25 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.processes import in_order
 from expdesign.progress import Estimated, silent
 
+PER_CAUSE = 2  # candidates of a cause that are fitted in a round, at most
+# share of the likelihood gain of the chosen candidate from which on another may be equivalent, where runs differ so
+# that the difference counts less
+RIVAL_SHARE = 0.5
+FIRST_STEPS = 3  # Gauss-Newton steps of every candidate
+LEADING_SHARE = 0.6  # candidates that then gain less than this share of the best are dropped
+SIMPLE_SHARE = 0.3  # the same of those with fewer numbers than the best
+RIVALS = 3  # candidates with fewer numbers that are compared with the best on held-out data, at most
+# share of the gain of a candidate that imitates many causes which one with fewer numbers needs to come first
+NEARLY_AS_MUCH = 0.7
+# share of the gain of a candidate from which on another is compared with it on held-out data; one with fewer numbers
+# comes first unless it is clearly worse there
+ABOUT_AS_LIKELY = 0.85
+LARGE_SHARE = 0.15  # share of the remainder above which an effect counts as large and is fitted in short windows too
+CERTAIN = 2  # causes whose best candidates are always fitted in long windows
+TESTS_WORK = 18.0  # time of the tests of a round, and of a round, in simulations of all data
+ROLL_WORK = 15.0  # time of a simulation with roll, which is stepped through, in simulations without
+
+
 # The candidates of a round that are worth a fit, and where their fits begin.
 
 SHORT = "in short windows"
@@ -53,7 +72,7 @@ def starting_points(
         known[SHORT] = fit_short_windows(base, windows), {}
     short_fit, beside = known[SHORT]
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
-    if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < TUNING.large_share:
+    if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < LARGE_SHARE:
         return [starting_point(base, test) for test in shortlist], False
     best, of_short = _never_left_out(shortlist), _shortlist(short_tests)
     certain = [*best, *_hidden_by_random_current(base, tests, best, beside=of_short)]
@@ -76,7 +95,7 @@ def _never_left_out(shortlist: Sequence[ScoreTest]) -> list[ScoreTest]:
     return [
         item
         for place, item in enumerate(first.values())
-        if place < TUNING.certain or item.statistic > TUNING.about_as_likely * largest
+        if place < CERTAIN or item.statistic > ABOUT_AS_LIKELY * largest
     ]
 
 
@@ -124,7 +143,7 @@ def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
             continue
         if cause not in count and len(count) == TUNING.shortlist:
             continue
-        if count.get(cause, 0) < TUNING.per_cause:
+        if count.get(cause, 0) < PER_CAUSE:
             found.append(test)
             count[cause] = count.get(cause, 0) + 1
     return found
@@ -176,7 +195,7 @@ class Work:
 
 def work_of_simulation(ship: ExtendedModel) -> float:
     """Of all data, beside one without roll."""
-    return 1.0 if ship.roll is None else TUNING.roll_work
+    return 1.0 if ship.roll is None else ROLL_WORK
 
 
 FURTHER = "further causes"
@@ -224,7 +243,7 @@ def round_tests(
         c for c in open_candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most
     ]
     tests = score_tests(base, candidates, rng)
-    work.progress.done += TUNING.tests_work
+    work.progress.done += TESTS_WORK
     return tests
 
 
@@ -237,7 +256,7 @@ def has_rivals(candidate: Candidate, tests: Sequence[ScoreTest]) -> bool:
     """Whether another candidate's statistic is a good share of this one's, so that it may gain more once fitted."""
     own = [test.statistic for test in tests if same_effects_as_any(test.candidate, [candidate])]
     others = [test.statistic for test in tests if not same_effects_as_any(test.candidate, [candidate])]
-    least = TUNING.leading_share * max(own, default=0.0) - TUNING.statistic_margin
+    least = LEADING_SHARE * max(own, default=0.0) - TUNING.statistic_margin
     return max(others, default=0.0) > least
 
 
@@ -288,9 +307,7 @@ def _rough_fits(
     known = work.fits_beside(base)
     keys = [(far, point.keys, tuple(sorted(point.effects.items()))) for point in points]
     waiting = {key: point for key, point in zip(keys, points, strict=True) if key not in known}
-    efforts = [
-        (TUNING.first_steps + 1) * work_of_simulation(base.ship.with_effects(p.effects)) for p in waiting.values()
-    ]
+    efforts = [(FIRST_STEPS + 1) * work_of_simulation(base.ship.with_effects(p.effects)) for p in waiting.values()]
     results = in_order(_rough_fit, (base, windows, far), [(point,) for point in waiting.values()])
     for index, (key, point) in enumerate(waiting.items()):
         work.tell(f"fitting {point.test.candidate.cause}", sum(efforts[index:]))
@@ -343,7 +360,7 @@ def _best_on_held_out(
 
 
 def _is_about_as_likely(rival: FittedCandidate, first: FittedCandidate) -> bool:
-    return rival.likelihood_gain > TUNING.about_as_likely * first.likelihood_gain
+    return rival.likelihood_gain > ABOUT_AS_LIKELY * first.likelihood_gain
 
 
 def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_number: bool) -> list[FittedCandidate]:
@@ -357,15 +374,15 @@ def _rivals(first: FittedCandidate, accepted: Sequence[FittedCandidate], *, any_
         most = first.numbers if likely and other else first.numbers - 1
         if ((any_number and other) or item.numbers <= most) and (likely or other):
             found.setdefault(item.candidate.cause, item)
-    return [*found.values()][: TUNING.shortlist if any_number else TUNING.rivals]
+    return [*found.values()][: TUNING.shortlist if any_number else RIVALS]
 
 
 def _rough_fit(base: Fit, windows: Windows, far: bool, point: StartingPoint) -> FittedCandidate | None:
     """A fit of few steps; from where the base is, where one that begins far away ends worse than the base."""
-    found = fit_candidate(base, windows, point, far=far, steps=TUNING.first_steps)
+    found = fit_candidate(base, windows, point, far=far, steps=FIRST_STEPS)
     if not far or (found is not None and found.likelihood_gain > 0):
         return found
-    return fit_candidate(base, windows, starting_point(base, point.test), steps=TUNING.first_steps) or found
+    return fit_candidate(base, windows, starting_point(base, point.test), steps=FIRST_STEPS) or found
 
 
 def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
@@ -377,7 +394,7 @@ def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
     first = accepted[0]
     if not first.candidate.imitates:
         return first
-    enough = TUNING.nearly_as_much * first.likelihood_gain
+    enough = NEARLY_AS_MUCH * first.likelihood_gain
     simple = [item for item in accepted[1:] if len(item.keys) < len(first.keys) and not item.candidate.imitates]
     return next((item for item in simple if item.likelihood_gain >= enough), first)
 
@@ -385,7 +402,7 @@ def simplest(accepted: list[FittedCandidate]) -> FittedCandidate:
 def _alternatives(chosen: FittedCandidate, fitted: list[FittedCandidate]) -> tuple[Rival, ...]:
     """The best candidate of every other kind that explains the data as well, or a good share as much."""
     found: dict[object, Rival] = {}
-    most = max(TUNING.equivalent_within, (1.0 - TUNING.rival_share) * chosen.likelihood_gain)
+    most = max(TUNING.equivalent_within, (1.0 - RIVAL_SHARE) * chosen.likelihood_gain)
     for other in fitted:
         trails_by = chosen.penalised_gain - other.penalised_gain
         if kind_of(other.candidate) != kind_of(chosen.candidate) and trails_by < most:
@@ -434,7 +451,7 @@ def _leading(rough: list[FittedCandidate]) -> list[FittedCandidate]:
         item
         for item in rough
         if item.likelihood_gain
-        > (TUNING.simple_share if item.numbers < best.numbers else TUNING.leading_share) * best.likelihood_gain
+        > (SIMPLE_SHARE if item.numbers < best.numbers else LEADING_SHARE) * best.likelihood_gain
         - TUNING.statistic_margin
     ]
 

@@ -21,7 +21,15 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.processes import in_order
 from expdesign.values import Array
 
-FROM_NOTHING = FitOptions(steps=TUNING.short_steps)
+SHORT_S, MIDDLE_S = 45.0, 140.0  # length of short windows, and of those between short and long ones [s]
+FEWEST_SAMPLES = 30  # of a short window
+SHORT_STEPS = 6  # Gauss-Newton steps in short windows
+# candidates that gain less than this share of the best in short windows are not fitted in long ones
+LEAST_GAIN_SHARE = 0.75
+REFINED_GRID = 11  # values of the second grid search
+
+
+FROM_NOTHING = FitOptions(steps=SHORT_STEPS)
 """Noise of unknown size."""
 
 
@@ -83,7 +91,7 @@ def _grid_search(base: Fit, candidate: Candidate) -> tuple[str, float, float]:
         inside = tried[statistics > statistics.max() - scipy.stats.chi2.isf(TUNING.level, 1)]
         std = max(float(np.ptp(inside)) / 4.0, width / 3.5)
         low, high = tried[max(place - 1, 0)], tried[min(place + 1, len(tried) - 1)]
-        values = tuple(np.linspace(low, high, TUNING.refined_grid).tolist())
+        values = tuple(np.linspace(low, high, REFINED_GRID).tolist())
     return key, best, std
 
 
@@ -102,7 +110,7 @@ def fit_short_windows(base: Fit, windows: Windows) -> Fit | None:
 
     None where windows are short anyway, or where the model cannot be fitted in them.
     """
-    samples = max(TUNING.fewest_samples, round(TUNING.short_s / windows.sample_s))
+    samples = max(FEWEST_SAMPLES, round(SHORT_S / windows.sample_s))
     if 2 * samples > windows.measured.shape[1]:
         return None
     short = replace(windows.cut_shorter(samples), white_noise=True)
@@ -141,7 +149,7 @@ def start_in_short_windows(
         if found is None
         else replace(point, effects=point.effects | {key: found.value(key) for key in found.keys})
         for number, (point, found, gain) in enumerate(zip(points, fits, gains, strict=True))
-        if number < certain or gain > TUNING.least_gain_share * max(gains)
+        if number < certain or gain > LEAST_GAIN_SHARE * max(gains)
     ]
 
 
@@ -168,7 +176,7 @@ def start_nearer(base: Fit, windows: Windows, point: StartingPoint) -> tuple[Ext
     """
     guess = base.ship.with_effects(point.effects)
     before, after = _squared_error(base, windows, base.ship), _squared_error(base, windows, guess)
-    middle = windows.cut_shorter(max(TUNING.fewest_samples, round(TUNING.middle_s / windows.sample_s)))
+    middle = windows.cut_shorter(max(FEWEST_SAMPLES, round(MIDDLE_S / windows.sample_s)))
     ship = guess
     if after > 0.5 * before and middle.measured.shape[1] < windows.measured.shape[1]:
         part, starts = replace(middle, white_noise=True), initial_states(middle, guess.states)

@@ -15,9 +15,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from expdesign.dictionary.spec import DURATION, WHOLE_PERIODS, Family, Setting
-from expdesign.dictionary.tuning import TUNING
 from expdesign.errors import InputError
 from expdesign.values import Array
+
+TONES = 4  # sines for each of the three velocities
+LEAST_SWING = 0.5  # least amplitude to both sides of a wave before it is scaled to amplitude 1
+
 
 # Smooth shapes of reference motions: without jumps, because actuators have rate limits.
 
@@ -56,7 +59,7 @@ def flat_wave(time_s: Array, *, period_s: float) -> Array:
     fade = envelope(time_s, length_s=period_s / 12)
     weights = np.r_[0.5, np.ones(len(time_s) - 2), 0.5]
     centred = fade * (wave - weights @ (fade * wave) / max(weights @ fade, 1e-300))
-    if not (centred.max() > TUNING.least_swing and centred.min() < -TUNING.least_swing):
+    if not (centred.max() > LEAST_SWING and centred.min() < -LEAST_SWING):
         raise InputError(
             f"period_s is {period_s:g}, expected a full swing within duration_s = {time_s[-1]:g} and several samples "
             f"of {time_s[1]:g} s within a swing"
@@ -148,8 +151,8 @@ INWARD_SPIRAL = Family(
 
 def _sum_of_sines(time_s: Array, *, period_s: float, first: int) -> Array:
     """Largest modulus 1, harmonics first, first + 3, ... of a period."""
-    place = np.arange(TUNING.tones)
-    phase = -np.pi * place * (place + 1) / TUNING.tones
+    place = np.arange(TONES)
+    phase = -np.pi * place * (place + 1) / TONES
     angles = 2 * np.pi * (first + 3 * place)[:, None] * time_s / period_s + phase[:, None]
     wave = np.sin(angles).sum(axis=0) * envelope(time_s, length_s=period_s / 12)
     return np.asarray(wave / max(float(np.abs(wave).max()), 1e-12))

@@ -13,6 +13,10 @@ from expdesign.durations.tuning import TUNING
 from expdesign.errors import NotInformative
 from expdesign.values import Array
 
+NEARLY_SINGULAR = 1e-10  # below this, elimination loses digits that matter
+OUTSIDE_RANGE = 1e-6  # share of an estimated combination that may lie outside the range of a singular matrix
+
+
 Indices = NDArray[np.intp]
 
 
@@ -133,7 +137,7 @@ def stacked_values(measure: Measure, M: Array) -> Array:
     if regular.any():
         values[regular] = measure.values(M[regular])
     if measure.L.shape[1] < M.shape[1]:
-        doubtful = eigenvalues[:, 0] < TUNING.nearly_singular * eigenvalues[:, -1]
+        doubtful = eigenvalues[:, 0] < NEARLY_SINGULAR * eigenvalues[:, -1]
         values[doubtful] = [_value_within(measure, item) for item in M[doubtful]]
     return values
 
@@ -143,10 +147,7 @@ def _value_within(measure: Measure, M: Array) -> float:
     eigenvalues, vectors = np.linalg.eigh(M)
     seen = vectors[:, eigenvalues > TUNING.singular * max(eigenvalues[-1], 0.0)]
     missing = measure.L - seen @ (seen.T @ measure.L)
-    if (
-        not seen.size
-        or (np.linalg.norm(missing, axis=0) > TUNING.outside_range * np.linalg.norm(measure.L, axis=0)).any()
-    ):
+    if not seen.size or (np.linalg.norm(missing, axis=0) > OUTSIDE_RANGE * np.linalg.norm(measure.L, axis=0)).any():
         return -np.inf
     return float(measure.transformed(seen.T).values(np.diag(eigenvalues[-seen.shape[1] :])))
 

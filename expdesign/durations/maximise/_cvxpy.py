@@ -22,8 +22,12 @@ from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria import LogDet, LogTrace, Measure
 from expdesign.durations.criteria.models import Indices, Piece
 from expdesign.durations.limits import Polytope
-from expdesign.durations.tuning import TUNING
 from expdesign.values import Array
+
+# added to the diagonal of a curvature, as a share of its trace, to make it positive definite
+CURVATURE_ROUNDING = 1e-14
+SOLVER_TOLERANCE = 1e-11  # gap and feasibility tolerance of the conic solver
+
 
 ALL = slice(None)
 
@@ -77,7 +81,7 @@ def newton_step(
     pieces, floors = task.objective.pieces, [floor.pieces[0] for floor in task.floors]
     weighed = zip((*mixture, *floor_prices), (*pieces, *floors), strict=True)
     H = np.sum([weight * piece.curvature(w, chosen) for weight, piece in weighed if weight > 0], axis=0)
-    H[np.diag_indices_from(H)] += TUNING.curvature_rounding * np.trace(H)
+    H[np.diag_indices_from(H)] += CURVATURE_ROUNDING * np.trace(H)
     step, height = cp.Variable(len(chosen)), cp.Variable()
     fixed = np.array(w)
     fixed[chosen] = 0.0
@@ -157,7 +161,7 @@ def _multiplier(piece: Piece, dual: Array | None, w: Array) -> Array:
 def _solve(problem: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # an inaccurate answer is judged by its certificate
-        tolerance = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), TUNING.solver_tolerance)
+        tolerance = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), SOLVER_TOLERANCE)
         try:
             problem.solve(solver=cp.CLARABEL, max_threads=1, **tolerance)  # more threads mostly wait for each other
         except cp.error.SolverError:

@@ -26,6 +26,17 @@ from expdesign.durations.criteria.models import whitening
 from expdesign.durations.tuning import TUNING
 from expdesign.values import Array, seal
 
+SMALLEST_SET = 50  # least size of a working set, and about as many as may join it at a time
+SET_PER_DIMENSION = 4  # the same per dimension of the information matrix
+FIRST_GAP = 1e-2  # to which the first working set is solved
+SHARPER = 1e-2  # ratio of the gaps of successive working sets
+CENTRING_STEPS = 60  # most Newton steps for one barrier weight
+MOST_SETS = 60  # working sets
+BARRIER_FRACTION = 1e-7  # fractions below this are removed from the solution of the barrier method
+INDEFINITE = 1e-9  # eigenvalues below minus this are not rounding
+REGULAR_SET = 1e-8  # least eigenvalue of a first working set
+
+
 Indices = NDArray[np.intp]
 
 
@@ -55,7 +66,7 @@ class LargeDesign:
 def rows_of(matrices: Array) -> Array | None:
     """(q, r, d) rows R_q with R_q^T R_q = B_q of (q, d, d), or None where one is not positive semidefinite."""
     values, vectors = np.linalg.eigh(matrices)
-    if (values[:, 0] < -TUNING.indefinite * np.maximum(values[:, -1], 0.0)).any():
+    if (values[:, 0] < -INDEFINITE * np.maximum(values[:, -1], 0.0)).any():
         return None
     return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, :, None] * np.swapaxes(vectors, 1, 2))
 
@@ -73,9 +84,9 @@ def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-
     """
     pool = _Pool.of(rows[:, None, :] if rows.ndim == 2 else rows, prior)
     chosen = _first_set(pool)
-    w, aim = np.full(len(chosen), 1.0 / len(chosen)), max(TUNING.first_gap, tolerance)
+    w, aim = np.full(len(chosen), 1.0 / len(chosen)), max(FIRST_GAP, tolerance)
     best = _evaluated(pool, chosen, w)
-    for _ in range(TUNING.most_sets):
+    for _ in range(MOST_SETS):
         w = _solved(pool, chosen, w, aim)
         found = _evaluated(pool, chosen, w)
         best = min(best, found, key=lambda item: item[0].gap)
@@ -86,9 +97,9 @@ def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-
             break
         if len(joining):
             joining = joining[np.argsort(-sensitivities[joining], kind="stable")[: set_size(pool.dimension)]]
-            kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > TUNING.barrier_fraction)
+            kept = (sensitivities[chosen] > (1 - max(10 * aim, 1e-3)) * pool.dimension) | (w > BARRIER_FRACTION)
             chosen, w = np.r_[chosen[kept], joining], np.r_[w[kept], np.zeros(len(joining))]
-        aim = max(TUNING.sharper * aim, tolerance)
+        aim = max(SHARPER * aim, tolerance)
     return _trimmed(pool, best[0], tolerance)
 
 
@@ -141,7 +152,7 @@ def _chunks(flat: Array) -> Iterator[Array]:
 
 def set_size(dimension: int) -> int:
     """Of a first working set, and the most that join it at a time."""
-    return max(TUNING.smallest_set, TUNING.set_per_dimension * dimension)
+    return max(SMALLEST_SET, SET_PER_DIMENSION * dimension)
 
 
 def _first_set(pool: _Pool) -> Indices:
@@ -154,9 +165,9 @@ def _first_set(pool: _Pool) -> Indices:
     chosen = np.argpartition(-leverage, size)[:size]
     for _ in range(d):
         values, vectors = np.linalg.eigh(pool.prior + pool.parts(chosen).mean(axis=0))
-        if values[0] > TUNING.regular_set * values[-1]:
+        if values[0] > REGULAR_SET * values[-1]:
             return np.sort(chosen)
-        dark = vectors[:, values <= TUNING.regular_set * values[-1]]
+        dark = vectors[:, values <= REGULAR_SET * values[-1]]
         within = pool.sensitivities(np.eye(d) + 1e12 * (np.eye(d) - dark @ dark.T))
         chosen = np.union1d(chosen, np.argsort(-within, kind="stable")[:d])
     return np.arange(count)
@@ -190,7 +201,7 @@ def _centred(pool: _Pool, parts: Array, w: Array, barrier: float) -> Array:
     The function is self-concordant: where the decrement is small against the barrier, full steps are safe. Farther away
     the step is halved until the merit rises.
     """
-    for _ in range(TUNING.centring_steps):
+    for _ in range(CENTRING_STEPS):
         T = root(pool.prior + np.tensordot(w, parts, axes=1))
         white = T @ parts @ T.T
         slope = w * np.trace(white, axis1=1, axis2=2) + barrier
@@ -219,7 +230,7 @@ def _merit(pool: _Pool, parts: Array, w: Array, barrier: float) -> float:
 
 def _trimmed(pool: _Pool, design: LargeDesign, tolerance: float) -> LargeDesign:
     """The design without the fractions that only the barrier keeps above zero, unless that widens the gap."""
-    kept = np.flatnonzero(design.fractions > TUNING.barrier_fraction)
+    kept = np.flatnonzero(design.fractions > BARRIER_FRACTION)
     w = design.fractions[kept] / design.fractions[kept].sum()
     try:
         if len(kept) > 1:

@@ -20,10 +20,21 @@ import numpy as np
 from expdesign.durations.certificate import Certificate, certify
 from expdesign.durations.concave import ConcaveProblem
 from expdesign.durations.criteria.models import Indices, Objective
-from expdesign.durations.maximise.large_scale import d_optimal, rows_of, set_size
+from expdesign.durations.maximise.large_scale import FIRST_GAP, MOST_SETS, d_optimal, rows_of, set_size
 from expdesign.durations.tuning import TUNING
 from expdesign.errors import FloorOutOfReach, NoAnswer, NotInformative
 from expdesign.values import Array
+
+WIDE_GAP = 1e-7  # gap from which a design that no Newton step can sharpen is sought by other means, too
+TARGET_GAP = 1e-10  # gap at which Newton's method ends
+ROUNDING_GAP = 1e-9  # below this gap, a Newton step that does not halve it is the last: the rest is rounding
+LEAST_GAP_OF_STEP = 1e-6  # gap to which the objective of a Newton step is scaled at least
+NEWTON_STEPS = 30  # most Newton steps; six to ten are usual, two or three from a conic optimum
+# a fraction at its least value may change in a Newton step where its net sensitivity falls short of the others' by
+# less, per degree
+MARGIN = 0.01
+CONIC_INEQUALITIES = 5  # most models and floors of such a problem; each costs as much again
+
 
 CVXPY, WORKING_SET, NEWTON = "cvxpy with CLARABEL", "working-set method", "Newton's method"
 NO_CHOICE = "none: least times take all of the time"
@@ -68,7 +79,7 @@ def maximised(task: ConcaveProblem, kind: str = "", *, as_stated: bool = False) 
     if not 1.0 - least.sum() > TUNING.loosening:  # least times take everything
         return _proven(task, least / least.sum(), kind, method=NO_CHOICE)
     best = _by_cvxpy(task, kind) if as_stated and _moderate(task) else None
-    if best is None or not best.gap < (TUNING.target_gap if task.smooth else TUNING.wide_gap):
+    if best is None or not best.gap < (TARGET_GAP if task.smooth else WIDE_GAP):
         few = best is not None and not task.smooth  # fewer at a time give an interior point more digits
         own = _plain_d(task, kind) or _by_working_sets(task, kind, few=few) or _by_newton(task, kind)
         best = min(filter(None, (best, own)), key=lambda found: found.gap, default=None)
@@ -102,7 +113,7 @@ def _prices(proof: Certificate, names: Sequence[str]) -> Array:
 
 def _moderate(task: ConcaveProblem) -> bool:
     """Whether cvxpy takes seconds at most."""
-    few = len(task.objective.pieces) + len(task.floors) <= TUNING.conic_inequalities
+    few = len(task.objective.pieces) + len(task.floors) <= CONIC_INEQUALITIES
     return few and len(task.polytope.least) <= TUNING.conic_candidates
 
 
@@ -131,7 +142,7 @@ def _plain_d(task: ConcaveProblem, kind: str) -> Optimum | None:
     if rows is None:
         return None
     w = np.array(polytope.least)
-    w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=TUNING.target_gap).fractions
+    w[free] += left * d_optimal(rows, prior=piece.matrix(polytope.least) / left, tolerance=TARGET_GAP).fractions
     return _proven(task, w, kind, method=WORKING_SET)
 
 
@@ -147,7 +158,7 @@ def _by_working_sets(task: ConcaveProblem, kind: str, *, few: bool = False) -> O
         return None
     try:
         chosen = _first_set(task)
-        for _ in range(TUNING.most_sets):
+        for _ in range(MOST_SETS):
             part = task.among(chosen)
             found = _by_newton(part, kind) or _by_cvxpy(part, kind)
             if found is None:
@@ -156,8 +167,8 @@ def _by_working_sets(task: ConcaveProblem, kind: str, *, few: bool = False) -> O
             w[chosen] = found.fractions
             here = _proven(task, w, kind, found.multipliers, method=WORKING_SET)
             best = min(filter(None, (best, here)), key=lambda item: item.gap)
-            rising = np.setdiff1d(np.flatnonzero(_excess(here) > TUNING.target_gap), chosen)
-            if best.gap < TUNING.target_gap or not len(rising):
+            rising = np.setdiff1d(np.flatnonzero(_excess(here) > TARGET_GAP), chosen)
+            if best.gap < TARGET_GAP or not len(rising):
                 break
             chosen = np.union1d(chosen, rising[np.argsort(-_excess(here)[rising], kind="stable")[:size]])
     except (np.linalg.LinAlgError, NotInformative):
@@ -184,7 +195,7 @@ def _first_set(task: ConcaveProblem) -> Indices:
         rows = rows_of(piece.matrices[allowed])
         if rows is None:
             raise np.linalg.LinAlgError
-        needed[allowed] |= d_optimal(rows, prior=piece.prior, tolerance=TUNING.first_gap).fractions > 0
+        needed[allowed] |= d_optimal(rows, prior=piece.prior, tolerance=FIRST_GAP).fractions > 0
     if not polytope.plain:
         slope = pieces[0].tangent(polytope.middle()).slope
         roomy = replace(polytope, most=np.maximum(polytope.least, polytope.most / 2))
@@ -214,13 +225,13 @@ def _sharpened(task: ConcaveProblem, best: Optimum, *, least_steps: int = 0) -> 
     from expdesign.durations.maximise._cvxpy import newton_step
 
     here = best
-    for number in range(TUNING.newton_steps):
-        if best.gap < TUNING.target_gap and number >= least_steps:
+    for number in range(NEWTON_STEPS):
+        if best.gap < TARGET_GAP and number >= least_steps:
             break
         proof, w = here.certificate, here.fractions
         prices = _prices(proof, task.floor_names)
         try:
-            gain = float(np.clip(here.gap, TUNING.least_gap_of_step, 1.0))
+            gain = float(np.clip(here.gap, LEAST_GAP_OF_STEP, 1.0))
             chosen = _working_set(task, here)
             step = newton_step(task, w, chosen=chosen, mixture=proof.mixture, floor_prices=prices, gain=gain)
             moved = None if step is None else _ascended(task, here, step)
@@ -230,7 +241,7 @@ def _sharpened(task: ConcaveProblem, best: Optimum, *, least_steps: int = 0) -> 
         except np.linalg.LinAlgError:
             break
         before, best = best.gap, min(best, here, key=lambda item: item.gap)
-        if before / 2 < best.gap < TUNING.rounding_gap:
+        if before / 2 < best.gap < ROUNDING_GAP:
             break
     return best
 
@@ -238,7 +249,7 @@ def _sharpened(task: ConcaveProblem, best: Optimum, *, least_steps: int = 0) -> 
 def _working_set(task: ConcaveProblem, here: Optimum) -> Indices:
     """(c,) fractions above their least value, and those whose net sensitivity lets them rise."""
     proof = here.certificate
-    rising = here.sensitivities - proof.prices > proof.level - TUNING.margin * proof.degree
+    rising = here.sensitivities - proof.prices > proof.level - MARGIN * proof.degree
     return np.flatnonzero(rising | (here.fractions > task.polytope.least))
 
 

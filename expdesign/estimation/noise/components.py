@@ -49,8 +49,15 @@ import scipy
 from numpy.typing import NDArray
 
 from expdesign.estimation.regression import Integers, batch_slices
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
+
+SPECTRUM_BINS = 80  # bins of the periodogram, of equal width in the logarithm of frequency
+SPECTRUM_ITERATIONS = 12  # of reweighted non-negative least squares
+LEAST_LEFT = 0.05  # share of a part of the noise that parameters leave in residuals at a frequency, at least
+MEMORY_DOUBLINGS = 1.0  # how far the memory of a slow part may be from the found one, standard deviation of log2
+ROUNDING = 1e-9  # expected periodogram of a part with unit variance below which it is rounding errors
+LONG_GAP_SAMPLES = 500  # missing samples in a row after which the noise starts again
+
 
 # Rows of a regression in time: stretches without long gaps, and short gaps filled with zeros.
 
@@ -94,7 +101,7 @@ def stretches(batch: Integers, step: Integers, heading: Array | None = None) -> 
     for rows in batch_slices(batch):
         edges = [
             0,
-            *(np.flatnonzero(np.diff(step[rows]) > TUNING.long_gap_samples) + 1).tolist(),
+            *(np.flatnonzero(np.diff(step[rows]) > LONG_GAP_SAMPLES) + 1).tolist(),
             rows.stop - rows.start,
         ]
         for low, high in pairwise(edges):
@@ -172,7 +179,7 @@ def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
     """Slow parts that noise may have in stretches so long; those of the chart only where headings are known."""
     longest = max(part.samples for part in parts)
     memories = MEMORIES[longest >= MEMORIES].tolist()
-    turns = any(part.turn is not None and np.ptp(part.turn) > TUNING.rounding for part in parts)
+    turns = any(part.turn is not None and np.ptp(part.turn) > ROUNDING for part in parts)
     ship, chart = [Slow(memory) for memory in (*memories, np.inf)], [Slow(memory, turning=True) for memory in memories]
     return (*ship, *chart) if turns else tuple(ship)
 
@@ -201,7 +208,7 @@ def directions_of(variances: Array, slow: Sequence[Slow]) -> tuple[Array, Array]
             column = np.zeros(len(variances))
             column[[ends[0], ends[-1]]] = np.array([-1.0, 1.0]) * variances[place] / (ends[-1] - ends[0])
             columns.append(column)
-            before.append(TUNING.memory_doublings**-2.0)
+            before.append(MEMORY_DOUBLINGS**-2.0)
     return np.reshape(columns, (-1, len(variances))).T, np.array(before)
 
 
@@ -288,7 +295,7 @@ def in_bins(frequency: Array, rows: Array) -> tuple[Array, Array]:
     """Means (q, b) of rows (q, f) in bins of frequency (f,), and how many frequencies each bin holds, half for zero."""
     least = frequency[frequency > 0].min(initial=np.pi)
     position = np.log(np.maximum(frequency, least) / least) / np.log(1.001 * np.pi / least)
-    place = np.where(frequency > 0, 1 + (TUNING.spectrum_bins * position).astype(int), 0)
+    place = np.where(frequency > 0, 1 + (SPECTRUM_BINS * position).astype(int), 0)
     _, place, count = np.unique(place, return_inverse=True, return_counts=True)
     weight = np.asarray(np.bincount(place, np.where(frequency > 0, 1.0, 0.5)), dtype=float)
     return np.array([np.bincount(place, row) / count for row in rows]), weight
@@ -390,8 +397,8 @@ def _less(expected: Sequence[Array], parts: Sequence[Stretch], slow: tuple[Slow,
             there = turned[number] if len(part.places) == part.samples else _where(turned[number], part.places)
             mixed = 0.5 * Phi @ C - np.fft.rfft(there, part.padded, axis=0)
             result[number][index] += 2.0 * (Phi.conj() * mixed).real.sum(axis=1) / len(part.places)
-    left = [np.maximum(new, TUNING.least_left * old) for new, old in zip(result, expected, strict=True)]
-    return [np.where(np.abs(shape) > TUNING.rounding, shape, 0.0) for shape in left]
+    left = [np.maximum(new, LEAST_LEFT * old) for new, old in zip(result, expected, strict=True)]
+    return [np.where(np.abs(shape) > ROUNDING, shape, 0.0) for shape in left]
 
 
 def _where(rows: Array, places: Integers) -> Array:
@@ -424,7 +431,7 @@ def _fitted(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array], slo
 def _most_likely(ordinates: Array, shapes: Array, count: Array) -> tuple[Array, float]:
     """Variances (parts,) of parts with these shapes, and minus the logarithm of their likelihood."""
     expected = shapes[0] + shapes[1]
-    for _ in range(TUNING.spectrum_iterations):
+    for _ in range(SPECTRUM_ITERATIONS):
         weight = np.sqrt(count) / expected
         variances, _ = scipy.optimize.nnls((shapes * weight).T, ordinates * weight, maxiter=100 * len(shapes))
         expected = np.maximum(variances @ shapes, 1e-9 * np.max(variances @ shapes))

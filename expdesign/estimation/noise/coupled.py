@@ -26,6 +26,7 @@ import scipy
 
 from expdesign.estimation.noise.components import (
     SENSOR,
+    SPECTRUM_ITERATIONS,
     WHITE,
     Fitted,
     Slow,
@@ -40,7 +41,6 @@ from expdesign.estimation.noise.components import (
 )
 from expdesign.estimation.noise.covariance import as_correlation, sums_of_parts
 from expdesign.estimation.regression import Integers
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 
@@ -160,7 +160,7 @@ class _Spectra:
         variances[:, [WHITE, SENSOR]] = 1.0
         pairs = np.array([np.eye(n)[[o, q]].T @ np.eye(n)[[q, o]] for o in range(n) for q in range(o)])
         designs, root = self.designs[:, places].reshape(-1, *self.binned.shape), np.sqrt(self.count)[:, None, None]
-        for _ in range(TUNING.spectrum_iterations):
+        for _ in range(SPECTRUM_ITERATIONS):
             half = np.linalg.inv(np.linalg.cholesky(self.expected(variances, common)))
             shared = [sign * pair * self._shared(variances) for pair in pairs for sign in (1.0, -1.0)]
             turned = root * (half @ np.stack([*designs, *shared, self.binned]) @ half.conj().swapaxes(1, 2))

@@ -47,6 +47,11 @@ from expdesign.estimation.regression import Integers, batch_slices
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
+SLOWEST_POLE = 0.98  # bound on the autoregressive coefficient of a whitening filter
+LONGEST_LAG_SHARE = 8  # automatic lags end at the longest batch divided by this
+FEW_LAGS = 10  # up to this number, sums of products are faster than Fourier transforms
+
+
 # Long-run covariance of a vector series: how its sum varies when samples depend on each other.
 
 
@@ -111,7 +116,7 @@ def automatic_lags(scores: Array, batch: Integers, step: Integers, *, kernel: st
         return 0
     rho = np.clip(lagged[power > 0] / power[power > 0], -0.97, 0.97)
     alpha = 4.0 * rho**2 / (1.0 - rho) ** 4 if order == 2 else 4.0 * rho**2 / (1.0 - rho**2) ** 2
-    limit = max(1, max(len(rows) for rows in batches) // TUNING.longest_lag_share)
+    limit = max(1, max(len(rows) for rows in batches) // LONGEST_LAG_SHARE)
     lags = constant * (float(np.median(alpha)) * len(scores)) ** (1.0 / (2 * order + 1))
     return int(np.clip(np.ceil(lags), 1, limit))
 
@@ -131,7 +136,7 @@ def _filled(scores: Array, batch: Integers, step: Integers) -> list[Array]:
 def _windowed(series: Array, weights: Array) -> Array:
     """Sum over lags of w(l) Gamma(l); for many lags by way of the cross-periodogram."""
     lags = len(weights) - 1
-    if lags <= TUNING.few_lags:
+    if lags <= FEW_LAGS:
         near = series * (weights[0] / 2.0)
         for lag in range(1, min(lags, len(series) - 1) + 1):
             near[lag:] += weights[lag] * series[:-lag]
@@ -306,5 +311,5 @@ def _fitted(series: Sequence[Array], present: Sequence[Array], c: float) -> tupl
     filtered = [scipy.signal.lfilter([1.0], [1.0, c], rows) * ones for rows, ones in zip(series, present, strict=True)]
     power = sum(float(x @ x) for x in filtered)
     crossed = sum(float(x[1:] @ x[:-1]) for x in filtered)
-    a = float(np.clip(crossed / power, -TUNING.slowest_pole, TUNING.slowest_pole)) if power > 0 else 0.0
+    a = float(np.clip(crossed / power, -SLOWEST_POLE, SLOWEST_POLE)) if power > 0 else 0.0
     return power - 2.0 * a * crossed + a**2 * power, Colour(a, c)

@@ -12,8 +12,12 @@ import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.estimation.output_error.problem import Problem
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
+
+MOST_STEPS = 40  # of Gauss and Newton at one horizon
+MOST_DAMPING = 1e10  # of such a step, relative to the diagonal; with more, nothing is left to find
+REMEMBERED_STEPS = 5  # that the next one is mixed with
+MOST_CORRELATED = 0.9999  # correlation of residuals from sample to sample that counts, at most
 
 
 def cost(problem: Problem, values: Array, residuals: Array) -> float:
@@ -46,18 +50,18 @@ def minimised(
     with np.errstate(over="ignore", invalid="ignore"):
         point = _point(problem, values, starts)
         _check_bounded(problem, np.array(point.cost))
-        for _ in range(TUNING.most_steps):
+        for _ in range(MOST_STEPS):
             normal, least = _normal(problem, point.values, point.states), settled * unit(problem, point.states)
             _check_bounded(problem, normal.S, normal.C, normal.V)
             newer = None
             while newer is None:
                 move = _step(normal, damping)
                 report(move.expected / least)
-                if move.expected < least or damping > TUNING.most_damping:
+                if move.expected < least or damping > MOST_DAMPING:
                     return point.values, point.starts
                 newer = _lower(problem, point, move, before)
                 damping *= 10 if newer is None else 0.1
-            before = [*before, (point, move)][-TUNING.remembered_steps :]
+            before = [*before, (point, move)][-REMEMBERED_STEPS:]
             point = newer
     return point.values, point.starts
 
@@ -143,7 +147,7 @@ def unit(problem: Problem, states: Array) -> float:
     residuals = problem.residuals(states)
     power = np.einsum("lwn,lwn->n", residuals, residuals)
     joined = np.einsum("lwn,lwn->n", residuals[1:], residuals[:-1])
-    rho = np.clip(np.divide(joined, power, out=np.zeros_like(power), where=power > 0), 0.0, TUNING.most_correlated)
+    rho = np.clip(np.divide(joined, power, out=np.zeros_like(power), where=power > 0), 0.0, MOST_CORRELATED)
     level = float(power @ problem.weights) / max(1, int(np.isfinite(problem.measured).sum()))
     return float(np.min((1 + rho) / (1 - rho))) * max(1.0, level)
 

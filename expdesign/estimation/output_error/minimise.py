@@ -52,6 +52,22 @@ from expdesign.progress import Estimated, Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
 
+FIRST_HORIZON_SAMPLES = 8  # of output error
+HORIZON_GROWTH = 4  # ratio of successive horizons of output error
+# where the model diverges at a horizon, others are tried down to the one, and up to a ratio of it of the other
+SHORTEST_HORIZON_SAMPLES, LEAST_HORIZON_GROWTH = 3, 1.2
+DIVERGED_TIMES = 10.0  # a simulation so many times as fast as the largest measurement has diverged
+MOST_PARTIAL_SEARCHES = 3  # without stretches in which the model diverges, of one horizon
+MOST_LEFT_OUT = 0.5  # share of these, at most
+EXPECTED_STEPS = 3  # of Gauss and Newton on all data, for the progress told; twice as many on part of them
+COVARIANCE_STEPS = 4.0  # how many such steps the covariance takes as long as
+# how many samples a step could do while libraries are loaded, and while a stage is compiled
+LOADING_SAMPLES, COMPILING_SAMPLES = 7e4, 7e3
+SLOWEST_CONVERGENCE = 1.5  # least ratio of successive expected decreases that the progress told counts on
+SETTLED_COST = 1e-4  # expected decrease of the cost, in squared standard deviations, that ends the last horizons
+ROUGH_COST = 0.1  # the same for earlier horizons
+
+
 ACTIVITY = "fitting simulations to the data"
 
 
@@ -66,15 +82,15 @@ class Steps:
     def __init__(self, stages: Sequence[tuple[float, int]], progress: Progress) -> None:
         """Begin before the first stage, with the libraries loaded."""
         self._stages, self._place, self._taken, self._before = list(stages), -1, 0, np.inf
-        self._estimated = Estimated(progress, after=TUNING.covariance_steps * stages[-1][0])
-        self._estimated.done = TUNING.loading_samples
+        self._estimated = Estimated(progress, after=COVARIANCE_STEPS * stages[-1][0])
+        self._estimated.done = LOADING_SAMPLES
         self._tell(0.0)
 
     def begin(self) -> None:
         """The next stage is compiled, and then begun."""
         self._place, self._taken, self._before = self._place + 1, 0, np.inf
         work, expected = self._stages[self._place]
-        self._estimated.done += TUNING.compiling_samples
+        self._estimated.done += COMPILING_SAMPLES
         self._tell(expected * work)
 
     def insert(self, work: float, expected: int) -> None:
@@ -87,7 +103,7 @@ class Steps:
         work, expected = self._stages[self._place]
         left = float(max(1, expected - self._taken))
         if np.isfinite(self._before) and excess > 0:
-            shrinks = np.log(max(self._before / excess, TUNING.slowest_convergence))
+            shrinks = np.log(max(self._before / excess, SLOWEST_CONVERGENCE))
             left = min(max(np.log(max(excess, 1.0)) / shrinks, 0.0) + 1.0, 2.0 * expected)
         self._tell(left * work)
         self._before, self._taken = excess, self._taken + 1
@@ -99,7 +115,7 @@ class Steps:
 
     def _tell(self, left: float) -> None:
         later = self._stages[self._place + 1 :]
-        self._estimated.tell(ACTIVITY, left + sum(work * steps + TUNING.compiling_samples for work, steps in later))
+        self._estimated.tell(ACTIVITY, left + sum(work * steps + COMPILING_SAMPLES for work, steps in later))
 
 
 def minimise_output_error(
@@ -146,7 +162,7 @@ def minimise_output_error(
             values, starts = minimised(problem, values, starts, settled=stage.settled, report=steps.report)
         except NoAnswer:
             if stage.excerpt.without:  # nothing is gained so
-                stages = [replace(later[0], attempts=TUNING.most_partial_searches), *later[1:]]
+                stages = [replace(later[0], attempts=MOST_PARTIAL_SEARCHES), *later[1:]]
                 continue
             easier = _without_diverging(stage, problem, values, starts) or _between(answered, stage)
             if easier is None:
@@ -224,14 +240,14 @@ def _stages(record: Record, fitting: Fitting) -> list[Stage]:
         known_s = fitting.begun.horizon_s
         growing = [] if known_s is None else [samples for samples in growing if samples * time_s > known_s]
     rough = [Excerpt(samples=samples, most=TUNING.rough_samples) for samples in growing]
-    thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / TUNING.first_horizon_samples))
+    thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / FIRST_HORIZON_SAMPLES))
     if thinner > 1:
         rough.append(Excerpt(samples=-(-last // thinner), every=thinner))
     whole = Excerpt(samples=last)
     return [
-        *(Stage(excerpt=item, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps) for item in rough),
-        Stage(excerpt=whole, settled=TUNING.rough_cost, steps=TUNING.expected_steps),
-        Stage(excerpt=whole, settled=TUNING.settled_cost, steps=TUNING.expected_steps),
+        *(Stage(excerpt=item, settled=ROUGH_COST, steps=2 * EXPECTED_STEPS) for item in rough),
+        Stage(excerpt=whole, settled=ROUGH_COST, steps=EXPECTED_STEPS),
+        Stage(excerpt=whole, settled=SETTLED_COST, steps=EXPECTED_STEPS),
     ]
 
 
@@ -242,27 +258,27 @@ def _without_diverging(stage: Stage, problem: Problem, values: Array, starts: Ar
     """
     with np.errstate(over="ignore", invalid="ignore"):
         largest = np.abs(problem.states(values, starts)).max(axis=(0, 2))
-    diverges = ~(largest < TUNING.diverged_times * np.nanmax(np.abs(problem.measured)))
-    if stage.attempts >= TUNING.most_partial_searches or not 0 < diverges.sum() < TUNING.most_left_out * len(diverges):
+    diverges = ~(largest < DIVERGED_TIMES * np.nanmax(np.abs(problem.measured)))
+    if stage.attempts >= MOST_PARTIAL_SEARCHES or not 0 < diverges.sum() < MOST_LEFT_OUT * len(diverges):
         return None
     places = zip(problem.batch[diverges].tolist(), problem.first[diverges].tolist(), strict=True)
     excerpt = replace(stage.excerpt, without=frozenset(places))
-    return Stage(excerpt=excerpt, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps)
+    return Stage(excerpt=excerpt, settled=ROUGH_COST, steps=2 * EXPECTED_STEPS)
 
 
 def _between(answered: int, stage: Stage) -> Stage | None:
     """A search of a horizon between that of the last answer and one that has none; None where these are near."""
-    samples = round(math.sqrt(max(answered, TUNING.shortest_horizon_samples) * stage.excerpt.length))
-    if samples > stage.excerpt.length / TUNING.least_horizon_growth:
+    samples = round(math.sqrt(max(answered, SHORTEST_HORIZON_SAMPLES) * stage.excerpt.length))
+    if samples > stage.excerpt.length / LEAST_HORIZON_GROWTH:
         return None
     excerpt = Excerpt(samples=samples, most=TUNING.rough_samples)
-    return Stage(excerpt=excerpt, settled=TUNING.rough_cost, steps=2 * TUNING.expected_steps)
+    return Stage(excerpt=excerpt, settled=ROUGH_COST, steps=2 * EXPECTED_STEPS)
 
 
 def _horizons(full: int) -> list[int]:
     horizons = [full]
-    while horizons[0] > TUNING.first_horizon_samples * TUNING.horizon_growth:
-        horizons.insert(0, -(-horizons[0] // TUNING.horizon_growth))
+    while horizons[0] > FIRST_HORIZON_SAMPLES * HORIZON_GROWTH:
+        horizons.insert(0, -(-horizons[0] // HORIZON_GROWTH))
     return horizons
 
 

@@ -12,10 +12,11 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, drive_of, heading_of, parts_of
 from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
-from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Sensors
+
+MOST_FIRST_WEIGHT = 1e4  # weight of the first sample of a stretch, to that of another, at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +130,7 @@ class Problem:
         First samples weigh by the sensors' noise: a simulation that may begin anywhere makes up for a wrong model so.
         """
         rows = np.broadcast_to(self.weights, self.measured.shape).copy()
-        rows[0] = np.clip(1.0 / np.maximum(self.sensed, 1e-300), self.weights, TUNING.most_first_weight * self.weights)
+        rows[0] = np.clip(1.0 / np.maximum(self.sensed, 1e-300), self.weights, MOST_FIRST_WEIGHT * self.weights)
         return np.where(np.isfinite(self.measured), rows, 0.0)
 
     def departure(self, values: Array) -> Array:

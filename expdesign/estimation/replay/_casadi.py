@@ -15,12 +15,14 @@ import numpy as np
 
 from expdesign.estimation.regression import drive_width
 from expdesign.estimation.replay.compiled import INTEGRATORS, Called, Simulate, Stretches
-from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import motion_rates
 from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, VesselModel
+
+BLOCK_INSTRUCTIONS = 20_000  # size of the flat CasADi functions that simulations are cut into
+
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 
@@ -58,7 +60,7 @@ def batch_simulator(
 def _chained(step: ca.Function, samples: int) -> Simulate:
     """Many samples of a step (state, inputs, parameters) -> state, a block of them as one flat function."""
     n, m, p = (step.size1_in(index) for index in range(3))
-    length = max(1, min(samples - 1, TUNING.block_instructions // step.n_instructions()))
+    length = max(1, min(samples - 1, BLOCK_INSTRUCTIONS // step.n_instructions()))
     x, drive, theta = ca.SX.sym("x", n), ca.SX.sym("i", m, length), ca.SX.sym("p", p)
     states = [x]
     for sample in range(length):

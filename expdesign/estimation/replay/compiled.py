@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from expdesign.estimation.regression import Integers
-from expdesign.estimation.tuning import TUNING
 from expdesign.processes import shared_among
 from expdesign.simulation import euler_step, rk4_step
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import VesselModel
+
+BLOCK_SAMPLES = 256  # of a stretch, simulated at once
+SIMULATED_POINTS, BLOCK_POINTS = 1024, 4096  # samples of all stretches, simulated or differentiated at once
+
 
 # Stretches of data that are to be simulated side by side.
 
@@ -177,7 +180,7 @@ def compiled(stretches: Stretches) -> Compiled:
     from expdesign.estimation.replay._casadi import stretch_functions  # CasADi takes a second to load
 
     length, count = stretches.drive.shape[:2]
-    steps = min(max(1, length - 1), TUNING.block_samples)
-    side_by_side = min(count, -(-TUNING.simulated_points // steps))
-    block = (steps, side_by_side, min(max(1, length - 1) * count, TUNING.block_points))
+    steps = min(max(1, length - 1), BLOCK_SAMPLES)
+    side_by_side = min(count, -(-SIMULATED_POINTS // steps))
+    block = (steps, side_by_side, min(max(1, length - 1) * count, BLOCK_POINTS))
     return Compiled(stretches, block, *stretch_functions(stretches, *block, threads=shared_among()))

@@ -56,11 +56,13 @@ from expdesign.estimation.regression import (
     room_for,
 )
 from expdesign.estimation.replay.replay import Replay
-from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import to_body
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import NUMPY, column_name
+
+SHORTEST_STRETCH = 3  # samples between steered ones that are worth a batch
+
 
 HEADINGS = ("measured", "simulated")
 WINDS = ("lagged", "mean", "measured")
@@ -277,7 +279,7 @@ def _open_stretches(batch: Batch) -> list[Batch]:
     return [
         replace(batch.cut(slice(begin, end)), name=f"{batch.name}, sample {begin + 1} to {end}")
         for begin, end in edges.reshape(-1, 2).tolist()
-        if end - begin >= TUNING.shortest_stretch
+        if end - begin >= SHORTEST_STRETCH
     ]
 
 

@@ -15,8 +15,13 @@ import numpy as np
 import scipy
 
 from expdesign.errors import NotInformative
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array, seal
+
+UNSEEN = 1e-10  # relative singular value below which a combination of parameters is not visible in the data
+FAINT = 1e-5  # relative singular value below which least squares gets a warning
+WEAK_STATISTIC = 10.0  # Cragg-Donald statistic per instrument below which instruments get a warning
+SMALL_WEIGHT = 0.05  # least weight of a parameter that a message names
+NAMED_PARAMETERS = 4  # most parameters of a combination that a message names
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,13 +42,9 @@ class Direction:
         seal(self, weights="k")
 
     def __str__(self) -> str:
-        pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[: TUNING.named_parameters]
+        pairs = list(zip(self.parameters, self.weights.tolist(), strict=True))[:NAMED_PARAMETERS]
         text = " ".join(f"{'-' if weight < 0 else '+'} {abs(weight):.2f} {name}" for name, weight in pairs)
-        more = (
-            f" and {len(self.parameters) - TUNING.named_parameters} more"
-            if len(self.parameters) > TUNING.named_parameters
-            else ""
-        )
+        more = f" and {len(self.parameters) - NAMED_PARAMETERS} more" if len(self.parameters) > NAMED_PARAMETERS else ""
         names = " and ".join(name for name, _ in pairs)
         return f"{names}: {text.removeprefix('+ ')}{more}" if len(pairs) > 1 else self.parameters[0]
 
@@ -81,11 +82,11 @@ def null_space(
     """
     sizes, rows = _right_vectors(moment)
     top = max(float(sizes[0]), 1e-300)
-    dark = sizes <= TUNING.unseen * top
+    dark = sizes <= UNSEEN * top
     unseen = [_direction(names, vector, 0.0) for vector in _sparse(rows[dark])]
     faint: list[Direction] = []
     if exogenous:
-        weak = ~dark & (sizes <= TUNING.faint * top)
+        weak = ~dark & (sizes <= FAINT * top)
         faint = [_direction(names, row, float(size / top)) for size, row in zip(sizes[weak], rows[weak], strict=True)]
     elif second is not None and not dark.any():
         faint = _weak(moment, second, names, samples)
@@ -116,7 +117,7 @@ def _weak(G: Array, second: Second, names: tuple[str, ...], samples: int) -> lis
     left = left + max(1e-9, -2.0 * float(np.linalg.eigvalsh(left)[0])) * np.eye(len(left))  # rounding
     ratios, vectors = scipy.linalg.eigh((explained + explained.T) / 2, (left + left.T) / 2)
     statistics = ratios * samples / len(names)
-    weak = statistics < TUNING.weak_statistic
+    weak = statistics < WEAK_STATISTIC
     unit = vectors / np.linalg.norm(vectors, axis=0)
     return [_direction(names, unit[:, i], float(np.clip(ratios[i], 0.0, 1.0))) for i in np.flatnonzero(weak)]
 
@@ -155,6 +156,6 @@ def _sparse(basis: Array) -> Array:
 
 
 def _direction(names: tuple[str, ...], vector: Array, strength: float) -> Direction:
-    order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > TUNING.small_weight]
+    order = [int(i) for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SMALL_WEIGHT]
     signed = vector * np.sign(vector[order[0]])
     return Direction(parameters=tuple(names[i] for i in order), weights=signed[order], strength=strength)

@@ -43,9 +43,13 @@ from expdesign.estimation.noise import (
     white_parts,
 )
 from expdesign.estimation.regression import Integers, Regression
+from expdesign.estimation.solve.null_space import UNSEEN
 from expdesign.estimation.solve.systems import Part, Weighting
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
+
+LEAST_FREEDOM = 2.0  # degrees of freedom that a variance is taken to have at least
+WHITE_TEST_LEVEL = 0.01  # of White's test
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +121,7 @@ def _root(P: Array, *, inverse: bool = False) -> Array:
     size = np.sqrt(np.diag(P))
     size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(P / np.outer(size, size))
-    kept = values > TUNING.unseen * values[-1]
+    kept = values > UNSEEN * values[-1]
     roots = np.where(kept, values, 1.0) ** (-0.5 if inverse else 0.5) * kept
     root = (vectors * roots) @ vectors.T
     return np.asarray(root / size if inverse else size[:, None] * root)
@@ -150,7 +154,7 @@ class _Terms:
             even += level * shares.sum(axis=0)
             changing += squares @ shares
             chance += ((squares - level) ** 2).mean() * ((shares - shares.mean(axis=0)) ** 2).sum(axis=0)
-        clear = changing - even > -scipy.special.ndtri(TUNING.white_test_level / len(even)) * np.sqrt(chance)
+        clear = changing - even > -scipy.special.ndtri(WHITE_TEST_LEVEL / len(even)) * np.sqrt(chance)
         return np.where(clear, np.divide(changing, even, out=np.ones_like(even), where=even > 0), 1.0)
 
 
@@ -269,6 +273,4 @@ def widening(variance: Array, doubt: Array) -> Array:
     Source: F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
     """
     freedom = np.divide(2.0 * variance**2, doubt, out=np.full(len(doubt), np.inf), where=doubt > 0)
-    return np.asarray(
-        scipy.special.stdtrit(np.maximum(freedom, TUNING.least_freedom), 0.975) / scipy.special.ndtri(0.975)
-    )
+    return np.asarray(scipy.special.stdtrit(np.maximum(freedom, LEAST_FREEDOM), 0.975) / scipy.special.ndtri(0.975))

@@ -47,6 +47,10 @@ from expdesign.estimation.solve.systems import Weighting as Weighting
 from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array, seal
 
+# of the first model, tried one after the other where an estimate is unstable
+STABILISING_WEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
+
+
 # LS and IV: the estimate, its covariance and its residuals, from a regression and instruments.
 
 
@@ -334,7 +338,7 @@ def _bounded(simulate: Simulate, values: Array, covariance: Array, prior: Prior 
     except Diverged:
         if prior is None:
             raise
-    *some, most = TUNING.stabilising_weights
+    *some, most = STABILISING_WEIGHTS
     for weight in some:
         try:
             return simulate(prior.drawn(values, covariance, weight)), weight

@@ -39,13 +39,16 @@ from expdesign.export.report.checks import day_sentence, day_words, procedure_se
 from expdesign.export.report.content import ReportContent, Run, primitive_runs, relative_information
 from expdesign.export.report.tables import settings_sentence, shown_name
 from expdesign.export.routes import require_verified
-from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Leg, Plan
 from expdesign.values import Array
 from expdesign.vessel import column_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+from expdesign.export.cards.orders import FARTHEST_DANGER_M
+
+RUNS_PER_SHEET = 3  # runs on one sheet
+NAMED_PARAMETERS = 4  # parameters named in the purpose of a run
 
 
 WIDTH_IN, HEIGHT_IN = 3.6, 3.6
@@ -147,7 +150,7 @@ def card_groups(content: ReportContent, runs: Sequence[Run]) -> list[list[Run]]:
     return [
         [group[index] for index in part]
         for group in groups
-        for part in np.array_split(np.arange(len(group)), math.ceil(len(group) / TUNING.runs_per_sheet))
+        for part in np.array_split(np.arange(len(group)), math.ceil(len(group) / RUNS_PER_SHEET))
     ]
 
 
@@ -201,7 +204,7 @@ def _together(runs: list[list[tuple[str, str]]]) -> list[tuple[str, tuple[str, .
 
 def _purpose(content: ReportContent, index: int) -> str:
     share = relative_information(content)[index]
-    order = np.argsort(-share, kind="stable")[: TUNING.named_parameters]
+    order = np.argsort(-share, kind="stable")[:NAMED_PARAMETERS]
     named = [f"{content.parameters[k]} ({words.percent(float(share[k]))})" for k in order.tolist() if share[k] > 0]
     listed = ", ".join(named)
     return f"{listed}: information in per cent of the most informative manoeuvre for each" if named else "none"
@@ -275,9 +278,7 @@ def _danger(danger: Danger, first: int, step: float) -> list[tuple[str, str]]:
 
 def _reach(distance_m: float) -> str:
     return (
-        f"over {words.distance(TUNING.farthest_danger_m)}"
-        if distance_m >= TUNING.farthest_danger_m
-        else words.distance(distance_m)
+        f"over {words.distance(FARTHEST_DANGER_M)}" if distance_m >= FARTHEST_DANGER_M else words.distance(distance_m)
     )
 
 

@@ -13,13 +13,20 @@ from expdesign.dictionary.spec import Primitive
 from expdesign.errors import ExpdesignError
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent, Run
-from expdesign.export.tuning import TUNING
 from expdesign.export.words import NB
 from expdesign.plan.values import Leg
 from expdesign.simulation import steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
 from expdesign.vessel.hull import swept_area
+
+# largest error of the condensed orders, as a share of the range of each signal; larger where `most_order_rows` is
+# reached
+ORDER_TOLERANCE = 0.02
+MOST_ORDER_ROWS = 48  # rows of orders on one sheet
+CALLED_ORDER_S = 10.0  # mean time between orders below which they are too fast to be called out [s]
+FARTHEST_DANGER_M = 5000.0  # distance up to which the nearest danger is stated [m]
+
 
 HEADS = ("helm", "until the heading has changed by", "about, s")
 """Heads of the columns of `heading_rows`."""
@@ -88,9 +95,9 @@ def condensed(values: Array) -> tuple[list[int], float]:
     span = np.ptp(values, axis=0)
     scaled = (values - values.min(axis=0)) / np.where(span > 1e-9, span, np.inf)
     kept = [0, len(values) - 1] if len(values) > 1 else [0]
-    while len(kept) < min(TUNING.most_order_rows, len(values)):
+    while len(kept) < min(MOST_ORDER_ROWS, len(values)):
         worst, place = _worst(scaled, kept)
-        if worst <= TUNING.order_tolerance:
+        if worst <= ORDER_TOLERANCE:
             break
         kept = sorted({*kept, place})
     return kept, _worst(scaled, kept)[0] if len(kept) < len(values) else 0.0
@@ -187,7 +194,7 @@ def orders_notes(content: ReportContent, leg: Leg, rows: list[tuple[str, ...]], 
         "Between the rows all orders change evenly. They differ from commands.csv (one command every "
         f"{step:g} s) by at most {100 * missed:.0f} % of the range of each order. {' '.join(signs)}".rstrip(),
     ]
-    if every < TUNING.called_order_s:
+    if every < CALLED_ORDER_S:
         notes.append(
             f"One order every {every:.2g} s is too fast to be called out. Let the control system execute "
             "commands.csv, and use these rows to monitor it."
@@ -252,8 +259,8 @@ def _ray(pose: Array, start_b: Array, turn_rad: float, forbidden: shapely.Geomet
     """Least distance along the lines of sight [m]."""
     begin = np.array([to_n_frame(start_b, one) for one in pose])
     bearing = pose[:, 2] + turn_rad
-    end = begin + TUNING.farthest_danger_m * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+    end = begin + FARTHEST_DANGER_M * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
     rays = shapely.linestrings(np.stack([begin[:, ::-1], end[:, ::-1]], axis=1))
     hits = shapely.intersection(rays, forbidden)
     away = shapely.distance(hits, shapely.points(begin[:, ::-1]))
-    return float(np.min(np.where(np.isnan(away), TUNING.farthest_danger_m, away)))
+    return float(np.min(np.where(np.isnan(away), FARTHEST_DANGER_M, away)))

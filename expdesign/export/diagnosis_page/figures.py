@@ -15,7 +15,6 @@ from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_te
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
-from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression
@@ -24,6 +23,11 @@ from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.transforms import Bbox
+
+CHANGED_INPUTS = 0.2  # change of inputs, summed in units of their standard deviations, that counts as one
+# errors beyond so many standard deviations of the measurements are not drawn: the simulation has diverged
+MOST_SPREADS = 3.0
+COLOURED_BY_CHANCE = 0.01  # probability that any panel is coloured if nothing depends on anything
 
 
 # The variable that the simulation error depends on if a cause acts, for its figure.
@@ -120,7 +124,7 @@ def _since_change(found: Diagnosis, columns: list[int]) -> tuple[Array, str]:
     scale = np.maximum(np.std(inputs.reshape(-1, inputs.shape[-1]), axis=0), 1e-12)
     change = np.zeros(inputs.shape[:2])
     change[:, 1:] = np.abs(np.diff(inputs, axis=1) / scale).sum(axis=2)
-    return _since(np.asarray(change > TUNING.changed_inputs)) * windows.sample_s, "time since the input changed [s]"
+    return _since(np.asarray(change > CHANGED_INPUTS)) * windows.sample_s, "time since the input changed [s]"
 
 
 def _since(events: NDArray[np.bool_]) -> Array:
@@ -217,7 +221,7 @@ def growth_figure(found: Diagnosis) -> str:
         axes.minorticks_off()
         spread = factor * float(np.nanstd(found.windows.measured[..., OUTPUTS.index(output)]))
         _, top = axes.get_ylim()
-        axes.set_ylim(0.0, min(top, TUNING.most_spreads * spread) if spread > 0 else top)
+        axes.set_ylim(0.0, min(top, MOST_SPREADS * spread) if spread > 0 else top)
         axes.set_title(f"error of {label}")
         axes.set_xlabel("time since the start [s]")
         light_grid(axes)
@@ -277,7 +281,7 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
         for name, values in residuals.variables.items()
         if np.ptp(values) > 0
     }
-    clear = TUNING.coloured_by_chance / sum(len(items) for items in tests.values())
+    clear = COLOURED_BY_CHANCE / sum(len(items) for items in tests.values())
     limits = [1.15 * max(float(np.abs(items[i].mean).max() + items[i].std.max()) for items in tests.values())
               for i in range(len(residuals.outputs))]  # fmt: skip
     ranked = sorted(tests, key=lambda name: min(item.p_value for item in tests[name]))

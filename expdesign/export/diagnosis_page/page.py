@@ -28,8 +28,11 @@ from expdesign.export.diagnosis_page.results import RollVerdict, roll_sentences
 from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
-from expdesign.export.tuning import TUNING
 from expdesign.progress import Progress, silent
+
+DRAWN_STRETCHES = 4  # stretches of data drawn in a diagnosis
+SMALLEST_P_VALUE = 1e-12  # p-values below are printed as this bound in tables
+
 
 # Names of causes and estimates in words, in place of "thrust_gain" or "lag_all_s".
 
@@ -183,7 +186,7 @@ def drawn(found: Diagnosis) -> list[int]:
     error = np.nan_to_num(found.windows.measured - found.simulated_before)[..., :3]
     scale = np.maximum(np.nanstd(found.windows.measured[..., :3], axis=(0, 1)), 1e-12)
     size = np.clip((error / scale) ** 2, 0, 1e6).sum(axis=(1, 2))
-    return [int(index) for index in np.sort(np.argsort(-size)[: TUNING.drawn_stretches])]
+    return [int(index) for index in np.sort(np.argsort(-size)[:DRAWN_STRETCHES])]
 
 
 def _stretch(found: Diagnosis, index: int) -> str:
@@ -248,7 +251,7 @@ def _fit(value: float) -> str:
 
 def _p_value(p_value: float) -> str:
     """Two digits; very small ones depend on the shape of the noise, so only a bound is given."""
-    return f"< {TUNING.smallest_p_value:g}" if p_value < TUNING.smallest_p_value else f"{p_value:.2g}"
+    return f"< {SMALLEST_P_VALUE:g}" if p_value < SMALLEST_P_VALUE else f"{p_value:.2g}"
 
 
 def _data(found: Diagnosis) -> str:

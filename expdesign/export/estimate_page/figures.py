@@ -9,11 +9,14 @@ import numpy as np
 from expdesign.assessment import Assessed, RunCheck
 from expdesign.conventions import OUTPUTS
 from expdesign.export.pages.figures import BLUE, GREY, LINES, light_grid, new_figure, page_figure, plain, svg
-from expdesign.export.tuning import TUNING
 from expdesign.values import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+LINE_POINTS = 500  # points per line: more cannot be told apart at this size
+SHOWN_BEYOND = 0.6  # share of the measured range that is shown beyond it; simulations that leave it are cut off
+
 
 AXES = {
     "u": ("u [m/s]", 1.0),
@@ -49,7 +52,7 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
             simulated = factor * check.simulated[:, column]
             axes.plot(*thinned(batch.time_s, simulated), color=colour, linewidth=1.0, label=plain(f"simulated, {name}"))
     low, high = np.nanmin(measured), np.nanmax(measured)
-    room = TUNING.shown_beyond * (high - low) or 1.0
+    room = SHOWN_BEYOND * (high - low) or 1.0
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, low - room), min(top, high + room))
     axes.set_ylabel(label, fontsize=9)
@@ -58,7 +61,7 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
 
 def thinned(time: Array, values: Array) -> tuple[Array, Array]:
     """About `Tuning.line_points` points at most, with the highest and the lowest of every stretch among them."""
-    stretch = -(-2 * len(values) // TUNING.line_points)
+    stretch = -(-2 * len(values) // LINE_POINTS)
     if stretch < 3:
         return time, values
     kept = []

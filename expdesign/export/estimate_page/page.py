@@ -24,9 +24,13 @@ from expdesign.export.files import (
 )
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
-from expdesign.export.tuning import TUNING
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.vessel import Vessel
+
+FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
+DRAWN_METHODS = 3  # largest number of methods in the figures of runs
+DRAWING_LOADS = 3.0  # how many figures could be drawn while the library for them loads, for the progress told
+
 
 # The content of the page.
 
@@ -52,7 +56,7 @@ class EstimateContent:
         """The methods whose simulations are drawn: the one in the vessel file, then those that simulate most runs."""
         others = [item for item in self.found.methods if item is not self.found.best]
         others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
-        return (self.found.best, *others)[: TUNING.drawn_methods]
+        return (self.found.best, *others)[:DRAWN_METHODS]
 
 
 # Sentences on an estimation: its parameters and data, and which estimate to use.
@@ -208,7 +212,7 @@ def _figures(content: EstimateContent, progress: Progress) -> dict[str, object]:
     found = content.found
     step = found.record.batches[0].sample_time_s
     names = tuple(batch.name for batch in found.record.batches)
-    loading, drawing = in_phases(progress, TUNING.drawing_loads, 3 + len(found.best.runs))
+    loading, drawing = in_phases(progress, DRAWING_LOADS, 3 + len(found.best.runs))
     with report_style():
         loading(DRAWING, 1.0)
         figures: list[object] = []
@@ -274,7 +278,7 @@ def _growth(factor: float) -> str:
     """Growth of an initial error; "" where it is not known."""
     if not math.isfinite(factor):
         return ""
-    return "decays" if factor < TUNING.fast_decay else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
+    return "decays" if factor < FAST_DECAY else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
 
 
 def _percent(value: float) -> str:

@@ -19,12 +19,14 @@ from markupsafe import Markup, escape
 
 from expdesign.export.folder import not_drawn
 from expdesign.export.formats.format import xml_text
-from expdesign.export.tuning import TUNING
 from expdesign.memory import in_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+WIDE_AXIS = 10.0  # ratio of the ends of an axis above which it has fewer ticks
+
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -160,8 +162,8 @@ def round_ticks(axes: Axes) -> None:
     low, high = axes.get_xlim()
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     ladder: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
-    if high / low > TUNING.wide_axis:
-        ladder = (1.0, 2.0, 5.0) if high / low < TUNING.wide_axis**3 else (1.0,)
+    if high / low > WIDE_AXIS:
+        ladder = (1.0, 2.0, 5.0) if high / low < WIDE_AXIS**3 else (1.0,)
     ticks = [step * 10.0**decade for decade in decades for step in ladder if low <= step * 10.0**decade <= high]
     if len(ticks) < 2:
         ticks = [low, high]

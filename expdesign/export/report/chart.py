@@ -29,7 +29,6 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.tuning import TUNING
 from expdesign.indices import DEPTH_BY_DRAUGHT
 from expdesign.plan.runs import dispersion_m
 from expdesign.plan.values import Plan
@@ -40,6 +39,10 @@ from expdesign.vessel.hull import covering_discs, hull_polygons
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import PathPatch
+
+UNCHARTED_SHARE = 1e-6  # share of the allowed water that may be outside the charted depths that bound it
+FOOTPRINT_SEED = 0  # random seed of the footprint figure; the planner uses other random numbers
+FOOTPRINT_PIECES = 40  # places of the hull along a run that its drawn footprint is made of
 
 
 # Latitude and longitude along the edges of the chart, a scale bar, and north.
@@ -140,7 +143,7 @@ def footprints(content: ReportContent) -> list[shapely.Geometry]:
                     content.environment,
                     centres_m=centres,
                     confidence=content.confidence,
-                    rng=np.random.default_rng(TUNING.footprint_seed),
+                    rng=np.random.default_rng(FOOTPRINT_SEED),
                 )
             except NoPlan:
                 radii[leg.name] = None
@@ -152,7 +155,7 @@ def footprints(content: ReportContent) -> list[shapely.Geometry]:
 
 def _covered(pose: Array, radius: Array, hull_b: Array) -> shapely.Geometry:
     count = min(len(pose), len(radius))
-    chosen = np.unique(np.linspace(0, count - 1, TUNING.footprint_pieces).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, FOOTPRINT_PIECES).round().astype(int))
     grown = shapely.buffer(hull_polygons(pose[chosen], hull_b), radius[chosen], quad_segs=4)
     spans = [shapely.union_all(pair).convex_hull for pair in pairwise(grown)]
     return shapely.union_all(spans)
@@ -254,7 +257,7 @@ def safety_contour(area: SeaArea) -> float | None:
     left: shapely.Geometry = area.water
     for depth, polygons in reversed(area.depths):
         left = left.difference(polygons)
-        if left.area <= TUNING.uncharted_share * area.water.area:
+        if left.area <= UNCHARTED_SHARE * area.water.area:
             return float(depth)
     return None
 

@@ -30,7 +30,6 @@ from expdesign.export.pages.figures import (
 from expdesign.export.report.content import ReportContent, primitive_runs, relative_information
 from expdesign.export.report.parameters import Expected
 from expdesign.export.report.tables import shown_names
-from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
@@ -38,6 +37,10 @@ from expdesign.vessel import stem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+LEAST_FRACTION = 1e-6  # time fractions below this count as none
+HULLS = 5  # hulls drawn along the path of a primitive
+NUMBER_GAP = 0.022  # least distance of the numbers of runs, as a share of the figure's width
 
 
 # Durations with the equivalence theorem, information of each primitive, time against accuracy, standard errors.
@@ -62,7 +65,7 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
     whole = np.array(design.repeats) * design.problem.run_s / 60
     axes.barh(rows, whole, height=0.62, color=PRIMITIVE, alpha=0.75, label="in whole runs")
-    used, optimal = design.fractions > TUNING.least_fraction, design.durations_s / 60
+    used, optimal = design.fractions > LEAST_FRACTION, design.durations_s / 60
     axes.plot(optimal[used], rows[used], "D", color="white", markeredgecolor="black", label="optimal", markersize=6)
     for row, (length, count) in enumerate(zip(whole, design.repeats, strict=True)):
         beyond = max(length, optimal[row])
@@ -76,7 +79,7 @@ def _draw_times(axes: Axes, design: DurationDesign) -> None:
 
 def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
     rows = np.arange(len(design.problem.names))
-    used, bound = design.fractions > TUNING.least_fraction, design.certificate.level
+    used, bound = design.fractions > LEAST_FRACTION, design.certificate.level
     net = design.sensitivities - design.certificate.prices
     axes.axvline(bound, color="black", linewidth=1.2, label=f"bound {bound:.4g}")
     shown = design.problem.included  # nothing is to be proved of the others
@@ -279,7 +282,7 @@ def _number_runs(axes: Axes, plan: Plan) -> None:
     for run in primitive_runs(plan):
         leg = plan.legs[run.leg]
         middle = (leg.first + leg.last) / 2 * minutes
-        if middle - last < TUNING.number_gap * plan.commands.duration_s / 60:
+        if middle - last < NUMBER_GAP * plan.commands.duration_s / 60:
             continue  # numbers of runs too short to be told apart here
         last = middle
         axes.annotate(
@@ -329,7 +332,7 @@ def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str
 
 def _draw_path(axes: Axes, pose: Array, hull_b: Array) -> None:
     axes.plot(pose[:, 1], pose[:, 0], color=PRIMITIVE, linewidth=1.6)
-    samples = np.linspace(0, len(pose) - 1, TUNING.hulls).round().astype(int)
+    samples = np.linspace(0, len(pose) - 1, HULLS).round().astype(int)
     hulls = [to_n_frame(hull_b, pose[sample]) for sample in samples]
     for corners in hulls:
         axes.fill(corners[:, 1], corners[:, 0], facecolor="none", edgecolor=GREY, linewidth=0.8)

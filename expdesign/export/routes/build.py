@@ -26,9 +26,11 @@ from expdesign.export.routes.chords import (
 from expdesign.export.routes.fence import Fence, build_fence, fence_polygon
 from expdesign.export.routes.read_plan import PlannedTrack
 from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, XTD_STEP_M, Route, RouteFit, Waypoint, fit_route
-from expdesign.export.tuning import TUNING
 from expdesign.sea_area import as_multipolygon
 from expdesign.values import Array
+
+CORRIDOR = 1.0  # cross-track distance where the water has room for it, in ship lengths
+NAMED_LETTERS = 24  # of a manoeuvre's name in the name of a waypoint
 
 
 def build_route(
@@ -101,7 +103,7 @@ def build_bridge_route(
     for (one, two), (start, end) in zip(pairwise(stops), pairwise(ends), strict=True):
         needed = sides_needed(points[one[0] : two[1] + 1], start, end)
         least = (_rounded_up(needed[0] + fit.curved_m), _rounded_up(needed[1] + fit.curved_m))
-        wanted_m = _rounded_up(TUNING.corridor * track.length_m)
+        wanted_m = _rounded_up(CORRIDOR * track.length_m)
         wide = widened(start, end, least, wanted_m=wanted_m, water=water, half_beam_m=half_beam_m)
         sides.append((_rounded_down(wide[0]), _rounded_down(wide[1])))
     names, held = _names(track, stops), [_held(track, stop) for stop in stops]
@@ -203,7 +205,7 @@ def _names(track: PlannedTrack, stops: list[Stop]) -> list[str]:
 def _name(track: PlannedTrack, one: Stop, two: Stop) -> str:
     runs = _runs(track, one[1], two[0])
     if runs:
-        return f"R{runs[0]:02d} {_run_name(track, runs[0])[: TUNING.named_letters]}"
+        return f"R{runs[0]:02d} {_run_name(track, runs[0])[:NAMED_LETTERS]}"
     later = [number for number in _runs(track, one[1], len(track.trajectory) - 1) if number]
     return _stop_name(track, one) or (f"to R{min(later):02d}" if later else "to goal")
 
@@ -213,7 +215,7 @@ def _stop_name(track: PlannedTrack, stop: Stop) -> str:
     if not numbers:
         return ""
     first = f"R{numbers[0]:02d}{f'-{numbers[-1]:02d}' if len(numbers) > 1 else ''}"
-    return f"{first} {_run_name(track, numbers[0])[: TUNING.named_letters]}"
+    return f"{first} {_run_name(track, numbers[0])[:NAMED_LETTERS]}"
 
 
 def _fence_and_water(

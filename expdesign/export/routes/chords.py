@@ -22,9 +22,21 @@ import numpy as np
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.export.tuning import TUNING
 from expdesign.plan.values import Leg
 from expdesign.values import Array
+
+WAYPOINT_SPACING = 2.0  # least distance between waypoints of the route for the bridge, in ship lengths
+STOP_RADIUS = 2.5  # farthest that the ship goes from a waypoint it stays at, in ship lengths
+CORRIDOR_HALVINGS = 6  # of the step from the corridor that is needed to the one that is wanted
+MOST_MIXED_RUNS = 2  # runs in one leg
+STOP_COST = 1.5  # of each ship length that the ship goes from a waypoint it stays at, in legs
+MIXED_COST = 10.0  # of each run in a leg beyond the first, in legs
+DIVIDED_COST = 5.0  # of a waypoint inside a run, in legs
+WIDE_WAY_COST, WIDE_RUN_COST = 1.0, 0.3  # of each ship length of cross-track distance, in legs
+WAY_IN_RUN_COST = 0.4  # of each ship length between runs that is sailed in the leg of a run, in legs
+NEAR_COST = 50.0  # of two waypoints that are too near to each other, in legs
+DRY_COST = 1000.0  # of a corridor that leaves the water, in legs
+
 
 # Cutting a curved track into straight chords.
 
@@ -193,7 +205,7 @@ def widened(
         low, high = sides[index], wanted_m
         if low >= high:
             continue
-        for _ in range(TUNING.corridor_halvings):
+        for _ in range(CORRIDOR_HALVINGS):
             sides[index] = high
             if corridor_in_water(start, end, (sides[0], sides[1]), water=water, half_beam_m=half_beam_m):
                 low = high
@@ -233,7 +245,7 @@ class Passage:
     @property
     def spacing_m(self) -> float:
         """Least distance between neighbouring waypoints [m]."""
-        return TUNING.waypoint_spacing * self.length_m
+        return WAYPOINT_SPACING * self.length_m
 
     def sides(self, one: Stop, two: Stop) -> Sides:
         """What the corridor between two stops must hold: the track from one to the other, and both stops [m]."""
@@ -242,18 +254,18 @@ class Passage:
     def cost(self, one: Stop, two: Stop) -> float:
         """Cost of a leg and of the stop that it leaves; infinite where it would hold more runs than can be mixed."""
         runs = [leg for leg in self.legs if leg.kind == "primitive" and leg.first < two[0] and leg.last > one[1]]
-        if len(runs) > TUNING.most_mixed_runs:
+        if len(runs) > MOST_MIXED_RUNS:
             return np.inf
         transit_m = self.sailed_m[two[0]] - self.sailed_m[one[1]]
         for run in runs:
             transit_m -= self.sailed_m[min(run.last, two[0])] - self.sailed_m[max(run.first, one[1])]
-        cost = 1.0 + TUNING.stop_cost * self.radius_m(one) / self.length_m + TUNING.mixed_cost * max(len(runs) - 1, 0)
-        cost += TUNING.divided_cost * sum(run.first < two[0] < run.last for run in runs)
-        wide = TUNING.wide_run_cost if runs else TUNING.wide_way_cost
+        cost = 1.0 + STOP_COST * self.radius_m(one) / self.length_m + MIXED_COST * max(len(runs) - 1, 0)
+        cost += DIVIDED_COST * sum(run.first < two[0] < run.last for run in runs)
+        wide = WIDE_RUN_COST if runs else WIDE_WAY_COST
         cost += wide * max(self.sides(one, two)) / self.length_m
-        cost += TUNING.way_in_run_cost * transit_m / self.length_m if runs else 0.0
+        cost += WAY_IN_RUN_COST * transit_m / self.length_m if runs else 0.0
         near = float(np.hypot(*(self.points[two[0]] - self.points[one[0]]))) < self.spacing_m
-        return float(cost + TUNING.near_cost * near)
+        return float(cost + NEAR_COST * near)
 
     def radius_m(self, stop: Stop) -> float:
         """How far the ship goes from its place on arrival [m]."""
@@ -284,7 +296,7 @@ def choose_stops(passage: Passage, samples: Sequence[int], *, fits: Fits) -> lis
         wrong = [(i, j) for i, j in new if not fits(stops[i], stops[j], passage.sides(stops[i], stops[j]))]
         for i, j in wrong:
             apart = order[stops[j][0]] - order[stops[i][1]]
-            costs[i, j] += TUNING.dry_cost * (apart > 1 or stops[i][0] < stops[i][1] or stops[j][0] < stops[j][1])
+            costs[i, j] += DRY_COST * (apart > 1 or stops[i][0] < stops[i][1] or stops[j][0] < stops[j][1])
         if not wrong:
             return [stops[number] for number in path]
 
@@ -298,7 +310,7 @@ def _stops(passage: Passage, samples: Sequence[int]) -> list[Stop]:
     stops = [(sample, sample) for sample in samples]
     for number, arrival in enumerate(ends):
         for departure in ends[number + 1 :]:
-            if passage.radius_m((arrival, departure)) > TUNING.stop_radius * passage.length_m:
+            if passage.radius_m((arrival, departure)) > STOP_RADIUS * passage.length_m:
                 break
             stops.append((arrival, departure))
     return sorted(stops)

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expdesign.export.tuning import TUNING
 from expdesign.sea_area import LocalFrame, eroded
 from expdesign.values import Array
+
+FENCE_MARGIN = 0.1  # room around the track, as a share of its extent, that the fence may cover
+FENCE_HALVINGS = 12  # of the slack by which the fence is simplified, until it keeps to the water
+
 
 DECIMALS = 7
 
@@ -44,10 +47,10 @@ def build_fence(
     """
     line = shapely.LineString(points[:, ::-1])
     west, south, east, north = line.bounds
-    margin = TUNING.fence_margin * max(east - west, north - south) + 4 * (clearance_m + beam_m)
+    margin = FENCE_MARGIN * max(east - west, north - south) + 4 * (clearance_m + beam_m)
     near = shapely.intersection(water, shapely.box(west - margin, south - margin, east + margin, north + margin))
     slack = max(clearance_m, 0.1) / 2
-    for _ in range(TUNING.fence_halvings):
+    for _ in range(FENCE_HALVINGS):
         found = _simplified(near, line, inset_m=beam_m / 2 + slack, slack_m=slack)
         if found is not None:
             degrees = _in_degrees(found, frame)

@@ -21,9 +21,11 @@ import shapely
 from expdesign.conventions import METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError
 from expdesign.export.routes.fence import Fence
-from expdesign.export.tuning import TUNING
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array
+
+COMPARED_POINTS = 17  # points on each leg where a route is compared with the track
+
 
 # How well a route of waypoints fits the track: exact distances after rounding to file decimals.
 
@@ -93,9 +95,9 @@ def _deviations(start_deg: Array, end_deg: Array, frame: LocalFrame) -> tuple[fl
     straight = shapely.LineString(frame.to_metres(ends))
     mercator, geod = pyproj.Proj(proj="merc", ellps="WGS84", lon_0=float(ends[0, 1])), pyproj.Geod(ellps="WGS84")
     x, y = mercator(ends[:, 1], ends[:, 0])
-    share = np.linspace(0, 1, TUNING.compared_points)
+    share = np.linspace(0, 1, COMPARED_POINTS)
     lon, lat = mercator(x[0] + share * (x[1] - x[0]), y[0] + share * (y[1] - y[0]), inverse=True)
-    inner = geod.npts(ends[0, 1], ends[0, 0], ends[1, 1], ends[1, 0], TUNING.compared_points)
+    inner = geod.npts(ends[0, 1], ends[0, 0], ends[1, 1], ends[1, 0], COMPARED_POINTS)
     curves = (np.stack([lat, lon], axis=1), np.array([(lat, lon) for lon, lat in inner]))
     rhumb, circle = (float(shapely.distance(shapely.points(frame.to_metres(c)), straight).max()) for c in curves)
     return rhumb, circle

@@ -10,10 +10,13 @@ import numpy as np
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.words import counted
-from expdesign.step_trials import CHANNELS, NO_BEND, TUNING, StepSample, StepTrial, Surface
+from expdesign.step_trials import CHANNELS, NO_BEND, StepSample, StepTrial, Surface
 from expdesign.step_trials.live import StepList
 from expdesign.values import Array
 from expdesign.vessel import Vessel, column_name
+
+SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported as found
+
 
 REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
 STATES = ("speed", "yaw rate")
@@ -133,14 +136,14 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
 
 
 def _compared(content: StepTrialContent) -> Iterator[str]:
-    significant = [one for one in content.trial.found if one.p_value < TUNING.significant]
+    significant = [one for one in content.trial.found if one.p_value < SIGNIFICANT]
     for one in significant:
         size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})
-        yield f"No sign of {' or '.join(kinds)} at the level of {TUNING.significant:g}."
+        yield f"No sign of {' or '.join(kinds)} at the level of {SIGNIFICANT:g}."
 
 
 def repeat_rows(content: StepTrialContent) -> list[tuple[str, ...]]:

@@ -17,12 +17,31 @@ import scipy
 import shapely
 
 from expdesign.dictionary import Primitive
-from expdesign.plan.bounds.displacement import SIDES, Displacement, Headway, Track, track_of
-from expdesign.plan.bounds.tuning import BOUNDS
+from expdesign.plan.bounds.displacement import (
+    SIDES,
+    SIDES_MARGIN,
+    TRACK_SAMPLES,
+    Displacement,
+    Headway,
+    Track,
+    track_of,
+)
 from expdesign.plan.chart import VisibilityGraph, build_visibility_graph, sight_lines, simplified, taut_bends
 from expdesign.sea_area import moved
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+QUAD_SEGMENTS = 32  # chords to a quarter circle round grown water
+CELL_HULLS = 16 / 15  # edge of the first cells of branch and bound, in hull lengths
+CELL_HEADINGS = 32  # of them to a full turn
+LEVELS, EXTRA_LEVELS = 3, 3  # refinement levels, and extra levels for the most promising cells
+# limits of branch and bound: cells of a level, their pairs with corners, and cells whose times are looked up for all
+# runs together
+CELLS, PAIRS, LOOKUPS = 300_000, 20_000_000, 400_000
+WORTHWHILE = 0.005  # share of the path that must be gainable over the known bound
+ENOUGH = 0.3  # gain that need not be improved on, in sizes of the cells after `levels`
+CANDIDATES = 4000  # cells among which the largest real gain is looked for
+LOOKUP_CHUNK = 1_000  # points looked up at a time
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,10 +63,7 @@ class GoalTimes:
 
     def at(self, points: Array) -> Array:
         """(k,) least time from points (k, 2), infinite where no path leads to the goal or a point is ashore."""
-        parts = [
-            self._at(points[first : first + BOUNDS.lookup_chunk])
-            for first in range(0, len(points), BOUNDS.lookup_chunk)
-        ]
+        parts = [self._at(points[first : first + LOOKUP_CHUNK]) for first in range(0, len(points), LOOKUP_CHUNK)]
         return np.concatenate([np.zeros(0), *parts])
 
     def _at(self, points: Array) -> Array:
@@ -87,25 +103,25 @@ class Saving:
     def most_s(self, chord_s: float, lookups: int) -> tuple[float, int]:
         """The most that the run saves, infinite where that takes too many lookups, and the lookups left."""
         track, cells = self.track, self._first()
-        spare_s = BOUNDS.enough * self._slowness * self._spread_m(track.ends_m, BOUNDS.levels)
+        spare_s = ENOUGH * self._slowness * self._spread_m(track.ends_m, LEVELS)
         threshold_s = chord_s + spare_s
-        for level in range(BOUNDS.levels + BOUNDS.extra_levels + 1):
+        for level in range(LEVELS + EXTRA_LEVELS + 1):
             spread_m, slack_s = self._spread_m(track.ends_m, level), 0.0
-            if len(cells) > BOUNDS.cells or len(cells) * len(self.times.nodes) > BOUNDS.pairs:
+            if len(cells) > CELLS or len(cells) * len(self.times.nodes) > PAIRS:
                 return np.inf, lookups
             cells = self._possible(cells, level)
             saved, taken = self._saved(cells, level)
             lookups, slack_s = lookups - taken, 2 * self._slowness * spread_m
             if lookups < 0:
                 return np.inf, 0
-            if level >= BOUNDS.levels:
-                best = cells[np.argsort(-saved, kind="stable")[: BOUNDS.candidates]]
-                real = np.sort(-saved)[: BOUNDS.candidates][has_room(track, best, self.water)]
+            if level >= LEVELS:
+                best = cells[np.argsort(-saved, kind="stable")[:CANDIDATES]]
+                real = np.sort(-saved)[:CANDIDATES][has_room(track, best, self.water)]
                 threshold_s = max(threshold_s, float(-real.min(initial=np.inf)) + spare_s)
             left = saved + slack_s > threshold_s
-            if level == BOUNDS.levels + BOUNDS.extra_levels:
+            if level == LEVELS + EXTRA_LEVELS:
                 return float((saved[left] + slack_s).max(initial=threshold_s)), lookups
-            cells = _halved(cells[left], self.cell_m * 0.5**level, np.pi / BOUNDS.cell_headings * 0.5**level)
+            cells = _halved(cells[left], self.cell_m * 0.5**level, np.pi / CELL_HEADINGS * 0.5**level)
         raise AssertionError("the last level returns")
 
     @property
@@ -117,7 +133,7 @@ class Saving:
 
     def _first(self) -> Array:
         """(n, 3) middles of cells that cover all references and headings."""
-        more_m = BOUNDS.sides_margin * float(self.track.hull_m.max()) + self.track.drift_m
+        more_m = SIDES_MARGIN * float(self.track.hull_m.max()) + self.track.drift_m
         return first_cells(self.water, more_m, self.cell_m)
 
     def _possible(self, cells: Array, level: int) -> Array:
@@ -132,7 +148,7 @@ class Saving:
     def _saved(self, cells: Array, level: int) -> tuple[Array, int]:
         """(n,) what is saved in the middle of cells, infinite where that is unknown yet, and the lookups it took."""
         ends, known = self.track.ends(cells), np.full(len(cells), True)
-        if level < BOUNDS.levels:  # the water is grown by less than a cell: a straight line need not lead to its middle
+        if level < LEVELS:  # the water is grown by less than a cell: a straight line need not lead to its middle
             inner = grown(self.times.graph.water, -self._spread_m(self.track.ends_m, level))
             shapely.prepare(inner)
             known = np.all([shapely.contains_xy(inner, end[:, 1], end[:, 0]) for end in ends], axis=0)
@@ -175,13 +191,13 @@ def time_saved_s(
         return None
     whole_s = float(times.at(start[None])[0])
     at_best_s = whole_s - sum(repeats[name] * displacements[name].chord_s for name in tracks)
-    if not np.isfinite(whole_s) or at_best_s < known_s + BOUNDS.worthwhile * whole_s:
+    if not np.isfinite(whole_s) or at_best_s < known_s + WORTHWHILE * whole_s:
         return None
-    most, lookups = {}, BOUNDS.lookups
+    most, lookups = {}, LOOKUPS
     for name in sorted(
         tracks, key=lambda name: repeats[name] * (displacements[name].chord_s - displacements[name].path_s)
     ):
-        saving = Saving(track=tracks[name], times=times, water=water, cell_m=BOUNDS.cell_hulls * vessel.length_m)
+        saving = Saving(track=tracks[name], times=times, water=water, cell_m=CELL_HULLS * vessel.length_m)
         found_s, lookups = saving.most_s(displacements[name].chord_s, lookups)
         most[name] = min(displacements[name].path_s, found_s)
     return whole_s, most
@@ -194,23 +210,23 @@ def grown_times(
 
     None where the goal is not in it, or the chart is too large.
     """
-    cell_m, (west, south, east, north) = BOUNDS.cell_hulls * vessel.length_m, shapely.bounds(water)
-    if BOUNDS.cell_headings * (east - west) * (north - south) / cell_m**2 > BOUNDS.cells:
+    cell_m, (west, south, east, north) = CELL_HULLS * vessel.length_m, shapely.bounds(water)
+    if CELL_HEADINGS * (east - west) * (north - south) / cell_m**2 > CELLS:
         return None
-    smallest_m = spread_m(cell_m, max((track.ends_m for track in tracks), default=0.0), BOUNDS.levels)
+    smallest_m = spread_m(cell_m, max((track.ends_m for track in tracks), default=0.0), LEVELS)
     graph = build_visibility_graph(simplified(grown(water, smallest_m), grow=True, tolerance_m=vessel.length_m / 40))
     return goal_times(graph, goal, headway) if shapely.covers(graph.water, shapely.Point(goal[::-1])) else None
 
 
 def spread_m(cell_m: float, reach_m: float, level: int) -> float:
     """How far points that turn with the heading may be from their places in the middle of their cell [m]."""
-    return float((cell_m / np.sqrt(2) + np.pi / BOUNDS.cell_headings * reach_m) * 0.5**level)
+    return float((cell_m / np.sqrt(2) + np.pi / CELL_HEADINGS * reach_m) * 0.5**level)
 
 
 def grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
     """A superset of the water grown by a distance, or a subset of the water shrunk by a negative one."""
-    wide_m = distance_m / np.cos(np.pi / (4 * BOUNDS.quad_segments)) + np.copysign(1e-6, distance_m)
-    return moved(water, wide_m, quad_segs=BOUNDS.quad_segments)
+    wide_m = distance_m / np.cos(np.pi / (4 * QUAD_SEGMENTS)) + np.copysign(1e-6, distance_m)
+    return moved(water, wide_m, quad_segs=QUAD_SEGMENTS)
 
 
 def first_cells(water: shapely.Geometry, more_m: float, cell_m: float) -> Array:
@@ -220,9 +236,7 @@ def first_cells(water: shapely.Geometry, more_m: float, cell_m: float) -> Array:
         low - more_m + cell_m * (np.arange(np.ceil((high - low + 2 * more_m) / cell_m)) + 0.5)
         for low, high in ((south, north), (west, east))
     ]
-    grids = np.meshgrid(
-        *axes, (np.arange(BOUNDS.cell_headings) + 0.5) * 2 * np.pi / BOUNDS.cell_headings, indexing="ij"
-    )
+    grids = np.meshgrid(*axes, (np.arange(CELL_HEADINGS) + 0.5) * 2 * np.pi / CELL_HEADINGS, indexing="ij")
     return np.stack([grid.ravel() for grid in grids], axis=1)
 
 
@@ -235,7 +249,7 @@ def _halved(cells: Array, cell_m: float, half_rad: float) -> Array:
 def _near_corners(track: Track, cells: Array, corners: Array, farther_m: float) -> Array:
     """Those cells in which some corner may be in the convex hull of the track."""
     slack_m = farther_m + track.drift_m
-    reach_m = BOUNDS.sides_margin * float(track.hull_m.max()) + slack_m
+    reach_m = SIDES_MARGIN * float(track.hull_m.max()) + slack_m
     (north, east), c, s = cells[:, :2].T.copy(), np.cos(cells[:, 2]), np.sin(cells[:, 2])
     near, left = np.zeros(len(cells), dtype=bool), np.arange(len(cells))
     for corner in corners:
@@ -254,9 +268,9 @@ def has_room(track: Track, cells: Array, water: shapely.Geometry) -> np.ndarray:
     left = np.arange(len(cells))
     for k in (
         0,
-        BOUNDS.track_samples - 1,
-        *range(1, BOUNDS.track_samples - 1),
-        *range(BOUNDS.track_samples, len(track.water)),
+        TRACK_SAMPLES - 1,
+        *range(1, TRACK_SAMPLES - 1),
+        *range(TRACK_SAMPLES, len(track.water)),
     ):
         places = track.at(cells[left], k)
         left = left[shapely.contains_xy(water, places[:, 1], places[:, 0])]

@@ -18,6 +18,11 @@ from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
+WIND_HEADINGS = 72  # at which runs are simulated where wind makes a difference
+WIND_MARGIN = 1.02  # factor for what headings in between may give more
+TRACK_SAMPLES = 13  # samples of a run at which its hull needs room
+SIDES_MARGIN = 1.01  # no corner of such a polygon is farther away than its farthest side by more
+
 
 @dataclass(frozen=True, kw_only=True)
 class Displacement:
@@ -97,9 +102,9 @@ def exit_motion(vessel: Vessel, primitive: Primitive, environment: Environment) 
     last = _in_weather(vessel, primitive, environment)[-1]
     speeds = np.hypot(*(over_ground(last) - environment.current_to).T)
     return (
-        float(speeds.min()) / BOUNDS.wind_margin,
-        float(speeds.max()) * BOUNDS.wind_margin,
-        float(np.abs(last[:, 5]).max()) * BOUNDS.wind_margin,
+        float(speeds.min()) / WIND_MARGIN,
+        float(speeds.max()) * WIND_MARGIN,
+        float(np.abs(last[:, 5]).max()) * WIND_MARGIN,
     )
 
 
@@ -108,9 +113,9 @@ def _displacement_in_weather(tracks: list[Array], headway: Headway) -> Displacem
     chords = [float(headway.seconds(track[-1] - track[0])) for track in tracks]
     paths = [float(headway.seconds(np.diff(track, axis=0)).sum()) for track in tracks]
     return Displacement(
-        chord_s=BOUNDS.wind_margin * max(chords),
-        path_s=BOUNDS.wind_margin * max(paths),
-        deviation_m=BOUNDS.wind_margin * max(_deviation_m(track) for track in tracks),
+        chord_s=WIND_MARGIN * max(chords),
+        path_s=WIND_MARGIN * max(paths),
+        deviation_m=WIND_MARGIN * max(_deviation_m(track) for track in tracks),
     )
 
 
@@ -138,11 +143,11 @@ def _in_weather(vessel: Vessel, primitive: Primitive, environment: Environment) 
     return run_at_headings(
         vessel,
         primitive,
-        np.arange(BOUNDS.wind_headings) * 2 * np.pi / BOUNDS.wind_headings,
+        np.arange(WIND_HEADINGS) * 2 * np.pi / WIND_HEADINGS,
         entering=environment.current_to,
-        current_to=np.tile(environment.current_to, (BOUNDS.wind_headings, 1)),
-        wind_to=np.tile(environment.wind_to, (BOUNDS.wind_headings, 1)),
-        parameters=np.tile(vessel.model.parameters, (BOUNDS.wind_headings, 1)),
+        current_to=np.tile(environment.current_to, (WIND_HEADINGS, 1)),
+        wind_to=np.tile(environment.wind_to, (WIND_HEADINGS, 1)),
+        parameters=np.tile(vessel.model.parameters, (WIND_HEADINGS, 1)),
     )
 
 
@@ -177,12 +182,12 @@ class Track:
     @property
     def reach_m(self) -> float:
         """How far from the reference anything is that turns with the heading."""
-        return max(float(np.hypot(*self.water.T).max()), BOUNDS.sides_margin * float(self.hull_m.max()))
+        return max(float(np.hypot(*self.water.T).max()), SIDES_MARGIN * float(self.hull_m.max()))
 
     @property
     def ends_m(self) -> float:
         """The same of the track's ends."""
-        return float(np.hypot(*self.water[[0, BOUNDS.track_samples - 1]].T).max())
+        return float(np.hypot(*self.water[[0, TRACK_SAMPLES - 1]].T).max())
 
     @property
     def drift_m(self) -> float:
@@ -197,13 +202,13 @@ class Track:
 
     def ends(self, cells: Array) -> tuple[Array, Array]:
         """(n, 2) where runs begin, and where they end."""
-        return self.at(cells, 0), self.at(cells, BOUNDS.track_samples - 1)
+        return self.at(cells, 0), self.at(cells, TRACK_SAMPLES - 1)
 
 
 def track_of(run: Primitive, vessel: Vessel, current_to: Array) -> Track:
     """The track of a run that is the same through water at every place."""
     pose, time_s = run.trajectory.pose, run.trajectory.time_s
-    kept = np.rint(np.linspace(0, len(pose) - 1, BOUNDS.track_samples)).astype(int)
+    kept = np.rint(np.linspace(0, len(pose) - 1, TRACK_SAMPLES)).astype(int)
     middle = (pose[:, :2].min(axis=0) + pose[:, :2].max(axis=0)) / 2
     drift = (time_s[kept] - (time_s[0] + time_s[-1]) / 2)[:, None] * current_to
     along = np.stack([np.cos(pose[kept, 2]), np.sin(pose[kept, 2])], axis=1)

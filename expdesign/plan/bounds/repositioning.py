@@ -38,9 +38,8 @@ import scipy
 import shapely
 
 from expdesign.dictionary import Primitive
-from expdesign.plan.bounds.branch_and_bound import time_saved_s
+from expdesign.plan.bounds.branch_and_bound import QUAD_SEGMENTS, time_saved_s
 from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by_heading, displacement_of, exit_motion
-from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
 from expdesign.plan.legs import LEGS, leg_speed_mps, through_water
@@ -49,6 +48,8 @@ from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+ORDER_STATES = 20_000  # combinations of remaining runs up to which all orders are enumerated
 
 
 def cheapest_orders(pairs: Array, home: Array, counts: Sequence[int]) -> Array | None:
@@ -60,7 +61,7 @@ def cheapest_orders(pairs: Array, home: Array, counts: Sequence[int]) -> Array |
         counts: of each run.
     """
     sizes = np.array(counts) + 1
-    if np.prod(sizes.astype(float)) > BOUNDS.order_states:
+    if np.prod(sizes.astype(float)) > ORDER_STATES:
         return None
     base = place_values(counts)
     table = np.zeros((int(np.prod(sizes)), len(home)))
@@ -159,9 +160,7 @@ def time_to_sail_s(
 
 def _grown(water: shapely.Geometry, distance_m: float) -> shapely.Geometry:
     """A superset of the water grown by a distance: the chords of arcs are nearer than their ends."""
-    return shapely.buffer(
-        water, distance_m / np.cos(np.pi / (4 * BOUNDS.quad_segments)) + 1e-6, quad_segs=BOUNDS.quad_segments
-    )
+    return shapely.buffer(water, distance_m / np.cos(np.pi / (4 * QUAD_SEGMENTS)) + 1e-6, quad_segs=QUAD_SEGMENTS)
 
 
 def _holds_ends(water: shapely.Geometry, ends: tuple[Array, Array]) -> bool:

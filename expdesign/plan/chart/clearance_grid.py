@@ -9,9 +9,15 @@ import numpy as np
 import scipy
 import shapely
 
-from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import SeaArea, as_multipolygon
 from expdesign.values import Array, seal
+
+GRID_CELLS = 3_000_000  # of the clearance grid at most; a larger area gets a coarser grid
+FINE_HULLS = 0.25  # spacing of that grid in hull lengths above which a smaller part of the chart is planned in
+KEPT = 0.9  # share of the extent of the water, from which on nothing is left out for being unreachable
+LEAST_REACH_HULLS = 60.0  # hull lengths that this part reaches from start and goal at least
+ROUTING_CELLS = 400_000  # of the grid on which the narrowest passage is located
+KEPT_GRIDS = 3  # visibility graphs, clearance grids and tables of distances that a process keeps
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +70,7 @@ class ClearanceField:
 def grid_cell_m(area: SeaArea, resolution_m: float) -> float:
     """Spacing of the grid over an area [m]."""
     west, south, east, north = area.water.bounds
-    return max(resolution_m, float(np.sqrt((east - west) * (north - south) / CHART.grid_cells)))
+    return max(resolution_m, float(np.sqrt((east - west) * (north - south) / GRID_CELLS)))
 
 
 def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
@@ -77,7 +83,7 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
     return _clearance_field(area.water, grid_cell_m(area, resolution_m))
 
 
-@lru_cache(maxsize=CHART.kept_grids)
+@lru_cache(maxsize=KEPT_GRIDS)
 def _clearance_field(water: shapely.MultiPolygon, cell: float) -> ClearanceField:
     """The field of a water on cells of a size [m]; kept, as remedies ask for it again."""
     west, south, east, north = water.bounds
@@ -131,7 +137,7 @@ def _first_passage(regions: np.ndarray) -> tuple[slice, tuple[int, int]]:
 
 def _path(fine: ClearanceField, start: Array, goal: Array, clearance_m: float) -> Array:
     """(k, 2) centres of a shortest eight-neighbour path through cells with a clearance; one row where there is none."""
-    field = fine.thinned(CHART.routing_cells)
+    field = fine.thinned(ROUTING_CELLS)
     free = field.clearance_m >= clearance_m
     free[field.index(goal)] = True
     numbers = np.arange(free.size).reshape(free.shape)
@@ -177,7 +183,7 @@ def reachable(area: SeaArea, ends: Array, reach_m: float) -> SeaArea:
     parts, points = shapely.get_parts(water), shapely.points(east_north)
     held = np.array([shapely.intersects(part, points) for part in parts])
     found = shapely.MultiPolygon(list(parts[held.any(axis=1)]))
-    kept = shapely.box(*found.bounds).area > CHART.kept * shapely.box(*area.water.bounds).area
+    kept = shapely.box(*found.bounds).area > KEPT * shapely.box(*area.water.bounds).area
     return area if kept or not held.any(axis=0).all() else replace(area, water=found)
 
 
@@ -194,12 +200,12 @@ def resolved(area: SeaArea, ends: Array, reach_m: float, *, hull_m: float) -> tu
         area, ends, reach_m: as for `reachable`.
         hull_m: length of the hull.
     """
-    reach_m = max(reach_m, CHART.least_reach_hulls * hull_m)
+    reach_m = max(reach_m, LEAST_REACH_HULLS * hull_m)
     found = reachable(area, ends, reach_m)
-    while grid_cell_m(found, hull_m / 8) > CHART.fine_hulls * hull_m:
+    while grid_cell_m(found, hull_m / 8) > FINE_HULLS * hull_m:
         smaller_m = reach_m * np.sqrt(0.5)
         less = reachable(found, ends, smaller_m)
-        if smaller_m < CHART.least_reach_hulls * hull_m or (connects(found, ends) and not connects(less, ends)):
+        if smaller_m < LEAST_REACH_HULLS * hull_m or (connects(found, ends) and not connects(less, ends)):
             break
         found, reach_m = less, smaller_m
     return found, reach_m

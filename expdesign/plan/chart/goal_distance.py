@@ -13,9 +13,12 @@ import scipy
 import shapely
 
 from expdesign.plan.chart.clearance_grid import ClearanceField
-from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import VisibilityGraph
 from expdesign.values import Array
+
+KEPT_TABLES = 6  # visibility graphs, clearance grids and tables of distances that a process keeps
+TABLE_CELLS = 60_000  # of the table of distances to the goal
+TABLE_CHUNK = 1000  # cells of that table processed at a time
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,15 +77,15 @@ def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Arr
     return _goal_distance(graph, field, (float(goal[0]), float(goal[1])))
 
 
-@lru_cache(maxsize=CHART.kept_tables)
+@lru_cache(maxsize=KEPT_TABLES)
 def _goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: tuple[float, float]) -> GoalDistance | None:
     """The table; kept, as remedies ask for it again."""
     nodes, distance, next_node = shortest_path_tree(graph, np.array(goal))
-    grid = field.thinned(CHART.table_cells)
+    grid = field.thinned(TABLE_CELLS)
     cells = grid.centre(np.arange(grid.clearance_m.size))
     wet = np.flatnonzero(shapely.contains_xy(graph.water, cells[:, 1], cells[:, 0]))
     table, first = np.full(grid.clearance_m.size, np.inf), np.full(grid.clearance_m.size, len(nodes) - 1)
-    for some in np.array_split(wet, len(wet) // CHART.table_chunk + 1):
+    for some in np.array_split(wet, len(wet) // TABLE_CHUNK + 1):
         total = scipy.spatial.distance.cdist(cells[some], nodes) + distance
         table[some], first[some] = taut_bends(graph, cells[some], nodes, next_node, total)
     if not np.isfinite(table).any():

@@ -21,6 +21,12 @@ from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import as_multipolygon, moved
 from expdesign.values import Array
 
+STRAIGHT = 0.98  # share of the tolerance by which moved shores are straightened; the rest is for moving them
+SLIT_M = 1e-3  # growth of the water before lines of sight are tested, as a path may touch the shore
+GLANCES = (0.5, 0.75, 0.25, 0.9, 0.1, 0.625, 0.375)  # shares of a line of sight at which it is tested first
+TAUT = 1e-3  # share of the water's size by which a path may miss a corner that it bends at
+
+
 Corners = tuple[tuple[float, int], ...]
 """Most corners by the least tolerance, in those asked for, at which so many are accepted."""
 
@@ -133,7 +139,7 @@ class VisibilityGraph(Roadmap):
         directions /= np.maximum(np.hypot(directions[..., :1], directions[..., 1:]), 1e-12)
         side = np.sign(_cross(directions[:, :1], directions[:, 1:]).sum(axis=1))
         west, south, east, north = self.water.bounds
-        spare_m = CHART.taut * float(np.hypot(north - south, east - west))
+        spare_m = TAUT * float(np.hypot(north - south, east - west))
         found = np.ones((len(points), len(corners)), dtype=bool)
         for k in range(3):
             normal = side[:, None] * np.stack([-directions[:, k, 1], directions[:, k, 0]], axis=1)
@@ -161,7 +167,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
 
 def opened(water: shapely.Geometry) -> shapely.MultiPolygon:
     """Water grown by `Tuning.slit_m`, prepared for lines of sight, which may touch the shore."""
-    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), CHART.slit_m, join_style="mitre"))
+    grown = as_multipolygon(shapely.buffer(as_multipolygon(water), SLIT_M, join_style="mitre"))
     shapely.prepare(grown)
     return grown
 
@@ -197,7 +203,7 @@ def simplified(
     source, moved_m, made = water, 0.0, [(water, 0.0)]
     while True:
         step_m = tolerance_m - moved_m
-        simple = _straightened(moved(source, step_m if grow else -step_m), CHART.straight * step_m)
+        simple = _straightened(moved(source, step_m if grow else -step_m), STRAIGHT * step_m)
         most = max(count for times, count in corners if times * least_m <= tolerance_m)
         if len(shore_corners(simple)[0]) <= (corners[0][1] if grow else most):
             return simple
@@ -241,7 +247,7 @@ def sight_lines(a: Array, b: Array) -> np.ndarray:
 def _joined(water: shapely.MultiPolygon, a: Array, b: Array) -> np.ndarray:
     """(n,) whether a water covers the lines between points (n, 2): first some places on them, then the whole lines."""
     seen = np.arange(len(a))
-    for share in CHART.glances:
+    for share in GLANCES:
         north, east = ((1.0 - share) * a[seen] + share * b[seen]).T
         seen = seen[shapely.intersects_xy(water, east, north)]
     found = np.zeros(len(a), dtype=bool)

@@ -10,10 +10,18 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.memory import recalled
-from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel
+
+SPEED_BANDS = 12  # with a largest acceleration each
+# of the time in which actuators get from nothing to full; until then they reach only so far
+STAGE_SHARES = (0.1, 0.2, 0.35, 0.6, 1.0)
+DRAWN_MOTIONS = 240  # motions and commands drawn for each band and stage
+REFINEMENTS, REFINED_MOTIONS = 5, 12  # rounds in which the best of them are varied, and how many are
+RATE_MARGIN = 1.1  # factor on the largest rates found, for what the search may have missed
+# step of time, in the actuators' time from nothing to full, and their largest number
+LOSS_STEP, LOSS_STEPS = 0.01, 3000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,7 +45,7 @@ class SpeedChanges:
     @property
     def mean_mps2(self) -> float:
         """Mean over all speeds of the largest rate at which speed was found to grow, actuators being anywhere."""
-        return float(self.faster_mps2[-1].mean()) / CONTROL.rate_margin
+        return float(self.faster_mps2[-1].mean()) / RATE_MARGIN
 
     def most(self, speed_mps: float, time_s: Array) -> Array:
         """(n,) largest speed at even times (n,) after the given speed, or before it."""
@@ -106,12 +114,12 @@ def leg_end(
         top_mps: speed of the fastest leg.
         yaw_rate_radps: no turn is faster.
     """
-    edges = np.linspace(0.0, top_mps, CONTROL.speed_bands + 1)
+    edges = np.linspace(0.0, top_mps, SPEED_BANDS + 1)
     until_s, boxes = _boxes(vessel, inputs)
     wind = float(np.hypot(*(environment.wind_to - environment.current_to)))
     found = [recalled(_most, vessel, boxes, edges, wind, yaw_rate_radps, sign) for sign in (1.0, -1.0)]
     least = 1e-3 * max(rate.max() for rate in found)  # a band that nothing passes through costs much, but not all
-    faster, slower = (CONTROL.rate_margin * np.maximum(rate, least) for rate in found)
+    faster, slower = (RATE_MARGIN * np.maximum(rate, least) for rate in found)
     changes = SpeedChanges(edges_mps=edges, until_s=until_s, faster_mps2=faster, slower_mps2=slower)
     return LegEnd(slowest_mps=speed_mps, fastest_mps=speed_mps, inputs=inputs, changes=changes)
 
@@ -133,7 +141,7 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
     )
     if inputs is None or not all(response.follows for response in vessel.responses):
         return np.array([np.inf]), np.stack([low, high])[None]
-    until_s = to_work_s(vessel) * np.array(CONTROL.stage_shares)
+    until_s = to_work_s(vessel) * np.array(STAGE_SHARES)
     # a command may move before the first sample of a leg is over
     reach = np.minimum(vessel.rates * (until_s[:, None] + vessel.sample_time_s), np.where(limited, np.inf, np.pi))
     # fmax and fmin take the limit where a command may be anything
@@ -145,16 +153,16 @@ def _boxes(vessel: Vessel, inputs: Array | None) -> tuple[Array, Array]:
 def _most(vessel: Vessel, boxes: Array, edges: Array, wind_mps: float, yaw_rate_radps: float, sign: float) -> Array:
     """(s, k) largest rate of change of speed found in each stage and band, faster or slower."""
     rng = np.random.default_rng(0)
-    shares = rng.uniform(-0.5, 1.5, (CONTROL.drawn_motions, len(boxes), len(edges) - 1, 4 + boxes.shape[-1]))
+    shares = rng.uniform(-0.5, 1.5, (DRAWN_MOTIONS, len(boxes), len(edges) - 1, 4 + boxes.shape[-1]))
     shares[..., :4] = (shares[..., :4] + 0.5) / 2
     shares = shares.clip(0.0, 1.0)
     most = np.full(shares.shape[1:3], -np.inf)
-    for spread in 0.3 * 0.5 ** np.arange(CONTROL.refinements):
+    for spread in 0.3 * 0.5 ** np.arange(REFINEMENTS):
         rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
         most = np.maximum(most, rates.max(axis=0))
-        order = np.argpartition(-rates, CONTROL.refined_motions, axis=0)[: CONTROL.refined_motions]
+        order = np.argpartition(-rates, REFINED_MOTIONS, axis=0)[:REFINED_MOTIONS]
         best = np.take_along_axis(shares, order[..., None], axis=0)
-        varied = np.repeat(best, CONTROL.drawn_motions // CONTROL.refined_motions, axis=0)
+        varied = np.repeat(best, DRAWN_MOTIONS // REFINED_MOTIONS, axis=0)
         shares = (varied + spread * rng.standard_normal(varied.shape)).clip(0.0, 1.0)
     rates = sign * _rates(vessel, shares, boxes, edges, wind_mps, yaw_rate_radps)
     most = np.maximum(most, rates.max(axis=0))
@@ -181,8 +189,8 @@ def least_loss(firsts: Sequence[LegEnd], lasts: Sequence[LegEnd], vessel: Vessel
     be reached by then and what can still be shed, so the longer a leg, the more is lost: the shortest one counts in
     which the one speed can become the other, and the one command the other.
     """
-    step_s = CONTROL.loss_step * to_work_s(vessel)
-    time_s: Array = step_s * np.arange(CONTROL.loss_steps, dtype=np.float64)
+    step_s = LOSS_STEP * to_work_s(vessel)
+    time_s: Array = step_s * np.arange(LOSS_STEPS, dtype=np.float64)
     after = [_speeds(end, end.changes, time_s) for end in firsts]
     before = [_speeds(end, end.changes.reversed(), time_s) for end in lasts]
     losses = np.empty((len(firsts), len(lasts), 2))
@@ -203,8 +211,8 @@ def _speeds(end: LegEnd, changes: SpeedChanges, time_s: Array) -> tuple[Array, A
 
 def _steps_to_meet(after: tuple[Array, Array], before: tuple[Array, Array], least: int) -> int:
     """Steps until speeds after one end can meet those before another, so many at least."""
-    count = min(least, CONTROL.loss_steps - 1)
-    while count < CONTROL.loss_steps - 1 and not _can_meet(*after, *before, count):
+    count = min(least, LOSS_STEPS - 1)
+    while count < LOSS_STEPS - 1 and not _can_meet(*after, *before, count):
         count += 1
     return count
 

@@ -9,6 +9,7 @@ import numpy as np
 from expdesign.dictionary.trim import drift, trim
 from expdesign.errors import NoPlan
 from expdesign.plan.control.helm_capability import (
+    LATERAL_MPS2,
     leg_radius_m,
     side_by_side,
     simulated_acceleration,
@@ -21,6 +22,10 @@ from expdesign.plan.control.tuning import CONTROL
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import steady_ahead
 from expdesign.vessel import Limit, Vessel, direct_terms, force_matrix
+
+USABLE_SHARE = 0.9  # of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on
+# largest yaw rate on the way into a turn, in those of the steady one: a rule of thumb that bounds the search
+HELM_OVERSHOOT = 1.3
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -45,7 +50,7 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
     yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
     if yaw is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
-    yaw = min(yaw, CONTROL.lateral_mps2 / transit / CONTROL.usable_share)
+    yaw = min(yaw, LATERAL_MPS2 / transit / USABLE_SHARE)
     if settings.turning_radius_m is not None and settings.turning_radius_m < transit / yaw:
         raise NoPlan(
             f"plan.turning_radius_m is {settings.turning_radius_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} "
@@ -54,16 +59,16 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         )
     spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
     agile = bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) == 3) and spot > transit / vessel.length_m / 10
-    radius = settings.turning_radius_m or max(transit / (CONTROL.usable_share * yaw), 1.5 * vessel.length_m)
-    rate = min(CONTROL.usable_share * yaw, 2.0 * transit / radius)
+    radius = settings.turning_radius_m or max(transit / (USABLE_SHARE * yaw), 1.5 * vessel.length_m)
+    rate = min(USABLE_SHARE * yaw, 2.0 * transit / radius)
     return (AgileShip if agile else DubinsShip)(
         top_speed_mps=top,
         transit_speed_mps=transit,
         turning_radius_m=radius,
         yaw_rate_radps=rate,
         acceleration_mps2=_acceleration(vessel, transit),
-        spot_rate_radps=CONTROL.usable_share * spot,
-        lateral_mps2=max(CONTROL.lateral_mps2, 1.01 * transit * rate),
+        spot_rate_radps=USABLE_SHARE * spot,
+        lateral_mps2=max(LATERAL_MPS2, 1.01 * transit * rate),
         working_s=max(_reach(limit) / rate for limit, rate in zip(vessel.limits, vessel.rates.tolist(), strict=True)),
         late_s=max(response.lag_s + response.delay_s for response in vessel.responses),
     )
@@ -81,7 +86,7 @@ def needs_helm(vessel: Vessel) -> bool:
 
 
 def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_mps: float) -> float:
-    transit = settings.transit_speed_mps or CONTROL.usable_share * top
+    transit = settings.transit_speed_mps or USABLE_SHARE * top
     if transit > top:
         raise NoPlan(
             f"plan.transit_speed_mps is {transit:g}, vessel {vessel.name!r} reaches {top:.3g} m/s", what="speed"
@@ -119,9 +124,9 @@ def _helm_ship(vessel: Vessel, settings: PlanSettings, current_mps: float) -> He
         top_speed_mps=top,
         transit_speed_mps=transit,
         turning_radius_m=radius,
-        yaw_rate_radps=CONTROL.helm_overshoot * max(fastest, transit / radius),
+        yaw_rate_radps=HELM_OVERSHOOT * max(fastest, transit / radius),
         acceleration_mps2=simulated_acceleration(approach),
-        lateral_mps2=max(CONTROL.lateral_mps2, CONTROL.helm_overshoot * transit**2 / radius),
+        lateral_mps2=max(LATERAL_MPS2, HELM_OVERSHOOT * transit**2 / radius),
         approach=approach,
         turns=turns,
         stopping_m=stopping_distance_m(vessel, transit),

@@ -10,10 +10,14 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control.helm_capability import SteadyTurn
-from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Allocator, Vessel, required_force
+
+# natural frequency of courses in that of a hull length at transit speed, and their damping
+COURSE_FREQUENCY, COURSE_DAMPING = 1.2, 0.9
+HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
+HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,11 +147,11 @@ class HelmController:
     def _helm(self, desired: Array, moving: Array, unexplained: Array) -> Array:
         """(n,) helm angles: those of steady turns, and more or less by what is missing in heading and yaw rate."""
         approach = self.approach
-        quick = CONTROL.course_frequency / self._pace_s
-        turn = np.clip(wrap_angle(desired[:, 1]), -CONTROL.helm_farthest_rad, CONTROL.helm_farthest_rad)
-        damping = 2 * CONTROL.course_damping * quick - self._own_damping
+        quick = COURSE_FREQUENCY / self._pace_s
+        turn = np.clip(wrap_angle(desired[:, 1]), -HELM_FARTHEST_RAD, HELM_FARTHEST_RAD)
+        damping = 2 * COURSE_DAMPING * quick - self._own_damping
         missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
-        effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, CONTROL.helm_slowest) ** 2
+        effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, HELM_SLOWEST) ** 2
         change = np.interp(desired[:, 2], *self._turns) + missing / effect
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
 

@@ -15,13 +15,22 @@ import scipy
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NoAnswer, NoPlan
-from expdesign.plan.control.tuning import CONTROL
 from expdesign.plan.values import PlanSettings
 from expdesign.signals import Trajectory
 from expdesign.simulation import Conduct, simulate_many, steady_ahead, stopping
 from expdesign.simulation.helm import Approach
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+LATERAL_MPS2 = 0.03 * 9.81  # lateral acceleration of turns on legs: small enough not to heel the ship
+HELM_SHARE = 0.65  # of the hardest helm at which ships turn on legs: the rest is for getting into turns and out of them
+HELM_SLOW_SHARE = 0.5  # slowest speed, in transit speeds, at which a ship must still turn as tightly as legs ask
+FULL_AHEAD_HULLS = 200.0  # hull lengths at transit speed in whose time full ahead from rest is simulated
+HELM_ANGLES = 8  # to each side, whose steady turns are simulated
+STEADY_HULLS = 30.0  # hull lengths at approach speed after which a turn counts as steady
+STEADY_SHARE = 1e-6  # of the approach speed, per time of a hull length, that a steady turn may still gain or lose
+STEADY_OFFSET = 0.3  # shares of the approach's scales between the exact turn and the end of its simulation
+
 
 # Steady turns of a ship that is steered by a helm: what is left when the helm stays over, by simulation.
 
@@ -63,9 +72,9 @@ def steady_turns(approach: Approach) -> tuple[SteadyTurn, ...]:
     """
     helm, vessel = approach.helm, approach.helm.vessel
     hardest = helm.hardest(approach.drive) - abs(approach.angle_rad)
-    shares = np.arange(1, CONTROL.helm_angles + 1) / CONTROL.helm_angles
+    shares = np.arange(1, HELM_ANGLES + 1) / HELM_ANGLES
     angles = hardest * np.r_[-shares[::-1], shares]
-    count = max(2, math.ceil(CONTROL.steady_hulls * vessel.length_m / approach.speed_mps / vessel.sample_time_s))
+    count = max(2, math.ceil(STEADY_HULLS * vessel.length_m / approach.speed_mps / vessel.sample_time_s))
     rows = helm.rows(np.array(approach.drive), approach.angle_rad + approach.starboard * angles)
     runs, still = len(rows), np.zeros((len(rows), 2))
     states = simulate_many(
@@ -102,8 +111,8 @@ def _solved(approach: Approach, angle: float, motion: Array) -> SteadyTurn | Non
     turns = whole[0] > 0 and whole[2] * angle > 0
     if (
         not turns
-        or np.abs(excess(share)).max() > CONTROL.steady_share
-        or np.abs(share - motion[used] / scale).max() > CONTROL.steady_offset
+        or np.abs(excess(share)).max() > STEADY_SHARE
+        or np.abs(share - motion[used] / scale).max() > STEADY_OFFSET
     ):
         return None
     return SteadyTurn(
@@ -128,7 +137,7 @@ def why_not_ahead(vessel: Vessel, speed: float) -> str:
 
 
 def _slower(approach: Approach) -> Approach:
-    return steady_ahead(approach.helm.vessel, CONTROL.helm_slow_share * approach.speed_mps)
+    return steady_ahead(approach.helm.vessel, HELM_SLOW_SHARE * approach.speed_mps)
 
 
 def leg_radius_m(approach: Approach, settings: PlanSettings, pairs: list[tuple[SteadyTurn, SteadyTurn]]) -> float:
@@ -155,20 +164,20 @@ def leg_radius_m(approach: Approach, settings: PlanSettings, pairs: list[tuple[S
     found = [tightest, 1.5 * vessel.length_m]
     for some in at_speeds:
         most = max((pair[1].helm_rad for pair in some), default=0.0)
-        eased = [pair for pair in some if pair[1].helm_rad <= CONTROL.helm_share * most and _gentle(pair)]
-        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / CONTROL.lateral_mps2)
+        eased = [pair for pair in some if pair[1].helm_rad <= HELM_SHARE * most and _gentle(pair)]
+        found.append(max(turn.radius_m for turn in eased[-1]) if eased else transit**2 / LATERAL_MPS2)
     return asked_m or max(found)
 
 
 def _gentle(pair: tuple[SteadyTurn, SteadyTurn]) -> bool:
-    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= CONTROL.lateral_mps2 for turn in pair)
+    return all(abs(turn.surge_mps * turn.yaw_rate_radps) <= LATERAL_MPS2 for turn in pair)
 
 
 def full_ahead(approach: Approach) -> Array:
     """(k, 6) pose and velocity from rest with the engines full ahead, as fast as they answer, at every sample."""
     helm, vessel = approach.helm, approach.helm.vessel
     step_s = vessel.sample_time_s
-    count = int(np.ceil(CONTROL.full_ahead_hulls * vessel.length_m / approach.speed_mps / step_s))
+    count = int(np.ceil(FULL_AHEAD_HULLS * vessel.length_m / approach.speed_mps / step_s))
     orders = np.minimum(1.0, np.arange(1, count + 1) * step_s * helm.drive_rate)
     rows = np.array([helm.inputs(order, approach.angle_rad) for order in orders.tolist()])
     states = simulate_many(

@@ -12,11 +12,18 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control.controllers import Controller, ForceController, HelmController
-from expdesign.plan.control.helm_capability import SteadyTurn
+from expdesign.plan.control.helm_capability import LATERAL_MPS2, SteadyTurn
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+# of the time in which a vessel reaches its speed, or its actuators run up, that a change of motion takes besides
+SETTLING_SHARE = 0.25
+# hull lengths that paths of agile ships keep from the shore beyond clearance and half beam
+AGILE_PATH_SPARES = (0.25, 0.1, 0.02)
+LEAD_SHARE = 0.2  # share of their lag in which lagging actuators reach what is desired, by commanding more
+HELM_RUN_UP_HULLS = 8.0  # hull lengths of the run-up of a helm-steered ship
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +45,7 @@ class Capability(ABC):
     turning_radius_m: float
     yaw_rate_radps: float
     acceleration_mps2: float
-    lateral_mps2: float = CONTROL.lateral_mps2
+    lateral_mps2: float = LATERAL_MPS2
     spot_rate_radps: float = 0.0
 
     @property
@@ -92,7 +99,7 @@ class ForceSteered(Capability):
 
     def controller(self, vessel: Vessel) -> Controller:
         """Velocities by forces, by the inverse of the nominal model."""
-        late_s = max(response.delay_s + CONTROL.lead_share * response.lag_s for response in vessel.responses)
+        late_s = max(response.delay_s + LEAD_SHARE * response.lag_s for response in vessel.responses)
         answer_s = max(self._settling_s + late_s, 3.0 * vessel.sample_time_s)
         return ForceController(vessel=vessel, answer_s=answer_s, turn_rate_radps=self.turn_rate_radps)
 
@@ -106,7 +113,7 @@ class ForceSteered(Capability):
 
     @property
     def _settling_s(self) -> float:
-        return CONTROL.settling_share * max(self.transit_speed_mps / self.acceleration_mps2, self.working_s)
+        return SETTLING_SHARE * max(self.transit_speed_mps / self.acceleration_mps2, self.working_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +127,7 @@ class AgileShip(ForceSteered):
 
     def path_spares_m(self, vessel: Vessel) -> tuple[float, ...]:
         """Half the beam and some: more gives smoother paths, less leads through narrower water."""
-        return tuple(vessel.beam_m / 2 + share * vessel.length_m for share in CONTROL.agile_path_spares)
+        return tuple(vessel.beam_m / 2 + share * vessel.length_m for share in AGILE_PATH_SPARES)
 
     def turn_loss_s(self, first_rad: Array, second_rad: Array) -> Array:
         """Time that turns at both ends of a leg cost besides its path, from the courses there.
@@ -186,7 +193,7 @@ class HelmShip(Capability):
 
     def run_up_s(self, vessel: Vessel, speed_mps: float) -> float:
         """Some hull lengths."""
-        return CONTROL.helm_run_up_hulls * vessel.length_m / max(speed_mps, 0.5 * self.transit_speed_mps)
+        return HELM_RUN_UP_HULLS * vessel.length_m / max(speed_mps, 0.5 * self.transit_speed_mps)
 
     def braking_mps2(self, speed_mps: float) -> float:
         """Deceleration with the engines full astern."""

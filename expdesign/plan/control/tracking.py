@@ -14,11 +14,14 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.plan.control.controllers import Controller, Demand
-from expdesign.plan.control.ships import Capability
+from expdesign.plan.control.ships import LEAD_SHARE, Capability
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Allocator, Vessel, VesselModel
+
+PACE_LEAST, PACE_MOST = 0.2, 3.0  # of a reference that stays abeam of a ship, in samples
+LEARNING = 3.0  # time constant in which an unexplained acceleration is estimated, in those of the velocities
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +79,7 @@ class Reference:
         """
         step = np.maximum(self._steps_m.take(sample.astype(int), mode="clip"), step_m)
         pace = -self._behind_m(sample, states) / step
-        return np.asarray(np.minimum(np.maximum(pace, CONTROL.pace_least), CONTROL.pace_most))
+        return np.asarray(np.minimum(np.maximum(pace, PACE_LEAST), PACE_MOST))
 
     def _behind_m(self, sample: Array, states: Array) -> Array:
         """(n,) how far ships (n, 6) are behind the reference at samples (n,), along its course [m]."""
@@ -175,7 +178,7 @@ class Helmsman:
         delay_s, lag_s, offset = (
             np.array([getattr(x, name) for x in given]) for name in ("delay_s", "lag_s", "offset")
         )
-        soon = np.maximum(CONTROL.lead_share, self.vessel.sample_time_s / np.maximum(lag_s, 1e-9))
+        soon = np.maximum(LEAD_SHARE, self.vessel.sample_time_s / np.maximum(lag_s, 1e-9))
         return delay_s, lag_s, offset, 1.0 / -np.expm1(-soon)
 
     def unexplained(self, estimate: Array, before: Array, states: Array, delivered: Array) -> Array:
@@ -192,7 +195,7 @@ class Helmsman:
         known = np.empty((3, len(estimate))).T
         for column, part in enumerate(predicted):
             known[:, column] = part
-        share = min(1.0, self.vessel.sample_time_s / (CONTROL.learning * self.answer_s))
+        share = min(1.0, self.vessel.sample_time_s / (LEARNING * self.answer_s))
         return np.asarray(estimate + share * ((new - old) / self.vessel.sample_time_s - known - estimate))
 
     @cached_property

@@ -23,11 +23,18 @@ import casadi as ca
 import numpy as np
 
 from expdesign.plan.legs.problem import LegProblem
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, Vessel
+
+SMOOTHNESS = 0.02  # weight of squared command steps against time in units of `LegProblem.time_scale_s`
+SMALLNESS = 1e-4  # weight of squared commands: decides between commands that give the same force
+FREE_SAMPLES = (0.2, 3.0)  # least and largest time between samples while it is free, in sample times
+SETTLED = 1e-4  # miss of what lagging actuators deliver at the end, relative to the largest
+ITERATIONS = 100  # of IPOPT at most
+PROGRAMS = 24  # nonlinear programs kept built
+
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 RELAXED = 1e-8
@@ -73,8 +80,8 @@ class Program:
         others = ca.vertcat(*rows, ca.sum1(through**2).T, (through[0, :] * x[5, 1:-1]).T)
         constraints = ca.vertcat(motion, others)
         cost = (
-            LEGS.smoothness * ca.sumsqr(ca.diff(u, 1, 1))
-            + LEGS.smallness * ca.sumsqr(u) / j
+            SMOOTHNESS * ca.sumsqr(ca.diff(u, 1, 1))
+            + SMALLNESS * ca.sumsqr(u) / j
             - ca.dot(displacement_value, states[:2, -1]) / unit_s
         )
         if self.free:
@@ -84,7 +91,7 @@ class Program:
         variables_and_parameters = [variables, parameters]
         weights, jacobian, hessian = self._derivatives(variables, arguments, given[:, 1:], scale, cost, others)
         options: dict[str, Any] = {"print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes"}
-        options |= {"ipopt.max_iter": LEGS.iterations, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
+        options |= {"ipopt.max_iter": ITERATIONS, "ipopt.constr_viol_tol": 1e-9, "ipopt.acceptable_iter": 0}
         options |= {"ipopt.tol": 1e-5 if self.free else 1e-7}
         options |= {"ipopt.mumps_pivot_order": 0}  # minimum degree: by far the least work for chains of samples
         # all is scaled here: what MUMPS would scale, and what a second solution would refine, changes no digit kept
@@ -197,9 +204,9 @@ class Program:
         least, most = (np.full((j + 1, len(self.lagging)), sign * np.inf) for sign in (-1, 1))
         scale = self.input_scale[self.lagging]
         least[0] = most[0] = ends[0] / scale
-        least[-1], most[-1] = ends[1] / scale - LEGS.settled, ends[1] / scale + LEGS.settled
+        least[-1], most[-1] = ends[1] / scale - SETTLED, ends[1] / scale + SETTLED
         sample_s = self.vessel.sample_time_s
-        times = [share * sample_s for share in LEGS.free_samples] if self.free else [sample_s, sample_s]
+        times = [share * sample_s for share in FREE_SAMPLES] if self.free else [sample_s, sample_s]
         return (
             np.r_[low.ravel(), (first / self.input_scale).ravel(), least.ravel(), times[0]],
             np.r_[high.ravel(), (last / self.input_scale).ravel(), most.ravel(), times[1]],
@@ -269,7 +276,7 @@ class BlockMap:
     hessian: ca.Function
 
 
-@lru_cache(maxsize=LEGS.programs)
+@lru_cache(maxsize=PROGRAMS)
 def _block_map(ship: _Ship, block: int) -> BlockMap:
     """The map over so many samples of a vessel in an environment's mean current and wind, with its derivatives."""
     vessel = ship.vessel
@@ -345,6 +352,6 @@ def program(vessel: Vessel, environment: Environment, nodes: int, block: int, fr
     return _program(_ship(vessel, environment), nodes, block, free_time)
 
 
-@lru_cache(maxsize=LEGS.programs)
+@lru_cache(maxsize=PROGRAMS)
 def _program(ship: _Ship, nodes: int, block: int, free_time: bool) -> Program:
     return Program(ship.vessel, ship.environment, nodes, block, free_time)

@@ -24,8 +24,20 @@ from ompl import util as ou
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import CHART, Corners, Roadmap, opened, shore_corners, simplified
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.values import Array
+
+# iterations of the path planner between looks for a solution, and how often at most
+SEARCH_ITERATIONS, SEARCH_SLICES = 1500, 4
+SEARCH_BATCHES = 100  # batches of samples after which it gives up
+IMPROVING_SLICES = 1  # spent on a shorter path after the first solution
+ROADMAP_PLACES = 500  # drawn for a roadmap besides the shores' corners, in `roadmap_tries` tries at most
+ROADMAP_TRIES = 50_000
+# shares of a path that shortcuts span, tried one after the other, `shortcut_tries` of each at most, and no more after
+# `shortcut_misses` without a gain
+SHORTCUTS = (1.0, 0.3, 0.1, 0.03)
+SHORTCUT_TRIES = 200
+SHORTCUT_MISSES = 60
+
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
@@ -71,8 +83,8 @@ def _roadmap_data(information: ob.SpaceInformation, bends: Array) -> ob.PlannerD
     planner.setProblemDefinition(query)
     planner.setup()
     planner.solve(ob.plannerAlwaysTerminatingCondition())
-    tries = iter(range(LEGS.roadmap_tries))
-    most = planner.milestoneCount() + LEGS.roadmap_places
+    tries = iter(range(ROADMAP_TRIES))
+    most = planner.milestoneCount() + ROADMAP_PLACES
     enough = ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= most or next(tries, None) is None)
     planner.growRoadmapPtc(enough)
     data = ob.PlannerData(information)
@@ -87,9 +99,9 @@ def shortened(path: Array, water: shapely.MultiPolygon) -> Array:
     simplifier, taut = og.PathSimplifier(information), og.PathGeometric(information)
     for point in path:
         taut.append(_place(information, point))
-    tries, misses = LEGS.shortcut_tries, LEGS.shortcut_misses
+    tries, misses = SHORTCUT_TRIES, SHORTCUT_MISSES
     simplifier.reduceVertices(taut, tries, misses, 1.0)
-    for share in LEGS.shortcuts:
+    for share in SHORTCUTS:
         simplifier.partialShortcutPath(taut, tries, misses, share)
     simplifier.reduceVertices(taut, tries, misses, 1.0)
     return _places(taut.getStates())
@@ -161,10 +173,10 @@ def search_dubins(
     setup.setPlanner(planner)
     # the planner reports a solution only between calls of solve, so it is called in slices and continues where it was
     solved = 0
-    for _ in range(LEGS.search_slices):
-        setup.solve(ob.PlannerTerminationCondition(_after(LEGS.search_iterations, planner)))
+    for _ in range(SEARCH_SLICES):
+        setup.solve(ob.PlannerTerminationCondition(_after(SEARCH_ITERATIONS, planner)))
         solved += bool(setup.haveExactSolutionPath())
-        if solved > LEGS.improving_slices or _batches(planner) > LEGS.search_batches:
+        if solved > IMPROVING_SLICES or _batches(planner) > SEARCH_BATCHES:
             break
     if not solved:
         return None
@@ -218,7 +230,7 @@ def _curve(
 def _after(iterations: int, planner: og.BITstar) -> Callable[[], bool]:
     """A condition that becomes true after being asked a number of times, or when too many batches were drawn."""
     count = iter(range(iterations))
-    return lambda: next(count, None) is None or _batches(planner) > LEGS.search_batches
+    return lambda: next(count, None) is None or _batches(planner) > SEARCH_BATCHES
 
 
 def _batches(planner: og.BITstar) -> int:

@@ -16,10 +16,15 @@ from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import AgileShip, Helmsman, Reference
 from expdesign.plan.legs.optimise import solve_leg, solve_transition
 from expdesign.plan.legs.problem import LegProblem, hull_discs, leg_problem
-from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import FoundLeg, LegTask, LegWater, acceptable, nearest_turns
+from expdesign.plan.legs.water import CORRIDOR_HULLS, FoundLeg, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import allocate, required_force
+
+GUESS_NODES = 40  # of first guesses of agile legs
+TRANSITION_NODES = 24  # of optimised transitions at most
+WHOLE_SAMPLES = 100.0  # up to which straight agile legs are optimised as a whole
+REMEMBERED_COMMANDS = 5000  # that are looked back at while steering
+BEND_RADII = (1.5, 0.8, 0.4)  # lengths over which bends of agile legs' paths are rounded, in turning radii
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +62,7 @@ def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> FoundLeg | Non
         line = _line(water, path.points)
         first_m, last_m = _end_lengths(task, water, ship, line)
         short = line.length_m < first_m + last_m + 2 * water.vessel.length_m
-        brief_m = LEGS.whole_samples * water.vessel.sample_time_s * water.ship.transit_speed_mps
+        brief_m = WHOLE_SAMPLES * water.vessel.sample_time_s * water.ship.transit_speed_mps
         whole = short or (len(path.points) == 2 and line.length_m < brief_m)  # loses less time, where it is small
         values = _optimised(task, water, ship, line) if whole else None
         if values is None and not short:
@@ -69,10 +74,10 @@ def agile_leg(task: LegTask, water: LegWater, ship: AgileShip) -> FoundLeg | Non
 
 def _line(water: LegWater, path: Array) -> Line:
     """A path with its bends rounded as widely as the water allows."""
-    for share in LEGS.bend_radii:
+    for share in BEND_RADII:
         window_m = share * water.ship.turning_radius_m
         line = rounded(path, window_m=window_m, spacing_m=water.vessel.length_m / 6)
-        if share == LEGS.bend_radii[-1] or len(path) < 3 or water.holds(line.at(line.along_m)):
+        if share == BEND_RADII[-1] or len(path) < 3 or water.holds(line.at(line.along_m)):
             break
     return line
 
@@ -174,7 +179,7 @@ def _steered(water: LegWater, reference: Reference, state: Array, before: Array)
     while sample[0] < len(reference.states) - 1:
         sample = sample + np.maximum(reference.pace(sample, states, water.vessel.length_m / 2), 0.2)
         row = helm.commands(reference.at(sample), states, given[-1][None])
-        past = None if water.prompt else water.remembered(np.array(given[-LEGS.remembered_commands :]))
+        past = None if water.prompt else water.remembered(np.array(given[-REMEMBERED_COMMANDS:]))
         states = water.states(states[0], row, past)[-1:]
         given.append(row[0])
     return np.array(given[first:]), states[0]
@@ -215,7 +220,7 @@ def free_leg(task: LegTask, water: LegWater, ship: AgileShip, displacement_value
     """
     line = _line(water, np.stack([task.start[:2], task.end[:2]]))
     problems = (
-        replace(problem, displacement_value=displacement_value, node_s=problem.duration_s / LEGS.transition_nodes)
+        replace(problem, displacement_value=displacement_value, node_s=problem.duration_s / TRANSITION_NODES)
         for problem in _problems(task, water, ship, line)
     )
     found = [answer for problem in problems if (answer := solve_transition(problem)) is not None]
@@ -225,7 +230,7 @@ def free_leg(task: LegTask, water: LegWater, ship: AgileShip, displacement_value
 def _problem(task: LegTask, water: LegWater, ship: AgileShip, line: Line, turn: float) -> LegProblem:
     duration_s = _duration_s(task, ship, line, turn)
     states = _guess(task, line, turn, duration_s)
-    path = line.at(np.linspace(0.0, line.length_m, LEGS.guess_nodes + 1))
+    path = line.at(np.linspace(0.0, line.length_m, GUESS_NODES + 1))
     problem = leg_problem(
         task,
         water,
@@ -257,7 +262,7 @@ def _circle(water: LegWater, line: Line, arm: float, margin_m: float) -> Array |
     middle = line.at(np.array([line.length_m / 2]))[0, :2]
     radius = float(water.field.at(middle)) - margin_m
     needed = float(np.hypot(*(line.points - middle).T).max()) + arm + water.vessel.length_m / 3
-    if radius >= needed + LEGS.corridor_hulls * water.vessel.length_m:
+    if radius >= needed + CORRIDOR_HULLS * water.vessel.length_m:
         radius = np.inf
     return np.r_[middle, radius] if radius >= needed else None
 
@@ -272,7 +277,7 @@ def _duration_s(task: LegTask, ship: AgileShip, line: Line, turn: float) -> floa
 
 def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
     """(j + 1, 6) states along a line, the heading turning evenly, velocities fitting the places."""
-    share = np.linspace(0.0, 1.0, LEGS.guess_nodes + 1)[:, None]
+    share = np.linspace(0.0, 1.0, GUESS_NODES + 1)[:, None]
     ends = np.stack([task.start, task.end])
     c, s = np.cos(ends[:, 2]), np.sin(ends[:, 2])
     tangents = duration_s * np.stack([ends[:, 3] * c - ends[:, 4] * s, ends[:, 3] * s + ends[:, 4] * c], axis=1)
@@ -280,7 +285,7 @@ def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
     place = line.at(smooth[:, 0] * line.length_m)[:, :2] + (task.start[:2] - line.points[0]) * (1 - smooth)
     place += (share - 2 * share**2 + share**3) * tangents[0] + (share**3 - share**2) * tangents[1]
     heading = task.start[2] + smooth[:, 0] * turn
-    step_s = duration_s / LEGS.guess_nodes
+    step_s = duration_s / GUESS_NODES
     motion = np.gradient(place, step_s, axis=0)
     c, s = np.cos(heading), np.sin(heading)
     states = np.column_stack(
@@ -299,7 +304,7 @@ def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
 
 def _guessed_inputs(task: LegTask, water: LegWater, states: Array, duration_s: float) -> Array:
     """Commands (j + 1, m) that would give the guessed motion."""
-    vessel, step_s = water.vessel, duration_s / LEGS.guess_nodes
+    vessel, step_s = water.vessel, duration_s / GUESS_NODES
     force = required_force(vessel.model, states[1:, 3:], np.gradient(states[:, 3:], step_s, axis=0)[1:])
     values = allocate(vessel.actuators, force, sample_time_s=step_s, before=task.start_inputs)
     inputs = np.vstack([task.start_inputs, values])

@@ -10,10 +10,12 @@ from expdesign.plan.control import Capability
 from expdesign.plan.legs._ompl import CURVE, DUBINS, dubins_curve, search_dubins
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
 from expdesign.vessel import Vessel, allocate, required_force
+
+# margins of the boxes searched for Dubins paths round a leg's ends, in turning radii plus hull lengths
+SEARCH_BOXES = (4.0, 40.0)
 
 
 def curved_leg(task: LegTask, water: LegWater) -> FoundLeg | None:
@@ -42,7 +44,7 @@ def find_path(task: LegTask, water: LegWater) -> LegPath | None:
         return LegPath(points=direct, source=CURVE)
     if not all(water.holds(end) for end in (direct[:1], direct[-1:])):  # then no path does
         return None
-    for attempt, reach in enumerate(LEGS.search_boxes):
+    for attempt, reach in enumerate(SEARCH_BOXES):
         box = reach * (radius + water.vessel.length_m)
         path = search_dubins(
             task.start[:3],

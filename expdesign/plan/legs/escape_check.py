@@ -10,9 +10,13 @@ import heapq
 import numpy as np
 
 from expdesign.errors import NoPlan
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import LegWater
 from expdesign.values import Array
+
+ESCAPED_RADII = 2.5  # turning radii from a place at which a ship has escaped from it
+ESCAPE_ARC_RAD = 0.35  # turn of one arc of the escape check; straights are as long
+ESCAPE_CELL, ESCAPE_COURSES = 0.25, 12  # cells of its search: their size in turning radii, and courses to half a circle
+ESCAPE_ARCS = 6000  # checked at most
 
 
 def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
@@ -29,10 +33,10 @@ def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
     radius, start = water.ship.turning_radius_m, np.add(pose, (0.0, 0.0, np.pi * backwards))
     queue: list[tuple[float, int, Array]] = [(0.0, 0, start)]
     seen, count = set[tuple[int, ...]](), 0
-    while queue and count < LEGS.escape_arcs:
+    while queue and count < ESCAPE_ARCS:
         _, _, place = heapq.heappop(queue)
         for bend in (0.0, 1.0, -1.0):
-            arc = _arc(place, bend / radius, LEGS.escape_arc_rad * radius, water.vessel.length_m)
+            arc = _arc(place, bend / radius, ESCAPE_ARC_RAD * radius, water.vessel.length_m)
             key = _cell(arc[-1], radius)
             if key in seen:
                 continue
@@ -41,7 +45,7 @@ def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
             if not water.holds(arc):
                 continue
             away = float(np.hypot(*(arc[-1] - start)[:2]))
-            if away > LEGS.escaped_radii * radius:
+            if away > ESCAPED_RADII * radius:
                 return True
             heapq.heappush(queue, (-away, count, arc[-1]))
     return False
@@ -57,7 +61,7 @@ def _arc(pose: Array, curvature: float, length_m: float, hull_m: float) -> Array
 
 
 def _cell(pose: Array, radius: float) -> tuple[int, ...]:
-    share, courses = LEGS.escape_cell, LEGS.escape_courses
+    share, courses = ESCAPE_CELL, ESCAPE_COURSES
     course = round(float(pose[2]) / np.pi * courses) % (2 * courses)
     return round(float(pose[0]) / (share * radius)), round(float(pose[1]) / (share * radius)), course
 

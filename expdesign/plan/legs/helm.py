@@ -29,11 +29,40 @@ from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
-from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns, through_water
+from expdesign.plan.legs.water import (
+    ARRIVAL,
+    FoundLeg,
+    LegPath,
+    LegTask,
+    LegWater,
+    acceptable,
+    nearest_turns,
+    through_water,
+)
 from expdesign.simulation import to_body
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, within_limits
+
+SLOW_SHARE = 0.3  # transit speeds below which a helm-steered ship is about to accelerate from rest or to stop
+# shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the stopping distance
+# before a goal
+STRAIGHTS = (
+    (1.0, 2.0, 1.0),
+    (1.0, 1.0, 0.7),
+    (0.5, 0.5, 0.4),
+    (0.0, 0.0, 0.1),
+)
+HELM_NODE = 0.25  # time between nodes of helm-steered legs, in that of a hull length at transit speed
+EASED_HULLS = 1.0  # hull lengths over which their first guess eases into turns
+STRAIGHT_OFF_HULLS = 1.0  # straight before the first turn, as the helm takes that long to act
+TRANSIT_HULLS = 20.0  # shortest straight that is sailed with constant commands, in hull lengths
+TRANSIT_ENDS_HULLS = 6.0  # of straights before and after it that are optimised with the rest of the leg
+STRAIGHT_RAD = 1e-6  # change of course from point to point of a path from which on it bends
+HEADING_ROUNDS = 8  # of the search for the heading that makes good a course in a current
+COUNTER_HELM = 3.0  # helm against a residual turn, per yaw rate, in times of a hull length at transit speed
+RECOVERED_SHARE = 0.05  # yaw rate at which the ship has recovered, in that of a leg's turns
+RECOVERY_HULLS = 8.0  # time after which a recovery ends in any case, in that of a hull length at transit speed
+
 
 # Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
 
@@ -60,11 +89,8 @@ def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recov
     pace_s, swing = vessel.length_m / ship.transit_speed_mps, ship.transit_speed_mps / ship.turning_radius_m
     hardest = approach.helm.hardest(approach.drive) - abs(approach.angle_rad)
     states, rows = [np.asarray(state)], [past[-1]]
-    while (
-        abs(states[-1][5]) > LEGS.recovered_share * swing
-        and len(states) * vessel.sample_time_s < LEGS.recovery_hulls * pace_s
-    ):
-        against = float(np.clip(LEGS.counter_helm * pace_s * states[-1][5], -hardest, hardest))
+    while abs(states[-1][5]) > RECOVERED_SHARE * swing and len(states) * vessel.sample_time_s < RECOVERY_HULLS * pace_s:
+        against = float(np.clip(COUNTER_HELM * pace_s * states[-1][5], -hardest, hardest))
         desired = np.array(approach.helm.inputs(approach.drive, approach.angle_rad - approach.starboard * against))
         row = within_limits(vessel.actuators, desired[None], sample_time_s=vessel.sample_time_s, before=rows[-1])
         given = past if water.prompt else water.remembered(np.concatenate([past, *(row[None] for row in rows[1:])]))
@@ -81,10 +107,8 @@ def displaced(recovery: Recovery, ship: Capability, *, sample_time_s: float, hul
     first, last = recovery.states[0], recovery.states[-1]
     c, s = math.cos(first[2]), math.sin(first[2])
     course = last[2] + (math.atan2(last[4], last[3]) if last[3] > 0 else 0.0)
-    north, east = (
-        last[:2] - first[:2] + LEGS.straight_off_hulls * hull_m * np.array([math.cos(course), math.sin(course)])
-    )
-    time_s = len(recovery.commands) * sample_time_s + LEGS.straight_off_hulls * hull_m / ship.transit_speed_mps
+    north, east = last[:2] - first[:2] + STRAIGHT_OFF_HULLS * hull_m * np.array([math.cos(course), math.sin(course)])
+    time_s = len(recovery.commands) * sample_time_s + STRAIGHT_OFF_HULLS * hull_m / ship.transit_speed_mps
     return np.array([north * c + east * s, east * c - north * s, course - first[2], time_s])
 
 
@@ -126,9 +150,9 @@ def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShi
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
     first, last = _longest_straight(along, path[:, 2])
     gather_m = ship.transit_speed_mps**2 / (2.0 * ship.acceleration_mps2)
-    begin = max(along[first], gather_m) + LEGS.transit_ends_hulls * hull_m
-    end = min(along[last], along[-1] - braking_m) - LEGS.transit_ends_hulls * hull_m
-    if end - begin < LEGS.transit_hulls * hull_m:
+    begin = max(along[first], gather_m) + TRANSIT_ENDS_HULLS * hull_m
+    end = min(along[last], along[-1] - braking_m) - TRANSIT_ENDS_HULLS * hull_m
+    if end - begin < TRANSIT_HULLS * hull_m:
         return None
     course = float(path[first, 2])
     place = path[first, :2] + (begin - along[first]) * np.array([np.cos(course), np.sin(course)])
@@ -137,7 +161,7 @@ def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShi
     commands = np.tile(ship.approach.inputs, (count, 1))
     states = water.states(start, commands)
     scale = np.r_[1.0, [ship.transit_speed_mps] * 2, ship.yaw_rate_radps]
-    if (np.abs(states[-1] - start)[2:] > LEGS.arrival / 10 * scale).any():
+    if (np.abs(states[-1] - start)[2:] > ARRIVAL / 10 * scale).any():
         return None
     return Transit(
         to=np.vstack([path[along < begin], [*place, course]]),
@@ -149,7 +173,7 @@ def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShi
 
 def _longest_straight(along: Array, course: Array) -> tuple[int, int]:
     """Indices of the points between which a path keeps its course longest."""
-    bends = np.flatnonzero(np.abs(np.diff(course)) > LEGS.straight_rad)
+    bends = np.flatnonzero(np.abs(np.diff(course)) > STRAIGHT_RAD)
     ends = np.r_[bends, len(course) - 1]  # a bend lies between its point and the next
     begins = np.r_[0, bends + 1]
     longest = int(np.argmax(along[ends] - along[begins]))
@@ -159,7 +183,7 @@ def _longest_straight(along: Array, course: Array) -> tuple[int, int]:
 def _steady_state(place: Array, course: float, water: LegWater, ship: HelmShip) -> Array:
     """(6,) the ship at a place (2,) at transit speed through water, heading so that it makes good a course [rad]."""
     velocity, heading = np.zeros(3), course
-    for _ in range(LEGS.heading_rounds):
+    for _ in range(HEADING_ROUNDS):
         current = to_body(water.environment.current_to, heading, NUMPY)
         velocity = ship.approach.velocity + np.array([*current, 0.0])
         heading = course - float(np.arctan2(velocity[1], velocity[0]))
@@ -208,7 +232,7 @@ def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: R
 
 def _stops(task: LegTask, water: LegWater) -> bool:
     """Whether the ship is to stop at the leg's end."""
-    return _speed_mps(water, task.end) < LEGS.slow_share * water.ship.transit_speed_mps
+    return _speed_mps(water, task.end) < SLOW_SHARE * water.ship.transit_speed_mps
 
 
 def _speed_mps(water: LegWater, state: Array) -> float:
@@ -224,7 +248,7 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
         return task, 0
     states = water.states(task.end, np.tile(task.end_inputs, (samples, 1)))
     scale = np.r_[1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    if (np.abs(states[-1] - task.end)[2:] > LEGS.arrival / 10 * scale).any():
+    if (np.abs(states[-1] - task.end)[2:] > ARRIVAL / 10 * scale).any():
         return task, 0
     moved = (states[-1] - states[0])[:2]
     return replace(task, end=np.r_[task.end[:2] - moved, task.end[2:]]), samples
@@ -267,10 +291,10 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip
         Straights(
             first=first,
             last=last,
-            off_m=off * LEGS.straight_off_hulls * length,
+            off_m=off * STRAIGHT_OFF_HULLS * length,
             into_m=stop * ship.stopping_m if stopping else settle * CONTROL.settling_hulls * length,
         )
-        for off, settle, stop in LEGS.straights
+        for off, settle, stop in STRAIGHTS
     ]
     lengths = [item.length_m(radius) for item in tries]
     longer = np.maximum(np.array(lengths) - min(lengths) - radius / 2, 0.0)
@@ -296,7 +320,7 @@ def _path(task: LegTask, water: LegWater, straights: Straights) -> LegPath | Non
 
 def _course_pose(state: Array, water: LegWater) -> Array:
     """(3,) place and course over ground of a state (6,); heading for course where it hardly moves."""
-    if _speed_mps(water, state) < LEGS.slow_share * water.ship.transit_speed_mps:
+    if _speed_mps(water, state) < SLOW_SHARE * water.ship.transit_speed_mps:
         return np.asarray(state[:3])
     return np.asarray(state[:3] + np.array([0.0, 0.0, np.arctan2(state[4], state[3])]))
 
@@ -324,7 +348,7 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
         path=places,
         duration_s=duration_s,
         turning_rate_radps=ship.yaw_rate_radps,
-        node_s=LEGS.helm_node * water.vessel.length_m / ship.transit_speed_mps,
+        node_s=HELM_NODE * water.vessel.length_m / ship.transit_speed_mps,
     )
 
 
@@ -353,7 +377,7 @@ def _steady_along(start: Array, end: Array, ship: HelmShip, path: Array) -> tupl
     """
     approach = ship.approach
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]
-    bend = _eased(along, path[:, 2], LEGS.eased_hulls * approach.helm.vessel.length_m)
+    bend = _eased(along, path[:, 2], EASED_HULLS * approach.helm.vessel.length_m)
     helm, slowed, drift = _turn_at(ship, bend)
     speed = _speeds((start, end), ship, along, slowed * ship.transit_speed_mps)
     time_s = np.r_[0.0, np.cumsum(np.diff(along) * 2 / (speed[1:] + speed[:-1]))]

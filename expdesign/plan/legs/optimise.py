@@ -8,11 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from expdesign.memory import recalled
-from expdesign.plan.legs._casadi import program
+from expdesign.plan.legs._casadi import FREE_SAMPLES, program
 from expdesign.plan.legs.problem import LegProblem
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.values import Array
+
+NODES = (12, 18, 24, 32, 44, 60, 80, 110, 160)  # numbers of nodes tried while the time is free
+UNLIMITED = 0.999  # share of the largest from which on a transition would last for ever
 
 
 def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
@@ -27,7 +29,7 @@ def solve_transition(problem: LegProblem) -> tuple[float, Array] | None:
         found = fastest.solve(_respaced(guess, nodes), duration_s / (nodes * block))
         if found is None:
             continue
-        if found[1] > LEGS.unlimited * LEGS.free_samples[1] * sample_s:
+        if found[1] > UNLIMITED * FREE_SAMPLES[1] * sample_s:
             return None
         count = max(2, int(np.ceil(nodes * found[1] / sample_s - 1e-6)))
         smooth = program(problem.vessel, problem.environment, count, block, False)
@@ -46,7 +48,7 @@ def _even(problem: LegProblem) -> LegProblem:
 def _size(problem: LegProblem, duration_s: float) -> tuple[int, int]:
     """Number of nodes for a leg of some time, and samples between two of them."""
     sample_s = problem.vessel.sample_time_s
-    nodes = next((n for n in LEGS.nodes if n >= duration_s / max(sample_s, problem.node_s)), LEGS.nodes[-1])
+    nodes = next((n for n in NODES if n >= duration_s / max(sample_s, problem.node_s)), NODES[-1])
     return nodes, max(1, round(duration_s / (nodes * sample_s)))
 
 

@@ -31,6 +31,11 @@ from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import swept_hulls
 
+CORRIDOR_HULLS = 3.0  # width of corridors to either side at most, in hull lengths
+MEMORY_TIME_CONSTANTS = 20.0  # after which a lagging actuator has forgotten: two parts in a thousand million are left
+ARRIVAL = 1e-3  # largest miss of a leg's end state, in hull lengths, and in transit speeds
+
+
 ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
 """Factor on a margin by which no rounded corner is nearer than required: arcs are drawn inside their circles."""
 
@@ -280,7 +285,7 @@ class LegWater:
 
     def remembered(self, commands: Array) -> Array:
         """The last of given commands (k, m), as many as still act through any actuator."""
-        memory = LEGS.memory_time_constants
+        memory = MEMORY_TIME_CONSTANTS
         longest_s = max(memory * response.lag_s + response.delay_s for response in self.vessel.responses)
         return commands[-int(np.ceil(longest_s / self.vessel.sample_time_s)) - 2 :]
 
@@ -306,7 +311,7 @@ def acceptable(start: Array, end: Array, water: LegWater, values: Array, before:
     """Whether commands, simulated from a state after others, arrive at another state and stay in safe water."""
     states = water.states(start, values, before)
     scale = np.r_[[water.vessel.length_m] * 2, 1.0, [water.ship.transit_speed_mps] * 2, water.ship.yaw_rate_radps]
-    return bool((np.abs(states[-1] - end) <= LEGS.arrival * scale).all()) and water.holds(states[:, :3])
+    return bool((np.abs(states[-1] - end) <= ARRIVAL * scale).all()) and water.holds(states[:, :3])
 
 
 def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
@@ -316,7 +321,7 @@ def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
 
 def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:
     """(j,) how far each centre may move to one side while its discs keep clear; bounded by `Tuning.corridor_hulls`."""
-    steps = np.arange(0.0, LEGS.corridor_hulls * water.vessel.length_m, water.field.cell_m)
+    steps = np.arange(0.0, CORRIDOR_HULLS * water.vessel.length_m, water.field.cell_m)
     points = centre[:, None] + steps[:, None] * side[:, None, :]
     free = water.field.at(points) >= margin_m
     free[:, 0] = True

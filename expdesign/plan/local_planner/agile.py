@@ -23,6 +23,7 @@ from expdesign.plan.local_planner.protocol import (
     TransitionTrials,
 )
 from expdesign.plan.local_planner.transitions import (
+    NEAR_HULLS,
     TURNS,
     LegTimes,
     leg_times,
@@ -36,6 +37,17 @@ from expdesign.plan.runs import Footprint
 from expdesign.simulation import CALM
 from expdesign.values import Array
 from expdesign.vessel import Vessel
+
+# the same of agile ships, and lengths of their straight legs besides the best transitions, beyond the run-up
+AGILE_PATH_STRETCHES = (1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0)
+# the same of agile ships, and lengths of their straight legs besides the best transitions, beyond the run-up
+AGILE_STRAIGHTS = (1.5, 2.5, 6.0)
+# courses of those legs to a full turn, from the heading that the run before ends with, and headings of runs, from that
+# heading or from the direction of the path
+AGILE_COURSES, AGILE_HEADINGS = 6, 16
+NEAR_PATH_HULLS = 10.0  # hull lengths along the path within which it is taken for a straight line
+FAR_HULLS = 4.0  # hull lengths that are enough for any leg
+TRANSITION_TRIALS = 4  # plans whose transitions are tried before the search proper
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +72,7 @@ class AgilePlanner:
     @property
     def transition_trials(self) -> int:
         """The least length of a leg depends on the runs; it is found by optimisation."""
-        return LOCAL.transition_trials
+        return TRANSITION_TRIALS
 
     def check_ends(self, start: Array, goal: Array, water: LegWater) -> None:
         """Nothing: such ships leave and reach any place."""
@@ -78,7 +90,7 @@ class AgilePlanner:
 
     def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Transitions, straight legs, and points of the path to the goal."""
-        points = path_points(space, plans.pose, LOCAL.agile_path_stretches)
+        points = path_points(space, plans.pose, AGILE_PATH_STRETCHES)
         found: list[Successors] = []
         for q in plans.wanted:
             able = plans.able(q)
@@ -119,9 +131,7 @@ class AgilePlanner:
         direct = np.arctan2(away[:, 1], away[:, 0])
         helped_m = away @ space.current_to / rule.speed_mps
         path_m = np.maximum(space.goal_distance.to_goal(pose[:, :2]) - helped_m, 0.0)
-        more_s = np.where(
-            path_m < LOCAL.near_hulls * space.hull_m, rule.settle_s / 2, 0.0
-        )  # may turn out to be too near
+        more_s = np.where(path_m < NEAR_HULLS * space.hull_m, rule.settle_s / 2, 0.0)  # may turn out to be too near
         more_s += np.array([space.more_s(int(last), -1) for last in plans.last])
         angles = pose[:, 2] - direct, space.goal[2] - direct, space.goal[2] - pose[:, 2]
         return rule.seconds(path_m, *angles, plans.exit_mps, np.zeros(1)) + more_s
@@ -130,7 +140,7 @@ class AgilePlanner:
         """Length from which on a leg takes as long as the rule says [m]."""
         tried = space.tried.get(pair)
         tried_m = 0.0 if tried is None else float(np.hypot(*tried.step[:2]))
-        return space.hull_m * float(np.clip(tried_m / space.hull_m, LOCAL.near_hulls, LOCAL.far_hulls))
+        return space.hull_m * float(np.clip(tried_m / space.hull_m, NEAR_HULLS, FAR_HULLS))
 
     def losses_s(self, space: SearchSpace, *, made_good: bool) -> tuple[Array, Array]:
         """Least losses of transitions.
@@ -183,8 +193,8 @@ class AgilePlanner:
 
     def _straights(self, space: SearchSpace, plans: PartialPlans, able: np.ndarray, q: int, alike: Alike) -> Successors:
         """Straight legs to all sides, the run with any heading."""
-        lengths = space.hull_m * np.array(LOCAL.agile_straights)
-        grids = np.meshgrid(all_round(LOCAL.agile_courses), lengths, all_round(LOCAL.agile_headings), indexing="ij")
+        lengths = space.hull_m * np.array(AGILE_STRAIGHTS)
+        grids = np.meshgrid(all_round(AGILE_COURSES), lengths, all_round(AGILE_HEADINGS), indexing="ij")
         course, length, heading = (grid.ravel() for grid in grids)
         step, leg_s = np.zeros((len(able), len(course), 3)), np.zeros((len(able), len(course)))
         for (last, exit_mps), where in alike.items():
@@ -200,11 +210,11 @@ class AgilePlanner:
     ) -> Successors:
         """Runs at points of the path to the goal, with any heading."""
         plan, point = np.nonzero(points.exists[able])
-        parent, turns = able[plan], all_round(LOCAL.agile_headings)
+        parent, turns = able[plan], all_round(AGILE_HEADINGS)
         pose, place = plans.pose[parent], points.place[parent, point]
         direction, along_m = points.direction_rad[parent, point], points.along_m[parent, point]
         away = place - pose[:, :2]
-        to_point, near = np.arctan2(away[:, 1], away[:, 0]), along_m < LOCAL.near_path_hulls * space.hull_m
+        to_point, near = np.arctan2(away[:, 1], away[:, 0]), along_m < NEAR_PATH_HULLS * space.hull_m
         first = pose[:, 2] - np.where(near, to_point, points.first_rad[parent])
         heading = direction[:, None] + turns
         helped_m = away @ space.current_to / self.times.speed_mps

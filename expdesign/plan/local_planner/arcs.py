@@ -9,8 +9,13 @@ import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.local_planner.protocol import RunSpace, SearchSpace, Successors
-from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
+
+# turns of arcs, and the straight after them beyond the run-up in hull lengths
+ARC_TURNS_DEG = (0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180)
+# turns of arcs, and the straight after them beyond the run-up in hull lengths
+ARC_STRAIGHTS = (0.0, 1.0, 2.0, 3.0, 4.5, 6.0)
+PATH_HEADINGS_DEG = (0, 30, -30, 60, -60, 90, -90, 135, -135, 180)  # headings of runs on it, from its direction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,8 +35,7 @@ def arc_successors(space: SearchSpace, departures: Departures, able: np.ndarray,
     """An arc and a straight to the run, after plans `able`; `run_up_m` of them is part of the straight."""
     radius = space.ship.turning_radius_m
     turn, extra = (
-        grid.ravel()
-        for grid in np.meshgrid(np.deg2rad(LOCAL.arc_turns_deg), space.hull_m * np.array(LOCAL.arc_straights))
+        grid.ravel() for grid in np.meshgrid(np.deg2rad(ARC_TURNS_DEG), space.hull_m * np.array(ARC_STRAIGHTS))
     )
     count, pose = len(turn), departures.pose
     departure = np.repeat(pose[able], count, axis=0)
@@ -63,7 +67,7 @@ def path_successors(
         points: of the paths of all plans.
         turning_radius_m: of the turns into and out of the path, whose length is added; 0 where leg times include it.
     """
-    off_path = np.deg2rad(LOCAL.path_headings_deg)
+    off_path = np.deg2rad(PATH_HEADINGS_DEG)
     plan, heading, point = np.nonzero(
         np.broadcast_to(points.exists[able, None], (len(able), len(off_path), points.count))
     )

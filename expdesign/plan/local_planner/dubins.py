@@ -20,8 +20,11 @@ from expdesign.plan.control import DubinsShip
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, curved_leg, dubins_curve
 from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_points, path_successors
 from expdesign.plan.local_planner.protocol import LegEnds, Pair, PartialPlans, SearchSpace, Successors, TransitionTrials
-from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.values import Array
+
+# of the shortest path to the goal, in hull lengths; the whole path is always tried too
+PATH_STRETCHES = (5.0, 12.0, 25.0, 50.0, 100.0)
+
 
 # Lengths of the shortest curves of bounded curvature, many at once: what a search needs of them.
 
@@ -93,7 +96,7 @@ class DubinsPlanner:
 
     def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Arcs, and stretches of the path to the goal."""
-        points, radius_m, found = path_points(space, plans.pose, LOCAL.path_stretches), self.ship.turning_radius_m, []
+        points, radius_m, found = path_points(space, plans.pose, PATH_STRETCHES), self.ship.turning_radius_m, []
         for q in plans.wanted:
             able, change_s = plans.able(q), self._change_s(plans.exit_mps, space.footprints[q].entry_mps)
             run_up_m = space.hull_m + np.array([space.more_run_up_m(int(last), q) for last in plans.last[able]])

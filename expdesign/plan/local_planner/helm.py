@@ -37,11 +37,20 @@ from expdesign.plan.local_planner.arcs import (
     path_points,
     path_successors,
 )
-from expdesign.plan.local_planner.dubins import dubins_m
+from expdesign.plan.local_planner.dubins import PATH_STRETCHES, dubins_m
 from expdesign.plan.local_planner.protocol import LegEnds, Pair, PartialPlans, SearchSpace, Successors, TransitionTrials
 from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.simulation import CALM
 from expdesign.values import Array, seal
+
+# what a metre costs that a helm-steered leg is too short by, in metres at transit speed: the ship goes back for it,
+# slowly
+TOO_SHORT = 12.0
+STOP_LEG_HULLS = 5.0  # least length of helm-steered legs to a stop: a ship off the track returns to it before
+RUN_LEG_SPARE_HULLS = 0.8  # length of helm-steered legs to runs beyond what changes of speed need: the helm takes some
+TABLED_SPEEDS = 60  # highest speeds of helm-steered legs that are tabulated
+STOPPED_SHARE = 0.3  # of transit speed below which a ship has stopped or is about to: no run-up then
+
 
 # A rule for the time of legs of helm-steered ships: accelerate, go on, stop, as the ship's own simulation does.
 
@@ -76,11 +85,11 @@ class HelmTimes:
     def seconds(self, length_m: Array, exit_mps: float, entry_mps: float) -> Array:
         """(...,) time of legs of such lengths through water from one speed to another [s]."""
         path_m, time_s = self._table(exit_mps, entry_mps)
-        least_m = path_m[0] if entry_mps > LOCAL.stopped_share * self.speed_mps else max(path_m[0], self.at_rest_m)
+        least_m = path_m[0] if entry_mps > STOPPED_SHARE * self.speed_mps else max(path_m[0], self.at_rest_m)
         return np.asarray(
             np.interp(length_m, path_m, time_s)
             + np.maximum(length_m - path_m[-1], 0.0) / self.speed_mps
-            + LOCAL.too_short * np.maximum(least_m - length_m, 0.0) / self.speed_mps
+            + TOO_SHORT * np.maximum(least_m - length_m, 0.0) / self.speed_mps
         )
 
     def lost_s(self, exit_mps: float, entry_mps: float, *, made_good: bool) -> float:
@@ -113,16 +122,16 @@ class HelmTimes:
 
     def _straight_m(self, entry_mps: float) -> float:
         """Straight before a run, with room to settle, or before a stop."""
-        return self.run_up_m if entry_mps > LOCAL.stopped_share * self.speed_mps else self.steady_m / 2
+        return self.run_up_m if entry_mps > STOPPED_SHARE * self.speed_mps else self.steady_m / 2
 
     def _table(self, exit_mps: float, entry_mps: float) -> tuple[Array, Array]:
         """Lengths and times of legs with higher and higher peak speeds."""
         first, last = (float(np.clip(speed, 0.0, self.speed_mps)) for speed in (exit_mps, entry_mps))
-        runs = last > LOCAL.stopped_share * self.speed_mps
+        runs = last > STOPPED_SHARE * self.speed_mps
         before_s = self.answer_s if first else 0.0  # from rest the table has it
         steady_m = self.steady_m + self.spare_m if runs else 0.0
         after_s = steady_m / last if runs else self.answer_s
-        peak = np.linspace(max(first, last), self.speed_mps, LOCAL.tabled_speeds)
+        peak = np.linspace(max(first, last), self.speed_mps, TABLED_SPEEDS)
         path_m, time_s = (_between(self.speeding_up, first, peak) + _between(self.stopping, last, peak)).T
         return path_m + steady_m + before_s * first, time_s + before_s + after_s
 
@@ -136,8 +145,8 @@ def helm_times(ship: HelmShip) -> HelmTimes:
         radius_m=ship.turning_radius_m,
         run_up_m=ship.run_up_m,
         steady_m=CONTROL.approach_hulls * approach.helm.vessel.length_m,
-        at_rest_m=LOCAL.stop_leg_hulls * approach.helm.vessel.length_m,
-        spare_m=LOCAL.run_leg_spare_hulls * approach.helm.vessel.length_m,
+        at_rest_m=STOP_LEG_HULLS * approach.helm.vessel.length_m,
+        spare_m=RUN_LEG_SPARE_HULLS * approach.helm.vessel.length_m,
         answer_s=0.5 / approach.helm.drive_rate,
         speeding_up=_speeding_up(ship),
         stopping=_stopping(ship),
@@ -215,7 +224,7 @@ class HelmPlanner:
     def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Arcs and stretches of the path to the goal, in the time that changes of speed and turns take."""
         departures = self._departures(space, plans)
-        points = path_points(space, departures.pose, LOCAL.path_stretches)
+        points = path_points(space, departures.pose, PATH_STRETCHES)
         return [self._to_run(space, plans, q, departures, points) for q in plans.wanted]
 
     def _to_run(

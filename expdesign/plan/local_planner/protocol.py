@@ -17,7 +17,6 @@ from expdesign.dictionary import Primitive
 from expdesign.plan.chart import ClearanceField, GoalDistance
 from expdesign.plan.control import AgileShip, Capability
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater
-from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.plan.values import Placement
 from expdesign.plan.work_budget import WorkBudget
@@ -25,6 +24,10 @@ from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+GO_AROUND_RUN_UPS = 3.0  # expected time of go-arounds before a run that follows another at once, in run-ups, and
+SETTLED_RUN_UPS = 2.0  # length of leg, in run-ups, on which it falls to 1/e; of drawn trials with legs of 5 to 270 s
+
 
 Pair = tuple[str, str]
 """Names of the runs before and after a leg; "" for start and goal."""
@@ -65,7 +68,7 @@ class GoAroundTime:
         if not isinstance(ship, AgileShip):
             return None
         run_up_s = ship.run_up_s(vessel, ship.transit_speed_mps)
-        return GoAroundTime(soon_s=LOCAL.go_around_run_ups * run_up_s, settled_s=LOCAL.settled_run_ups * run_up_s)
+        return GoAroundTime(soon_s=GO_AROUND_RUN_UPS * run_up_s, settled_s=SETTLED_RUN_UPS * run_up_s)
 
     def seconds(self, leg_s: Array) -> Array:
         """(...,) for legs (...,)."""

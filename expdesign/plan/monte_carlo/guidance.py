@@ -12,9 +12,25 @@ from expdesign.plan.control import CONTROL, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
 from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers, ReturnPaths, build_return_paths
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array
+
+GO_AROUNDS = 4  # for one run at most; then the trial is aborted
+PAST_START_HULLS = 1.0  # hull lengths past the start over which a reference continues steadily
+# a ship may take so many times as long as planned for a reference or a path, and so many time constants of the return
+# to a reference besides
+PATIENCE, WAITING_TIME_CONSTANTS = 3.0, 10.0
+LEAST_STEP = 0.2  # movement of a slow reference per sample, in that at transit speed
+PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a ship may sail beside the leg before it
+REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
+REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
+ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
+# distance from the start within which helm-steered ships keep the heading, not the track: there they drift
+STEADY_HULLS = 2.0
+# of the tolerances within which a ship at a standstill begins; the whole ones after half of the waiting time
+STANDSTILL_SHARE = 0.5
+SIDEWAYS_SHARE = 0.5  # of an azimuth's thrust ahead or astern, below which it counts as to the side
+
 
 STRAIGHT = 2
 """Points of a path without bends."""
@@ -67,7 +83,7 @@ class Guidance:
             inputs: (m,) commands with which the run begins: azimuths keep near their angles.
             last: whether the leg leads to the goal, where the position alone counts.
         """
-        after_m = 0.0 if last else max(MONTE_CARLO.past_start_hulls * helm.vessel.length_m, within.position_m)
+        after_m = 0.0 if last else max(PAST_START_HULLS * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
         self._free = np.array(helm.vessel.turns_freely, dtype=float)
@@ -80,7 +96,7 @@ class Guidance:
         self.doing = np.where(sailing, TRACKING, OUT)
         self._shift: Array = np.zeros((n, 2))
         leg_s = planned.arrival * helm.vessel.sample_time_s
-        self._caught_up_m = MONTE_CARLO.rejoin_share * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
+        self._caught_up_m = REJOIN_SHARE * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
         self._at, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
@@ -170,14 +186,14 @@ class Guidance:
             there = self._at_goal(states)
             return there | waited | (not self._helm.ship.keeps_station), there
         if not self._moves:
-            return (used <= MONTE_CARLO.standstill_share) | ((used <= 1.0) & waited), used <= 1.0
+            return (used <= STANDSTILL_SHARE) | ((used <= 1.0) & waited), used <= 1.0
         gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
         return (used <= 1.0) | gone_by, used <= 1.0
 
     def _at_goal(self, states: Array) -> np.ndarray:
         """(k,) whether ships at states (k, 6) of the leg to the goal have reached it: their place alone counts."""
         off_m = lengths(states[:, :2] - self._desired[:2])
-        return np.asarray(off_m <= MONTE_CARLO.arrived_hulls * self._helm.vessel.length_m)
+        return np.asarray(off_m <= ARRIVED_HULLS * self._helm.vessel.length_m)
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships], self._shift[ships] = TRACKING, 0.0
@@ -192,9 +208,9 @@ class Guidance:
         """
         off, result = states[:, :2] - self._reference.states[0, :2], np.zeros((len(states), 2))
         off_m = lengths(off)
-        most_m = MONTE_CARLO.parallel_share * self._within.position_m
+        most_m = PARALLEL_SHARE * self._within.position_m
         if not self._moves:
-            most_m *= MONTE_CARLO.standstill_share
+            most_m *= STANDSTILL_SHARE
         ships = np.flatnonzero((self.doing == TRACKING) & (off_m > self._caught_up_m))
         needed_m = np.minimum(off_m[ships] - self._caught_up_m, most_m)
         shift = off[ships] * (needed_m / off_m[ships])[:, None]
@@ -210,7 +226,7 @@ class Guidance:
 
     @cached_property
     def _thinned(self) -> np.ndarray:
-        return np.unique([*range(0, self._first, MONTE_CARLO.rejoin_samples), self._first - 1])
+        return np.unique([*range(0, self._first, REJOIN_SAMPLES), self._first - 1])
 
     def _rejoin(self, ships: np.ndarray, states: Array) -> None:
         """Ships too far off to return within the leg's time, or without a clear return to it, go around at once."""
@@ -260,7 +276,7 @@ class Guidance:
     def _go_around(self, ships: np.ndarray, states: Array) -> None:
         """Start ships (k,) on return paths to the run-up; those without a path, or go-arounds left, abort."""
         self.doing[ships] = ABORTED
-        again = self.go_arounds[ships] < MONTE_CARLO.go_arounds
+        again = self.go_arounds[ships] < GO_AROUNDS
         ships, states = ships[again], states[again]
         if not len(ships):
             return
@@ -307,7 +323,7 @@ class Guidance:
         vessel = self._helm.vessel
         slowest = float(vessel.rates[vessel.turns_freely].min(initial=np.inf))
         half_turn = np.pi / slowest / vessel.sample_time_s
-        sideways = np.abs(np.cos(self._inputs)) < MONTE_CARLO.sideways_share
+        sideways = np.abs(np.cos(self._inputs)) < SIDEWAYS_SHARE
         return half_turn + np.where(sideways, 0.0, self._arrival - self._first)
 
     def _next(self, ships: np.ndarray, states: Array) -> Array:
@@ -344,21 +360,21 @@ class Guidance:
         """(k,) whether ships (k,) are so near that they begin on the planned heading."""
         helm = self._helm
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
-        near = MONTE_CARLO.steady_hulls * helm.vessel.length_m / sample_m
+        near = STEADY_HULLS * helm.vessel.length_m / sample_m
         return np.asarray(self._end[ships] - self._at[ships] <= near)
 
     @property
     def _least_step_m(self) -> float:
-        return MONTE_CARLO.least_step * self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
+        return LEAST_STEP * self._helm.ship.transit_speed_mps * self._helm.vessel.sample_time_s
 
     @property
     def _waiting(self) -> float:
         """Samples that a ship may take beyond what is planned."""
-        time_constants = MONTE_CARLO.waiting_time_constants * CONTROL.track_lead
+        time_constants = WAITING_TIME_CONSTANTS * CONTROL.track_lead
         return time_constants * self._helm.answer_s / self._helm.vessel.sample_time_s
 
     def _allowed(self, samples: Array | float) -> Array | float:
-        return MONTE_CARLO.patience * samples + self._waiting
+        return PATIENCE * samples + self._waiting
 
 
 def open_loop(helm: Helmsman, fleet: Fleet, values: Array, sailing: np.ndarray) -> Array:

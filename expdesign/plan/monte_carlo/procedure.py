@@ -26,6 +26,18 @@ from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
+POSITION_HULLS = 0.2  # least tolerance of a run's start position, in hull lengths
+# share of the room beyond the clearance that the position may use instead, and its limit in hull lengths
+POSITION_ROOM, POSITION_MOST_HULLS = 0.5, 3.0
+SPEED_SHARE, YAW_RATE_SHARE = 0.1, 0.1  # tolerances of its velocity in transit speeds, of its yaw rate in the largest
+# share of the position's tolerance by which another speed at the start may move the run instead, and its limit in
+# transit speeds
+SPEED_MOVES, SPEED_MOST_SHARE = 0.5, 0.3
+RUN_UP_SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)  # of a run-up that are tried, where a whole one has no room
+# speed over ground in transit speeds, and yaw rate in the largest, up to which a run begins from a standstill
+REST_SHARE = 0.05
+
+
 ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no go-around path")
 """What can keep a ship from beginning a run: a tolerance, the time, or that no go-around path is found."""
 
@@ -68,18 +80,18 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
     ship, length_m = water.ship, water.vessel.length_m
     position_m = float(
         np.clip(
-            MONTE_CARLO.position_room * spare_m,
-            MONTE_CARLO.position_hulls * length_m,
-            MONTE_CARLO.position_most_hulls * length_m,
+            POSITION_ROOM * spare_m,
+            POSITION_HULLS * length_m,
+            POSITION_MOST_HULLS * length_m,
         )
     )
-    moved_mps = MONTE_CARLO.speed_moves * position_m / speed_decay_s(water.vessel, ship.transit_speed_mps)
-    least, most = MONTE_CARLO.speed_share, MONTE_CARLO.speed_most_share
+    moved_mps = SPEED_MOVES * position_m / speed_decay_s(water.vessel, ship.transit_speed_mps)
+    least, most = SPEED_SHARE, SPEED_MOST_SHARE
     return Tolerances(
         position_m=position_m,
         heading_rad=MONTE_CARLO.heading_rad,
         speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
-        yaw_rate_radps=MONTE_CARLO.yaw_rate_share * ship.turn_rate_radps,
+        yaw_rate_radps=YAW_RATE_SHARE * ship.turn_rate_radps,
     )
 
 
@@ -129,7 +141,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     if not moves and helm.ship.keeps_station:
         return Stretch(states=np.stack([desired, desired]), arrival=1)
     samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*desired[3:5]))) / sample_s
-    for share in MONTE_CARLO.run_up_shares:
+    for share in RUN_UP_SHARES:
         count = max(2, round(share * samples))
         before = steady_states(helm, desired, np.arange(-count, 0)) if moves else slowing(helm, desired, count)
         if water.holds(np.concatenate([before, desired[None]])[:, :3]):
@@ -142,7 +154,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
 
 def under_way(helm: Helmsman, state: Array) -> bool:
     """Whether a ship at a state (6,) moves over ground."""
-    ship, rest = helm.ship, MONTE_CARLO.rest_share
+    ship, rest = helm.ship, REST_SHARE
     return bool(np.hypot(*state[3:5]) > rest * ship.transit_speed_mps or abs(state[5]) > rest * ship.turn_rate_radps)
 
 

@@ -23,8 +23,20 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, polyline_length, shortest_path_tree
 from expdesign.plan.control import CONTROL, Helmsman, lengths
 from expdesign.plan.legs import dubins_curve
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array
+
+TURN_HULLS = 2.0  # distance from the end of a return path within which ships that keep station turn to its heading
+TURNED_RAD = 0.15  # heading error there up to which they have turned
+BEND_SPEED = 0.25  # least speed at bends and while the bow points elsewhere, in transit speeds
+BRAKING = 0.5  # share of the mean acceleration that is used for slowing down on return paths
+SIDEWAYS_SPEED = 0.5  # sideways and astern, in transit speeds
+LOOK_AHEAD_HULLS = 1.5  # of helm-steered ships on return paths (line of sight guidance)
+BEND_HULLS = 0.4  # distance from a bend at which a ship has reached it
+# distances from the goal of the poses through which go-arounds lead, in turning radii
+NODES_RADII = (2.0, 4.0, 7.0, 11.0)
+NODE_BEARINGS, NODE_COURSES = 12, 8  # bearings of these poses at each distance, and courses at each of them
+FIRST_TRIES, NEXT_TRIES = 60, 6  # such poses tried for a ship, and for a go-around from another pose
+CURVES = 3  # Dubins curves that a go-around from such a pose consists of at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,12 +116,10 @@ class PathFollowers:
         length = np.hypot(*steps.T)
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
         self._last[ship] = (self._left[ship] <= 0.0).argmax()
-        self._bend[ship] = MONTE_CARLO.bend_speed * fastest if self._helm.ship.keeps_station else fastest
+        self._bend[ship] = BEND_SPEED * fastest if self._helm.ship.keeps_station else fastest
         if count > 2:
             turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
-            self._bend[ship, 1 : count - 1] = fastest * np.maximum(
-                MONTE_CARLO.bend_speed, np.cos(np.minimum(turn, np.pi / 2))
-            )
+            self._bend[ship, 1 : count - 1] = fastest * np.maximum(BEND_SPEED, np.cos(np.minimum(turn, np.pi / 2)))
         self.length_m[ship] = length.sum()
 
     def arrived(self, ships: np.ndarray, states: Array) -> np.ndarray:
@@ -117,8 +127,8 @@ class PathFollowers:
         helm, off = self._helm, states[:, :2] - self.goal[:2]
         there = lengths(off) < self._reach_m
         if helm.ship.keeps_station:
-            turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < MONTE_CARLO.turned_rad
-            return np.asarray(there & turned & (np.abs(states[:, 5]) < MONTE_CARLO.turned_rad / (2.0 * helm.answer_s)))
+            turned = np.abs(wrap_angle(states[:, 2] - self.goal[2])) < TURNED_RAD
+            return np.asarray(there & turned & (np.abs(states[:, 5]) < TURNED_RAD / (2.0 * helm.answer_s)))
         ahead = np.stack([np.cos(self.goal[2]), np.sin(self.goal[2])])
         on_last = self._left[ships, self._next[ships]] <= 0.0
         return np.asarray(there | (on_last & (off @ ahead > 0.0)))
@@ -133,19 +143,19 @@ class PathFollowers:
         offset = there - states[:, :2]
         ahead = lengths(offset)
         left = ahead + self._left[ships, at]
-        near = (left < MONTE_CARLO.turn_hulls * length) & keeps
+        near = (left < TURN_HULLS * length) & keeps
         speed = self._speed(ahead, self._bend[ships, at])
         if near.any():
             lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - self.goal[2])
             slow = np.minimum(
-                fastest * np.maximum(lengthways, MONTE_CARLO.sideways_speed),
+                fastest * np.maximum(lengthways, SIDEWAYS_SPEED),
                 left[near] / (CONTROL.track_lead * helm.answer_s),
             )
             speed[near] = np.minimum(speed[near], slow)
         leg = there - before
         leg = leg / np.maximum(lengths(leg), 1e-9)[:, None]
         across = offset - (offset[:, 0] * leg[:, 0] + offset[:, 1] * leg[:, 1])[:, None] * leg
-        look = length if keeps else MONTE_CARLO.look_ahead_hulls * length
+        look = length if keeps else LOOK_AHEAD_HULLS * length
         pursued = leg * look + across  # a point ahead on the path
         if keeps:
             pursued = np.where((near | (ahead < look))[:, None], offset, pursued)
@@ -154,7 +164,7 @@ class PathFollowers:
         heading = np.where(near, self.goal[2], np.arctan2(through[:, 1], through[:, 0]))
         if keeps:
             off = np.cos(np.minimum(np.abs(wrap_angle(heading - states[:, 2])), np.pi / 2))
-            speed = speed * np.where(near, 1.0, np.maximum(off, MONTE_CARLO.bend_speed))
+            speed = speed * np.where(near, 1.0, np.maximum(off, BEND_SPEED))
         north, east = (course * speed[:, None]).T
         c, s = np.cos(heading), np.sin(heading)
         rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, np.zeros(len(ships))]
@@ -165,14 +175,14 @@ class PathFollowers:
         at = self._next[ships]
         there, before = self._path[ships, at], self._path[ships, at - 1]
         off, leg = there - places, there - before
-        reached = lengths(off) < MONTE_CARLO.bend_hulls * self._helm.vessel.length_m
+        reached = lengths(off) < BEND_HULLS * self._helm.vessel.length_m
         passed = off[:, 0] * leg[:, 0] + off[:, 1] * leg[:, 1] <= 0.0
         self._next[ships] = at + ((reached | passed) & (at < self._last[ships]))
 
     def _speed(self, ahead_m: Array, bend_mps: Array) -> Array:
         """(k,) speeds from which ships can slow down to those of the bends ahead."""
-        brake = MONTE_CARLO.braking * self._helm.ship.acceleration_mps2
-        braked_m = np.maximum(ahead_m - MONTE_CARLO.bend_hulls * self._helm.vessel.length_m, 0.0)
+        brake = BRAKING * self._helm.ship.acceleration_mps2
+        braked_m = np.maximum(ahead_m - BEND_HULLS * self._helm.vessel.length_m, 0.0)
         return np.minimum(np.sqrt(bend_mps * bend_mps + 2 * brake * braked_m), self._helm.ship.transit_speed_mps)
 
 
@@ -198,7 +208,7 @@ class GoAroundPaths:
     def find(self, pose: Array) -> Array | None:
         """A path (k, 2) from a pose (3,), or None where none was found."""
         direct = self._direct(pose)
-        return self._through(pose, self._roadmap, MONTE_CARLO.first_tries) if direct is None else direct
+        return self._through(pose, self._roadmap, FIRST_TRIES) if direct is None else direct
 
     def _through(self, pose: Array, roadmap: _Roadmap, tries: int) -> Array | None:
         """A path through one of the nodes that look shortest, or None."""
@@ -222,10 +232,8 @@ class GoAroundPaths:
         nodes = [node for node in self._nodes() if self.holds(np.stack([node[:2], node[:2] + 1e-3]))]
         found: list[tuple[Array, Array]] = []
         roadmap = _Roadmap.of(found)
-        for _ in range(MONTE_CARLO.curves):
-            paths = [
-                self._through(node, roadmap, MONTE_CARLO.next_tries) if found else self._direct(node) for node in nodes
-            ]
+        for _ in range(CURVES):
+            paths = [self._through(node, roadmap, NEXT_TRIES) if found else self._direct(node) for node in nodes]
             found += [(node, path) for node, path in zip(nodes, paths, strict=True) if path is not None]
             nodes = [node for node, path in zip(nodes, paths, strict=True) if path is None]
             roadmap = _Roadmap.of(found)
@@ -233,7 +241,7 @@ class GoAroundPaths:
 
     def _nodes(self) -> list[Array]:
         """(3,) poses all round the goal."""
-        counts = MONTE_CARLO.node_bearings, MONTE_CARLO.node_courses
+        counts = NODE_BEARINGS, NODE_COURSES
         bearings, courses = (2 * np.pi * np.arange(count) / count for count in counts)
         north, east, heading = self.goal
         return [
@@ -244,7 +252,7 @@ class GoAroundPaths:
                     heading + course,
                 ]
             )
-            for ring, bearing, course in product(MONTE_CARLO.nodes_radii, bearings, courses)
+            for ring, bearing, course in product(NODES_RADII, bearings, courses)
         ]
 
 

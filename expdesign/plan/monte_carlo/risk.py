@@ -14,14 +14,20 @@ import numpy as np
 import scipy
 
 from expdesign.plan.legs import LegWater
+from expdesign.plan.monte_carlo.guidance import GO_AROUNDS
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.plan.values import Leg, LegOutcome, PlanSettings, RiskEstimate, SailedTrial
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import SeaArea
 from expdesign.signals import Trajectory
 from expdesign.values import Array
+
+TRIALS, MOST_TRIALS = 500, 2000  # drawn of a plan at least and at most
+EXPECTED_CASES = 2.0  # trials are so many that this number may leave allowed water
+UPPER_SHARE = 0.95  # percentile of times that is reported, and confidence of the upper limit of a probability
+NO_PLAN_ABORTED = 0.5  # share of aborted trials from which a plan is rejected
+
 
 REASONS = tuple(
     {"time": "not there in time", "no go-around path": "no go-around path"}.get(cause, f"{cause} out of tolerance")
@@ -35,7 +41,7 @@ def estimate_risk(
     sailed: SailedTrial,
     *,
     rng: np.random.Generator,
-    draws: int = MONTE_CARLO.trials,
+    draws: int = TRIALS,
     aborted_most: float = PlanSettings.aborted_most,
     progress: Progress = silent,
 ) -> tuple[RiskEstimate, Trials]:
@@ -55,8 +61,8 @@ def estimate_risk(
         aborted=float(trials.aborted.any(axis=0).mean()),
         reasons=_reasons(legs, trials, trajectory, water.area),
         extra_median_s=float(np.median(extra)) if len(extra) else float("nan"),
-        extra_most_s=float(np.quantile(extra, MONTE_CARLO.upper_share)) if len(extra) else float("nan"),
-        go_arounds=MONTE_CARLO.go_arounds,
+        extra_most_s=float(np.quantile(extra, UPPER_SHARE)) if len(extra) else float("nan"),
+        go_arounds=GO_AROUNDS,
         heading_rad=within.heading_rad,
         yaw_rate_radps=within.yaw_rate_radps,
         legs=tuple(_leg_outcome(trials, index, sample_s) for index in range(len(legs))),
@@ -67,11 +73,11 @@ def estimate_risk(
 
 def trials_needed(confidence: float) -> int:
     """How many trials distinguish a share of 1 - confidence from none."""
-    needed = np.ceil(MONTE_CARLO.expected_cases / max(1.0 - confidence, 1e-9))
-    return int(np.clip(needed, MONTE_CARLO.trials, MONTE_CARLO.most_trials))
+    needed = np.ceil(EXPECTED_CASES / max(1.0 - confidence, 1e-9))
+    return int(np.clip(needed, TRIALS, MOST_TRIALS))
 
 
-def upper_limit(count: int, trials: int, *, confidence: float = MONTE_CARLO.upper_share) -> float:
+def upper_limit(count: int, trials: int, *, confidence: float = UPPER_SHARE) -> float:
     """Upper confidence limit of a probability of which `count` cases were seen among trials.
 
     Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
@@ -91,7 +97,7 @@ def failed_chance_constraint(
             f"more than plan.confidence = {confidence:g} allows, most of them ({trials.left[worst].mean():.1%}) "
             f"{described(legs, worst)} near {lat:.5f}, {lon:.5f}"
         )
-    return "" if found.aborted < MONTE_CARLO.no_plan_aborted else found.aborted_note
+    return "" if found.aborted < NO_PLAN_ABORTED else found.aborted_note
 
 
 def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
@@ -102,7 +108,7 @@ def violates_chance_constraint(found: RiskEstimate, confidence: float) -> bool:
 def shares_allowed(shares: tuple[float, float], confidence: float) -> bool:
     """Whether shares of trials that leave allowed water, and that are aborted, are acceptable if they are exact."""
     left, aborted = shares
-    return left <= 1.0 - confidence and aborted < MONTE_CARLO.no_plan_aborted
+    return left <= 1.0 - confidence and aborted < NO_PLAN_ABORTED
 
 
 def worst_leg(trials: Trials) -> int:
@@ -142,5 +148,5 @@ def _leg_outcome(trials: Trials, index: int, sample_s: float) -> LegOutcome:
         aborted=float(trials.aborted[index].mean()),
         go_arounds=float(trials.go_arounds[index][sailed].mean()) if sailed.any() else 0.0,
         median_s=float(np.median(times)),
-        most_s=float(np.quantile(times, MONTE_CARLO.upper_share)),
+        most_s=float(np.quantile(times, UPPER_SHARE)),
     )

@@ -28,6 +28,10 @@ from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import hull_outlines
 
+# samples of all ships, and hulls near the shore, checked at a time
+COLLISION_SAMPLES, COLLISION_CHUNK = 250_000, 20_000
+
+
 # Collision check of many hulls with the chart at every step, without the planner's grids and margins.
 
 
@@ -53,12 +57,12 @@ class CollisionCheck:
             poses: (k, n, 3) sample by sample; ships that do not move are skipped.
         """
         place: Array = np.full((poses.shape[1], 2), np.nan)
-        stretch = max(1, MONTE_CARLO.collision_samples // max(1, poses.shape[1]))
+        stretch = max(1, COLLISION_SAMPLES // max(1, poses.shape[1]))
         for begin in range(0, len(poses) - 1, stretch):
             some = poses[begin : begin + stretch + 1]
             steps, ships = self._close(some)
-            for first in range(0, len(steps), MONTE_CARLO.collision_chunk):
-                chunk = slice(first, first + MONTE_CARLO.collision_chunk)
+            for first in range(0, len(steps), COLLISION_CHUNK):
+                chunk = slice(first, first + COLLISION_CHUNK)
                 self._first_outside(some, steps[chunk], ships[chunk], place)
         return place
 

@@ -44,6 +44,18 @@ from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
+CLEARANCE_SHARES = (1.0, 0.75, 0.5, 0.0)  # of the largest clearance with which every run has a place, tried as remedies
+SAILED_SHARES = (0.5, 0.0)  # of the clearance asked for, tried as remedies where legs fail
+MOST_PLANS = 2  # plans made to check remedies
+# counted work of looking for remedies where drawn trials fail, in that of the refused plan; half of planning is not
+# counted, and is remembered
+REMEDY_WORK = 1.75
+# tried as remedies of a refusal, the highest first
+LOWER_CONFIDENCES = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
+TIGHTER = (0.9, 0.8, 0.7, 0.6, 0.5)  # turning radii tried as remedies, in that of legs
+FASTER = (1.05, 1.2, 1.5)  # repositioning speeds tried as remedies, in the mean current
+
+
 # Remedies where no path leads through, a berth cannot be left or reached, or the ship cannot do what is asked.
 
 
@@ -102,7 +114,7 @@ def for_berth(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str
     if clearance_m is not None:
         yield f"with plan.clearance_m = {clearance_m:g} there is such a path; {REST}"
         return
-    for key, radius in (("plan.turning_radius_m", share * water.ship.turning_radius_m) for share in PLAN.tighter):
+    for key, radius in (("plan.turning_radius_m", share * water.ship.turning_radius_m) for share in TIGHTER):
         value = rounded_up(radius)
         try:
             ship = ship_on_legs(with_settings(problem, turning_radius_m=value))
@@ -129,7 +141,7 @@ def for_settings(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[
 
 def _speeds(problem: PlanProblem) -> tuple[float, ...]:
     """Speeds faster than the mean current, the slowest first [m/s]."""
-    return tuple(rounded_up(share * problem.current_mps) for share in PLAN.faster if problem.current_mps > 0)
+    return tuple(rounded_up(share * problem.current_mps) for share in FASTER if problem.current_mps > 0)
 
 
 def _capable(problem: PlanProblem) -> bool:
@@ -169,7 +181,7 @@ def _clearances(problem: PlanProblem, water: LegWater, space: RunSpace, lacking:
     if most is None:
         yield Change(words="plan.clearance_m down to 0", problem=None)
         return
-    for share in PLAN.clearance_shares:
+    for share in CLEARANCE_SHARES:
         clearance_m = float(f"{share * most:.2g}")
         if clearance_m < asked:
             yield of_setting(problem, "clearance_m", clearance_m)
@@ -179,7 +191,7 @@ def _confidences(problem: PlanProblem, space: RunSpace, lacking: set[str]) -> It
     """Lower confidences with which every run has a place by itself, where they leave runs more room."""
     if not any((off > problem.settings.clearance_m).any() for off in dispersions(problem)):
         return
-    for confidence in PLAN.lower_confidences:
+    for confidence in LOWER_CONFIDENCES:
         if confidence < problem.settings.confidence:
             other = with_settings(problem, confidence=confidence)
             none = without_place(_only(space, other, dispersions(other), lacking, space.leg_margin_m))
@@ -200,7 +212,7 @@ def for_lattice(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[s
 
 def for_confidence(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """The largest confidence of those tried at which the room of runs can be estimated, and every run has a place."""
-    lower = [value for value in PLAN.lower_confidences if value < problem.settings.confidence]
+    lower = [value for value in LOWER_CONFIDENCES if value < problem.settings.confidence]
     changes = (of_setting(problem, "confidence", value) for value in lower)
     without = exclusions(problem, {refused.which}) if refused.what == "unstable" else ()
     yield from first_that_passes(chain(changes, without), finds_places, PLACES, tell=tell, most=len(lower) + 1)
@@ -212,12 +224,12 @@ def for_confidence(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterato
 def for_sailing(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """Less clearance, or a design without the run that no leg led to, with which every run is sailed."""
     asked = problem.settings.clearance_m
-    halves = [float(f"{share * asked:.2g}") for share in PLAN.sailed_shares] if asked > 0 else []
+    halves = [float(f"{share * asked:.2g}") for share in SAILED_SHARES] if asked > 0 else []
     changes = [of_setting(problem, "clearance_m", value) for value in halves]
     names = {refused.which} - {"", "goal"}
     tries = chain(changes[:1], exclusions(problem, names) if names else (), changes[1:])
     yield from first_that_passes(
-        tries, lambda other: first_sailed(other, WorkBudget()) is not None, SAILED, tell=tell, most=PLAN.most_plans
+        tries, lambda other: first_sailed(other, WorkBudget()) is not None, SAILED, tell=tell, most=MOST_PLANS
     )
 
 
@@ -231,7 +243,7 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
     """
     first: Refused | None = refused.plan
     plan_s = 0.0 if first is None else first.spent_s
-    budget = WorkBudget() if first is None else WorkBudget(most_s=PLAN.remedy_work * plan_s)
+    budget = WorkBudget() if first is None else WorkBudget(most_s=REMEDY_WORK * plan_s)
 
     def affords() -> bool:
         return budget.spent_s + plan_s <= budget.most_s
@@ -288,9 +300,9 @@ def for_verification(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Itera
         except NoPlan:
             return False
 
-    seeds = range(problem.seed + 1, problem.seed + 1 + PLAN.most_plans)
+    seeds = range(problem.seed + 1, problem.seed + 1 + MOST_PLANS)
     changes = (Change(words=f"--seed {seed}", problem=replace(problem, seed=seed)) for seed in seeds)
-    yield from first_that_passes(changes, passes, VERIFIED, tell=tell, most=PLAN.most_plans)
+    yield from first_that_passes(changes, passes, VERIFIED, tell=tell, most=MOST_PLANS)
 
 
 def advised(problem: PlanProblem, refused: NoPlan, progress: Progress = silent) -> NoPlan:

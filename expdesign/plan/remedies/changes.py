@@ -30,6 +30,11 @@ from expdesign.plan.values import SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import silent
 
+MOST_SEARCHES = 8  # narrow searches for places, each with a quarter of the partial plans, to check remedies
+REMEDY_BUDGET = 0.1  # share of the time budget that such a plan may spend on failures
+MOST_LEFT_OUT = 8  # designs tried as remedies, each without the runs that had no place in the one before
+
+
 NONE = "no single change of those tried helps ({})"
 REST = "the rest of the plan was not tried with it"
 UNCHECKED = "no remedy could be checked"
@@ -74,7 +79,7 @@ def first_that_passes(
     Changes come with the most promising first. Only so many are tried that this takes no longer than planning: a narrow
     search for places keeps a quarter of the partial plans. Those that work is not left for are told.
     """
-    tried, passed_over, left = [], [], most or PLAN.most_searches
+    tried, passed_over, left = [], [], most or MOST_SEARCHES
     for change in changes:
         if change.problem is not None and not affords():
             passed_over.append(change.words)
@@ -109,7 +114,7 @@ def exclusions(problem: PlanProblem, lacking: set[str]) -> Iterator[Change]:
         return
     limits = problem.design.problem.constraints
     water = leg_water(problem, ship_on_legs(problem))
-    for _ in range(PLAN.most_left_out):
+    for _ in range(MOST_LEFT_OUT):
         excluded = (*limits.excluded, *sorted(lacking - set(limits.excluded)))
         try:
             task = replace(problem.design.problem, constraints=replace(limits, excluded=excluded))
@@ -148,7 +153,7 @@ def first_sailed(problem: PlanProblem, budget: WorkBudget) -> tuple[LegWater, Sa
 
     Its work is counted.
     """
-    part = with_settings(problem, time_budget_s=PLAN.remedy_budget * problem.settings.time_budget_s)
+    part = with_settings(problem, time_budget_s=REMEDY_BUDGET * problem.settings.time_budget_s)
     try:
         water, room = roomy_water(part, ship_on_legs(part), silent)
         return water, sail_all(part, room, silent, stated=water, budget=budget)

@@ -9,12 +9,16 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.errors import NoPlan
 from expdesign.plan.runs.ensemble import Truths
-from expdesign.plan.runs.tuning import RUNS
 from expdesign.simulation import Environment, Variation, draw_environment, simulate_many
 from expdesign.simulation.environment import vary
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.vessel.hull import covering_discs, disc_points, thinned_poses
+
+FEWEST_DRAWS, USUAL_DRAWS = 200, 2000  # drawn runs of each primitive
+EXPECTED_OUTSIDE = 2.0  # draws are so many that this number may leave the room
+MOST_DRAWS = 50_000  # where one outside takes more than the usual number
+DRAWS_AT_ONCE = 4000  # simulated together, which bounds the memory
 
 
 def draw_truths(vessel: Vessel, environment: Environment, draws: int, rng: np.random.Generator) -> Truths:
@@ -56,7 +60,7 @@ def dispersion_m(
     Raises:
         NoPlan: so many drawn vessels are unstable that the share cannot be met, or it is too high to be estimated.
     """
-    draws, most = draws or draws_for(confidence), RUNS.draws_at_once
+    draws, most = draws or draws_for(confidence), DRAWS_AT_ONCE
     counts = [min(most, draws - first) for first in range(0, draws, most)]
     apart = [_apart(vessel, primitive, environment, centres_m=centres_m, rng=rng, draws=count) for count in counts]
     return _radius(np.concatenate(apart, axis=1), confidence, primitive.name)
@@ -71,12 +75,12 @@ def draws_for(confidence: float) -> int:
         NoPlan: the share is so high that it takes too many.
     """
     outside = 1.0 - confidence
-    usual = int(np.clip(np.ceil(RUNS.expected_outside / outside), RUNS.fewest_draws, RUNS.usual_draws))
+    usual = int(np.clip(np.ceil(EXPECTED_OUTSIDE / outside), FEWEST_DRAWS, USUAL_DRAWS))
     needed = max(usual, int(np.ceil((1.0 - 1e-9) / outside)))
-    if needed > RUNS.most_draws:
+    if needed > MOST_DRAWS:
         raise NoPlan(
             f"plan.confidence is too high to be estimated: each run would have to keep to its room in {confidence:.6g} "
-            f"of all cases, and it takes {needed} drawn vessels to resolve that, more than {RUNS.most_draws}",
+            f"of all cases, and it takes {needed} drawn vessels to resolve that, more than {MOST_DRAWS}",
             what="confidence",
         )
     return needed

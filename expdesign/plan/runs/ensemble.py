@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.plan.runs.tuning import RUNS
 from expdesign.simulation import ActuatorState, Environment, step_shares
 from expdesign.simulation.environment import vary
 from expdesign.simulation.program import RatesProgram
 from expdesign.simulation.run import LARGEST_SPEED, SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+FEW_SHIPS = 128  # up to so many are quicker one by one than by an operation on all of them at a time
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,7 +155,7 @@ class Fleet:
             self.weather.draw()
             self._program.sea[...] = self.weather.now[:, self._ships]
         with np.errstate(over="ignore", invalid="ignore"):
-            state = self._together(given) if len(commands) > RUNS.few_ships else self._one_by_one(given)
+            state = self._together(given) if len(commands) > FEW_SHIPS else self._one_by_one(given)
             settled = np.abs(state[3:]).max(axis=0) < LARGEST_SPEED
         delivered = given[0].T if len(given) == 1 else np.tensordot(self._shares, given, axes=1).T
         if not settled.all():

@@ -18,10 +18,14 @@ from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search.local_search import ChainEnds, clear_successors, polished
-from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import Placement
 from expdesign.processes import in_order
 from expdesign.values import Array
+
+BEAM_WIDTH = 400  # partial plans kept
+POLISHED_ORDERS = 6  # orders of runs of which the best plan is polished; the best one then counts
+CHECKED_AT_ONCE, SORTED_AT_ONCE = 1024, 8192  # successors checked for clearance at a time, and sorted
+CELL_HULLS, HEADING_RAD = 2.0, 0.4  # places of which one successor is kept: their size in hull lengths, and in heading
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,8 +75,8 @@ def place_runs(
     start: Array,
     exit_mps: float = 0.0,
     last: str = "",
-    width: int = SEARCH.beam_width,
-    orders: int = SEARCH.polished_orders,
+    width: int = BEAM_WIDTH,
+    orders: int = POLISHED_ORDERS,
 ) -> tuple[Placement, ...]:
     """Start poses of all runs in the order in which they are to be done.
 
@@ -178,12 +182,12 @@ def _select(
     """The best successors whose leg and run are clear, at most one for each kind of place and remainder."""
     kept: list[int] = []
     seen: set[tuple[int, ...]] = set()
-    for rows in _in_order(totals_s, SEARCH.checked_at_once):
+    for rows in _in_order(totals_s, CHECKED_AT_ONCE):
         some = Successors.chosen(found, rows)
         clear = clear_successors(space, some)
         some, rows = some[clear], rows[clear]
-        places = np.rint(some.end[:, :2] / (SEARCH.cell_hulls * space.hull_m)).astype(int)
-        headings = np.rint(wrap_angle(some.end[:, 2]) / SEARCH.heading_rad).astype(int)
+        places = np.rint(some.end[:, :2] / (CELL_HULLS * space.hull_m)).astype(int)
+        headings = np.rint(wrap_angle(some.end[:, 2]) / HEADING_RAD).astype(int)
         kinds = np.column_stack([places, headings, left[some.parent, some.primitive]])
         for row, kind in zip(rows.tolist(), map(tuple, kinds.tolist()), strict=True):
             if kind not in seen:
@@ -198,7 +202,7 @@ def _in_order(values: Array, at_once: int) -> Iterator[np.ndarray]:
     """Indices of finite values, the least first and equals as they come, so many at once."""
     left = np.flatnonzero(np.isfinite(values))
     while len(left):
-        count = min(SEARCH.sorted_at_once, len(left))
+        count = min(SORTED_AT_ONCE, len(left))
         among = values[left] <= np.partition(values[left], count - 1)[count - 1]
         some = left[among]
         order = some[np.argsort(values[some], kind="stable")]

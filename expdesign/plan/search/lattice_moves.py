@@ -20,8 +20,12 @@ from expdesign.plan.chart import ClearanceField
 from expdesign.plan.local_planner import LegEnds, SearchSpace, moved
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import LatticeProblem
-from expdesign.plan.search.tuning import SEARCH
 from expdesign.values import Array
+
+LATTICE_NEARBY = 2  # cells to each side, at least, within which legs lead from and to the lattice
+LATTICE_POINTS = 8  # places looked at along a move
+LATTICE_LEAST_SPEED = 0.1  # over ground against a current, in transit speeds
+
 
 # The poses of a state lattice over a sea area: cells and headings, and which of them legs may pass.
 
@@ -113,7 +117,7 @@ class Lattice:
 
     def around(self, pose: Array, least_m: float) -> np.ndarray:
         """(n, 2) cells, counted from the origin, that a leg of some length reaches from a pose (3,)."""
-        reach = max(SEARCH.lattice_nearby, int(np.ceil(least_m / self.spacing_m)) + 1)
+        reach = max(LATTICE_NEARBY, int(np.ceil(least_m / self.spacing_m)) + 1)
         middle = np.rint(pose[:2] / self.spacing_m).astype(int)
         cells = middle + np.indices((2 * reach + 1, 2 * reach + 1)).reshape(2, -1).T - reach
         far = np.hypot(*(cells * self.spacing_m - pose[:2]).T)
@@ -173,7 +177,7 @@ def _straights(lattice: Lattice) -> Iterator[Array]:
     """Ahead to the next cell, with the current's help."""
     for heading in range(lattice.headings):
         step = lattice.ahead(heading)
-        path = np.linspace(0.0, 1.0, SEARCH.lattice_points)[:, None] * step * lattice.spacing_m
+        path = np.linspace(0.0, 1.0, LATTICE_POINTS)[:, None] * step * lattice.spacing_m
         clear = lattice.path_clear(path, lattice.space.leg_margin_m)
         seconds = float(np.hypot(*path[-1])) / _over_ground_mps(lattice.space, float(lattice.angle(heading)))
         yield lattice.edges(clear, heading, step, heading, seconds)
@@ -183,12 +187,12 @@ def _over_ground_mps(space: SearchSpace, course_rad: float) -> float:
     """Speed along a course at transit speed through water, the current across it held off; little where it is swept."""
     top = space.ship.transit_speed_mps
     along, across = _turned(space.current_to[None], -course_rad)[0]
-    return float(max(np.sqrt(max(top**2 - across**2, 0.0)) + along, SEARCH.lattice_least_speed * top))
+    return float(max(np.sqrt(max(top**2 - across**2, 0.0)) + along, LATTICE_LEAST_SPEED * top))
 
 
 def _arcs(lattice: Lattice) -> Iterator[Array]:
     """Quarter turns under way to both sides, where cells are far enough apart for the ship's turning radius."""
-    ship, shares = lattice.space.ship, np.linspace(0.0, 1.0, SEARCH.lattice_points)
+    ship, shares = lattice.space.ship, np.linspace(0.0, 1.0, LATTICE_POINTS)
     quarter = lattice.headings // 4
     for heading in range(lattice.headings):
         stride_m = lattice.spacing_m * float(np.hypot(*lattice.ahead(heading)))

@@ -17,8 +17,16 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import sight_lines
 from expdesign.plan.local_planner import LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
-from expdesign.plan.search.tuning import SEARCH
 from expdesign.values import Array
+
+MANY_RUNS, SPARSE_DISCS = 50, 8  # of more runs than this, every so manieth disc is looked at before all of them
+SHIFT_HULLS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # steps of the local search, and with each a turn
+TURN_DEG = (90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0)  # steps of the local search, and with each a turn
+BLOCKS_AT_ONCE = 4  # moves of a block looked at together at first, four times as many then
+SWEEPS = 20  # over all blocks of runs at most
+SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
+LEAST_GAIN_S = 0.05  # for which a block is moved
+
 
 # Whether successors of partial plans keep their clearances on the grid.
 
@@ -69,8 +77,8 @@ def _hulls_clear(space: RunSpace | SearchSpace, primitive: np.ndarray, start: Ar
     clear = np.ones(len(start), dtype=bool)
     for q in np.unique(primitive):
         some, item = np.flatnonzero(primitive == q), space.footprints[q]
-        few = slice(None, None, SEARCH.sparse_discs)  # of many runs most are refused by a few of their discs
-        for part in (few, slice(None)) if len(some) > SEARCH.many_runs else (slice(None),):
+        few = slice(None, None, SPARSE_DISCS)  # of many runs most are refused by a few of their discs
+        for part in (few, slice(None)) if len(some) > MANY_RUNS else (slice(None),):
             drifted = item.times_s[part, None] * space.current_to
             places = _places(start[some, None], item.discs[part]) + drifted
             clear[some] = (space.field.at(places) >= item.room_m[part]).all(axis=1)
@@ -156,7 +164,7 @@ def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Ar
     chain = legs.measured(np.asarray(runs), poses)
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
     in_vain: dict[tuple[int, int], tuple[bytes, ...]] = {}
-    for _ in range(SEARCH.sweeps):
+    for _ in range(SWEEPS):
         before = chain
         for i, j in blocks:
             if in_vain.get((i, j)) == (around := chain.around(i, j)):
@@ -210,9 +218,7 @@ class _Legs:
         before, after = [*froms[i : i + 1, :2], *chain.bends[i]][-1], [*chain.bends[j + 1], *tos[j + 1 : j + 2, :2]][0]
         gain_s[(legs_m[0] < self._least_m(chain.runs, i)) | (legs_m[1] < self._least_m(chain.runs, j + 1))] = -np.inf
         order = np.argsort(-gain_s, kind="stable")
-        row = self._first_clear(
-            chain.runs[i : j + 1], blocks, order[gain_s[order] > SEARCH.least_gain_s], before, after
-        )
+        row = self._first_clear(chain.runs[i : j + 1], blocks, order[gain_s[order] > LEAST_GAIN_S], before, after)
         if row is None:
             return chain
         poses, legs_s = chain.poses.copy(), chain.legs_s.copy()
@@ -223,7 +229,7 @@ class _Legs:
         self, runs: np.ndarray, blocks: Array, rows: np.ndarray, before: Array, after: Array
     ) -> int | None:
         """The first of the rows of blocks (n, m, 3) that is clear, or None; more and more are looked at together."""
-        first, count = 0, SEARCH.blocks_at_once
+        first, count = 0, BLOCKS_AT_ONCE
         while first < len(rows):
             some = rows[first : first + count]
             clear = self._clear(runs, blocks[some], before, after)
@@ -245,7 +251,7 @@ class _Legs:
         north, east = after[:2] - before[:2] - tried.seconds * self.space.current_to
         away = np.hypot(c * north + s * east - tried.step[0], c * east - s * north - tried.step[1])
         turned = abs(float(wrap_angle(after[2] - before[2] - tried.step[2])))
-        if away >= SEARCH.same * self.space.hull_m or turned >= SEARCH.same:
+        if away >= SAME * self.space.hull_m or turned >= SAME:
             return 0.0
         before_run, after_run = (int(run) for run in np.r_[self.ends.last, runs, -1][k : k + 2])
         return tried.seconds + float(self.space.going_round_s(before_run, after_run, np.array(tried.seconds)))
@@ -308,7 +314,7 @@ class _Legs:
 @lru_cache(maxsize=16)
 def _pattern(hull_m: float) -> Array:
     """(n, 3) moves forward, to starboard and round, of every size, to all sides alike."""
-    shifts = hull_m * np.array(SEARCH.shift_hulls)
+    shifts = hull_m * np.array(SHIFT_HULLS)
     sides = np.array([side for side in product((-1.0, 0.0, 1.0), repeat=3) if any(side)])
-    sizes = np.column_stack([shifts, shifts, np.deg2rad(SEARCH.turn_deg)])
+    sizes = np.column_stack([shifts, shifts, np.deg2rad(TURN_DEG)])
     return np.concatenate([sides * size for size in sizes])

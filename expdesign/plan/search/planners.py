@@ -13,9 +13,16 @@ from expdesign.plan.local_planner import SearchSpace
 from expdesign.plan.search.beam import place_runs
 from expdesign.plan.search.lattice import search_lattice
 from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice
-from expdesign.plan.search.tuning import SEARCH
 from expdesign.plan.values import LatticeProof, Placement, Placements, PlannerName, PlanSettings
 from expdesign.values import Array
+
+LATTICE_RADII = 1.1  # default distance between cells of the lattice, in turning radii
+LATTICE_POSES = 60_000  # poses that the default keeps below where the water is large
+LATTICE_FINER = (1.0, 0.7, 0.5)  # factors on the default distance that are tried where the lattice holds no plan
+LATTICE_SUBOPTIMALITY = 0.02  # plans that could save no more than this share are left out
+LATTICE_STATES = 1e7  # after which the search ends with the bound proved by then
+LATTICE_STATE_S = 1e-6  # counted work for each state [s]
+
 
 # The lattice planner: order and placement of the runs by the exact search on a state lattice, with its proof.
 
@@ -60,10 +67,10 @@ class LatticeSearch:
         least_m = 0.0 if turns else space.ship.turning_radius_m
         if self.spacing_m is not None:
             return (max(self.spacing_m, least_m),)
-        usual_m = max(SEARCH.lattice_radii * space.ship.turning_radius_m, space.hull_m)
+        usual_m = max(LATTICE_RADII * space.ship.turning_radius_m, space.hull_m)
         water_m2 = np.count_nonzero(space.field.clearance_m >= space.leg_margin_m) * space.field.cell_m**2
-        base_m = max(usual_m, float(np.sqrt(water_m2 * (8 if turns else 4) / SEARCH.lattice_poses)))
-        return tuple(sorted({max(factor * base_m, least_m) for factor in SEARCH.lattice_finer}, reverse=True))
+        base_m = max(usual_m, float(np.sqrt(water_m2 * (8 if turns else 4) / LATTICE_POSES)))
+        return tuple(sorted({max(factor * base_m, least_m) for factor in LATTICE_FINER}, reverse=True))
 
 
 def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure) -> Placements:
@@ -73,7 +80,7 @@ def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure) -> P
         if count and not edges.nnz:
             raise NoPlan(f"no room for {item.name!r} {where}")
     try:
-        found = search_lattice(problem, suboptimality=SEARCH.lattice_suboptimality, most_states=SEARCH.lattice_states)
+        found = search_lattice(problem, suboptimality=LATTICE_SUBOPTIMALITY, most_states=LATTICE_STATES)
     except NoPlan as error:
         raise NoPlan(f"{error}, {where}") from None
     proof = LatticeProof(
@@ -84,7 +91,7 @@ def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure) -> P
     )
     return Placements(
         runs=_placements(lattice, found.steps),
-        work_s=SEARCH.lattice_state_s * found.expansions,
+        work_s=LATTICE_STATE_S * found.expansions,
         lattice=proof,
     )
 

@@ -22,6 +22,10 @@ from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.hull import hull_polygons
 
+ENTRY_TOLERANCE = 0.02  # largest deviation of a run's entry velocity, relative to the vessel's speed in the plan
+# share by which legs may exceed their stated speed, or that of their faster end: plans limit it at some samples
+SPEED_TOLERANCE = 0.03
+
 
 def verify_plan(
     vessel: Vessel,
@@ -182,7 +186,7 @@ def _end_problems(
     """Deviations of the plan's ends from start and goal, at rest through the water or, at the start, as under way."""
     problems = []
     fastest = np.hypot(*trajectory.velocity[:, :2].T).max(), np.abs(trajectory.velocity[:, 2]).max()
-    slow, steady = TUNING.entry_tolerance * np.array(fastest) + 1e-9
+    slow, steady = ENTRY_TOLERANCE * np.array(fastest) + 1e-9
     for name, pose, index in zip(("start", "goal"), ends, (0, -1), strict=True):
         place, velocity = trajectory.pose[index], trajectory.velocity[index]
         off_m = float(np.hypot(*(place - pose)[:2]))
@@ -192,7 +196,7 @@ def _end_problems(
         if name == "start" and begin is not None:
             wanted, words = begin, "off the speed asked for and turning by"
         moving, turning = float(np.hypot(*(velocity - wanted)[:2])), abs(float(velocity[2] - wanted[2]))
-        if off_m > vessel.length_m / 30 or turned > TUNING.entry_tolerance or moving > slow or turning > steady:
+        if off_m > vessel.length_m / 30 or turned > ENTRY_TOLERANCE or moving > slow or turning > steady:
             problems.append(
                 f"the {which}plan is {off_m:.2f} m and {turned:.3f} rad off the {name}, at {moving:.3f} m/s {words} "
                 f"{turning:.4f} rad/s"
@@ -284,7 +288,7 @@ def _entry_problems(
         if leg.kind == "primitive":
             u_c, v_c = to_body(environment.current_to, trajectory.pose[leg.first, 2], NUMPY)
             off = trajectory.velocity[leg.first] - [u_c, v_c, 0.0] - primitives[leg.name].entry_velocity
-            if (np.abs(off) > TUNING.entry_tolerance * scale).any():
+            if (np.abs(off) > ENTRY_TOLERANCE * scale).any():
                 share = np.abs(off / scale).max()
                 problems.append(f"{leg.name!r} at sample {leg.first} begins {share:.1%} off its entry")
     return problems
@@ -302,7 +306,7 @@ def _speed_problems(
     for leg in legs:
         sailed = speed[leg.first : leg.last + 1]
         allowed = max(transit_mps, sailed[0], sailed[-1])
-        if leg.kind != "primitive" and sailed.max() > (1.0 + TUNING.speed_tolerance) * allowed:
+        if leg.kind != "primitive" and sailed.max() > (1.0 + SPEED_TOLERANCE) * allowed:
             at_s = (leg.first + int(sailed.argmax())) * trajectory.sample_time_s
             problems.append(
                 f"the {which}leg to {leg.name!r} goes {sailed.max():.3g} m/s through the water at {at_s:.0f} s, "

@@ -13,14 +13,9 @@ class Tuning:
 
     Attributes:
         fine_substeps: integrator steps per sample of the re-simulation: ten times as many as in planning.
-        entry_tolerance: largest deviation of a run's entry velocity, relative to the vessel's speed in the plan.
-        speed_tolerance: share by which legs may exceed their stated speed, or that of their faster end: plans limit it
-            at some samples.
     """
 
     fine_substeps: int = 10 * SUBSTEPS
-    entry_tolerance: float = 0.02
-    speed_tolerance: float = 0.03
 
 
 TUNING = Tuning()

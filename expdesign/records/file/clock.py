@@ -12,6 +12,13 @@ from expdesign.records.file.table import Mask, Table
 from expdesign.records.tuning import TUNING
 from expdesign.values import Array
 
+GAP_SHARE = 0.2  # share of intervals that may be gaps before the sampling counts as irregular
+JITTER_SHARE = 0.25  # largest deviation of an interval from the sample time, as a share of it
+SAMPLE_TIME_MISMATCH = 0.01  # largest relative difference of two sample times that count as equal
+LONGEST_SAMPLE_TIME_S = 20.0  # limit of IMO MSC/Circ.1053 for manoeuvring trials [s]
+SHORTEST_SAMPLE_TIME_S = 1e-4  # limit below which the unit of time is questioned [s]
+
+
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"), (1 / 60, "minutes"), (1 / 3600, "hours"))
 
 
@@ -63,7 +70,7 @@ def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the v
 
 def same_sample_time(a_s: float, b_s: float) -> bool:
     """Whether two sample times differ by no more than rounding in files explains."""
-    return abs(a_s - b_s) <= TUNING.sample_time_mismatch * max(a_s, b_s)
+    return abs(a_s - b_s) <= SAMPLE_TIME_MISMATCH * max(a_s, b_s)
 
 
 def _announced(table: Table) -> Mask:
@@ -100,13 +107,11 @@ def _check_increasing(table: Table, step: Array, announced: Mask) -> None:
 
 
 def _check_sample_time(table: Table, found_s: float, wanted_s: float | None, whose: str) -> None:
-    if found_s < TUNING.shortest_sample_time_s:
-        raise table.error(
-            "time_s", f"has a sample every {found_s:g} s, expected {TUNING.shortest_sample_time_s:g} s or more"
-        )
+    if found_s < SHORTEST_SAMPLE_TIME_S:
+        raise table.error("time_s", f"has a sample every {found_s:g} s, expected {SHORTEST_SAMPLE_TIME_S:g} s or more")
     if wanted_s is None:
-        if found_s > TUNING.longest_sample_time_s:
-            most = f"expected at most {TUNING.longest_sample_time_s:g} s{_unit(found_s, None)}"
+        if found_s > LONGEST_SAMPLE_TIME_S:
+            most = f"expected at most {LONGEST_SAMPLE_TIME_S:g} s{_unit(found_s, None)}"
             raise table.error("time_s", f"has a sample every {found_s:g} s, {most}")
     elif not same_sample_time(found_s, wanted_s):
         problem = f"has a sample every {found_s:g} s, expected every {wanted_s:g} s, as {whose} has it"
@@ -123,15 +128,13 @@ def _unit(found_s: float, wanted_s: float | None) -> str:
 
 
 def _check_regular(table: Table, step: Array, gap: Mask, regular: Mask, sample_time_s: float) -> None:
-    odd = regular & (np.abs(step - sample_time_s) > TUNING.jitter_share * sample_time_s)
-    if gap.sum() > max(TUNING.gap_share * len(step), 2):
+    odd = regular & (np.abs(step - sample_time_s) > JITTER_SHARE * sample_time_s)
+    if gap.sum() > max(GAP_SHARE * len(step), 2):
         odd |= gap
     if odd.any():
         later = np.concatenate([[False], odd])
         found = f"advances by {step[int(np.argmax(odd))]:.6g} s in {table.rows(later)}"
-        raise table.error(
-            "time_s", f"{found}, expected even steps of {sample_time_s:g} s within {TUNING.jitter_share:.0%}"
-        )
+        raise table.error("time_s", f"{found}, expected even steps of {sample_time_s:g} s within {JITTER_SHARE:.0%}")
 
 
 def _stretches(cut: Mask, count: int) -> list[slice]:

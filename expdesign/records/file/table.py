@@ -14,9 +14,14 @@ from expdesign.errors import FileError
 from expdesign.records.file.cells import FIRST_ROW, Cells, read_cells, shown
 from expdesign.records.file.choice import Inputs, Sources, choose_columns
 from expdesign.records.file.names import REACHED, Source, is_input
-from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
+
+LARGEST_NUMBER = 1e15  # limit above which a number is an error
+LISTED_ROWS = 3  # stretches of rows that a message lists
+WIND_DISAGREEMENT = 0.3  # relative difference between vane and components that gets a note
+WIND_EXPLAINED = 0.1  # remaining relative difference at which a wrong direction convention is the explanation
+
 
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none")
 OPTIONAL = (
@@ -104,10 +109,8 @@ def rows_in_words(rows: NDArray[np.int_]) -> str:
     """Row numbers, ascending: `row 12`, `rows 12 to 15, 20`, `rows 2, 4, 6 and 17 more`."""
     stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     words = [f"{part[0]} to {part[-1]}" if len(part) > 2 else ", ".join(map(str, part)) for part in stretches]
-    rest = sum(len(part) for part in stretches[TUNING.listed_rows :])
-    return f"row{'s' if len(rows) > 1 else ''} {', '.join(words[: TUNING.listed_rows])}" + (
-        f" and {rest} more" if rest else ""
-    )
+    rest = sum(len(part) for part in stretches[LISTED_ROWS:])
+    return f"row{'s' if len(rows) > 1 else ''} {', '.join(words[:LISTED_ROWS])}" + (f" and {rest} more" if rest else "")
 
 
 class _Numbers:
@@ -157,11 +160,11 @@ def _in_units(path: Path, source: Source, values: Array) -> Array:
     Raises:
         FileError: a value is infinite, or larger than any measurement.
     """
-    huge = np.abs(values) > TUNING.largest_number
+    huge = np.abs(values) > LARGEST_NUMBER
     if huge.any():
         rows = rows_in_words(np.flatnonzero(huge) + FIRST_ROW)
         found_value = "infinite" if np.isinf(values).any() else f"{values[int(np.argmax(huge))]:.6g}"
-        expected = f"expected finite numbers up to {TUNING.largest_number:g}"
+        expected = f"expected finite numbers up to {LARGEST_NUMBER:g}"
         raise FileError(path, source.header, f"is {found_value} in {rows}, {expected}")
     if source.factor != 1.0:
         values *= source.factor
@@ -279,10 +282,10 @@ def check_wind(table: Table) -> Table:
     cartesian, vane = table.stack(*CARTESIAN), vane_wind(*table.stack(*VANE).T)
     size = float(np.linalg.norm(cartesian)) or 1.0
     off = float(np.linalg.norm(cartesian - vane)) / size
-    if off <= TUNING.wind_disagreement:
+    if off <= WIND_DISAGREEMENT:
         return table.noted("the vane's wind agrees with wind_u_mps and wind_v_mps, which are used")
     for text, signs in (("counts counter-clockwise", (1, -1)), ("says where it blows to", (-1, -1))):
-        if float(np.linalg.norm(cartesian - vane * signs)) / size < TUNING.wind_explained:
+        if float(np.linalg.norm(cartesian - vane * signs)) / size < WIND_EXPLAINED:
             problem = f"{text}, as wind_u_mps and wind_v_mps show; expected where it comes from, clockwise from the bow"
             raise table.error(VANE[1], problem)
     return table.noted(f"the vane's wind differs by {off:.0%} from wind_u_mps and wind_v_mps, which are used")

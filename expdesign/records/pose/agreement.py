@@ -13,8 +13,17 @@ import numpy as np
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.records.file import Table
 from expdesign.records.pose.position import LocalMetres
-from expdesign.records.tuning import TUNING
 from expdesign.values import Array
+
+WINDOW_S = 10.0  # interval over which changes of the pose are compared with velocities [s]
+POSE_DISAGREEMENT = 0.3  # relative difference of both changes (root mean square) that gets a note
+POSE_SUSPICION = 0.1  # relative difference above which an explanation is searched for
+POSE_EXPLAINED = 0.25  # share of the difference that may remain with an explanation
+COURSE_SPREAD = 0.02  # circular variance of course less heading below which it is not questioned
+COURSE_AXIS_RAD = 0.5  # distance of an axis at which headings may begin [rad]
+EQUALLY_GOOD = 1.5  # ratio of remaining differences below which explanations are named together
+TURNING_RAD = 0.05  # change of heading over a window (root mean square) below which no turn is compared [rad]
+
 
 DEGREE = np.pi / 180.0
 
@@ -92,10 +101,10 @@ def check_heading(table: Table, batches: tuple[slice, ...], sample_time_s: float
     bow = np.exp(1j * table.columns["heading_rad"][middle])
     size = float(np.abs(way).sum())
     ahead, mirrored = (complex(np.sum(way * turn)) / size if size else 0j for turn in (bow.conj(), bow))
-    if 1.0 - abs(ahead) < TUNING.course_spread or 1.0 - abs(mirrored) > TUNING.pose_explained * (1.0 - abs(ahead)):
+    if 1.0 - abs(ahead) < COURSE_SPREAD or 1.0 - abs(mirrored) > POSE_EXPLAINED * (1.0 - abs(ahead)):
         return
     for axis, whence in ((0.0, ""), (np.pi / 2.0, " from east, as in mathematics")):
-        if abs(np.angle(mirrored * np.exp(-1j * axis))) < TUNING.course_axis_rad:
+        if abs(np.angle(mirrored * np.exp(-1j * axis))) < COURSE_AXIS_RAD:
             problem = f"counts counter-clockwise{whence}, as the positions show; expected clockwise from north"
             raise table.error("heading_rad", problem)
 
@@ -106,8 +115,8 @@ def _check_turning(table: Table, windows: Array, sample_time_s: float) -> Table:
     mistakes = [Mistake(text=text, moved=turned, expected=factor * expected) for text, factor in RATE_UNITS]
     as_is = Mistake(text="", moved=turned, expected=expected)
     _raise_explained(table, "r_radps", "disagrees with the change of heading", as_is, mistakes)
-    if as_is.difference > TUNING.pose_disagreement and np.sqrt(np.mean(turned**2)) > TUNING.turning_rad:
-        return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {TUNING.window_s:g} s")
+    if as_is.difference > POSE_DISAGREEMENT and np.sqrt(np.mean(turned**2)) > TURNING_RAD:
+        return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {WINDOW_S:g} s")
     return table
 
 
@@ -135,8 +144,8 @@ def _check_moving(table: Table, windows: Array, sample_time_s: float) -> Table:
     names = f"{table.sources['north_m'].header} and {table.sources['east_m'].header}"
     mistakes.append(Mistake(text=f"{names} are exchanged", moved=swapped, expected=as_is.expected))
     _raise_explained(table, "u_mps", "disagrees with the positions", as_is, mistakes)
-    if as_is.difference > TUNING.pose_disagreement:
-        disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {TUNING.window_s:g} s"
+    if as_is.difference > POSE_DISAGREEMENT:
+        disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {WINDOW_S:g} s"
         return table.noted(disagree + _heading_offset(as_is))
     return table
 
@@ -147,7 +156,7 @@ def _heading_offset(as_is: Mistake) -> str:
     offset = float(np.angle(np.vdot(expected, moved)))
     turned = expected * np.exp(1j * offset)
     corrected = Mistake(text="", moved=as_is.moved, expected=np.stack([turned.real, turned.imag], axis=-1))
-    if corrected.difference > TUNING.pose_explained * as_is.difference:
+    if corrected.difference > POSE_EXPLAINED * as_is.difference:
         return ""
     return f", only by {corrected.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
 
@@ -155,9 +164,9 @@ def _heading_offset(as_is: Mistake) -> str:
 def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake]) -> None:
     """Raise where a mistake explains the disagreement."""
     best = min(mistake.difference for mistake in mistakes)
-    if as_is.difference <= TUNING.pose_suspicion or best > TUNING.pose_explained * as_is.difference:
+    if as_is.difference <= POSE_SUSPICION or best > POSE_EXPLAINED * as_is.difference:
         return
-    likely = [mistake for mistake in mistakes if mistake.difference <= TUNING.equally_good * best + 0.01]
+    likely = [mistake for mistake in mistakes if mistake.difference <= EQUALLY_GOOD * best + 0.01]
     texts = ", or ".join(mistake.text for mistake in sorted(likely, key=lambda mistake: mistake.difference))
     found = f"{problem} by {as_is.difference:.0%}, but only by {best:.0%} if {texts}"
     raise table.error(name, f"{found}; expected units, signs and axes as in the column names")
@@ -165,7 +174,7 @@ def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mist
 
 def _windows(batches: tuple[slice, ...], sample_time_s: float) -> Array:
     """(n, 2) first and last sample of windows that do not overlap and do not cross batches."""
-    length = max(round(TUNING.window_s / sample_time_s), 1)
+    length = max(round(WINDOW_S / sample_time_s), 1)
     pairs = [
         (start, start + step)
         for part in batches

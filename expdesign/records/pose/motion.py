@@ -24,8 +24,12 @@ import scipy
 from expdesign.conventions import OUTPUTS, POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError
 from expdesign.records.file import Table, mistyped
-from expdesign.records.tuning import TUNING
 from expdesign.values import Array
+
+LOG10_RATIOS = (-9.0, 6.0)  # range of q Ts^3 / variance of the smoother, from strong smoothing to none
+LEARNING_SAMPLES = 8192  # samples, from the middle, from which the smoother learns its ratio
+SHORTEST_SMOOTHED = 4  # samples that the smoother needs
+
 
 # Rauch-Tung-Striebel smoother of a constant-velocity model, solved as the banded system that it is.
 
@@ -41,7 +45,7 @@ def smooth(values: Array, sample_time_s: float, *, noise_std: float | None = Non
     Returns:
         Smoothed values (k, m) and rates (k, m) [per second].
     """
-    surplus = max(len(values) - TUNING.learning_samples, 0) // 2
+    surplus = max(len(values) - LEARNING_SAMPLES, 0) // 2
     ratio = _likeliest_ratio(values[surplus : len(values) - surplus], noise_std)
     state = _solve(values, ratio)[0]
     return state[:, 0], state[:, 1] / sample_time_s
@@ -53,9 +57,9 @@ def _likeliest_ratio(values: Array, noise_std: float | None) -> float:
     def cost(exponent: float) -> float:
         return _minus_log_likelihood(values, 10.0**exponent, noise_std)
 
-    grid = np.arange(TUNING.log10_ratios[0], TUNING.log10_ratios[1] + 0.5)
+    grid = np.arange(LOG10_RATIOS[0], LOG10_RATIOS[1] + 0.5)
     best = float(grid[np.argmin([cost(exponent) for exponent in grid])])
-    bounds = (max(best - 1.0, TUNING.log10_ratios[0]), min(best + 1.0, TUNING.log10_ratios[1]))
+    bounds = (max(best - 1.0, LOG10_RATIOS[0]), min(best + 1.0, LOG10_RATIOS[1]))
     return float(
         10.0 ** scipy.optimize.minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 0.02}).x
     )
@@ -159,7 +163,7 @@ def turned_to_b(rates: Array, heading_rad: Array) -> Array:
 MEASURED, DIFFERENCE, SMOOTHED = "measured", "difference", "smoothed"
 COLUMN_OF = dict(zip(OUTPUTS, VELOCITY_COLUMNS, strict=True))
 NEEDS = {"u": POSE_COLUMNS, "v": POSE_COLUMNS, "r": POSE_COLUMNS[2:]}
-SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: TUNING.shortest_smoothed}
+SAMPLES = {MEASURED: 2, DIFFERENCE: 4, SMOOTHED: SHORTEST_SMOOTHED}
 """Samples that a batch must have."""
 DERIVED = "north_m and east_m (or lat_deg and lon_deg) with heading_rad (or heading_deg)"
 WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed pose"}

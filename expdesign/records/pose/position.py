@@ -12,9 +12,11 @@ import pyproj
 from expdesign.conventions import whole_turns
 from expdesign.errors import FileError
 from expdesign.records.file import Table, check_ranges, input_name, is_turning_input, read_table
-from expdesign.records.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel import Limit
+
+JUMP_RATIO = 10.0  # a step above this multiple of the 95th percentile of all changes gets a note
+
 
 TURN = 2.0 * np.pi
 TIE = 1e-9
@@ -125,7 +127,7 @@ def check_jumps(table: Table, batches: tuple[slice, ...], sample_time_s: float, 
         step = np.abs(_steps(table.columns[name], batches))
         if name == "north_m":
             step = np.hypot(step, _steps(table.columns["east_m"], batches))
-        ordinary = TUNING.jump_ratio * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
+        ordinary = JUMP_RATIO * float(np.percentile(step[step > 0], 95)) if step.any() else 0.0
         jump = step > max(least, fastest * sample_time_s, ordinary)
         if jump.any() and name in needed:
             what = "position jumps" if name == "north_m" else "jumps"

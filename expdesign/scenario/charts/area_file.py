@@ -10,9 +10,9 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
-from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import (
     KM_PER_DEGREE,
+    LARGEST_EXTENT_KM,
     Box,
     OpenChart,
     beside,
@@ -102,10 +102,10 @@ def _checked_bounds(given: Box | None, chart: OpenChart, entry: Entry) -> Box:
     west, south, east, north = given or chart.extent
     height_km = (north - south) * KM_PER_DEGREE
     width_km = (east - west) * KM_PER_DEGREE * float(np.cos(np.radians((south + north) / 2)))
-    if max(height_km, width_km) > TUNING.largest_extent_km or max(-south, north) > 85:
+    if max(height_km, width_km) > LARGEST_EXTENT_KM or max(-south, north) > 85:
         found = "cover" if given else "are missing and the chart covers"
         size = f"{height_km:.0f} x {width_km:.0f} km from latitude {south:.4g} to {north:.4g}"
-        raise entry.error(f"{found} {size}, expected at most {TUNING.largest_extent_km:g} km and no pole")
+        raise entry.error(f"{found} {size}, expected at most {LARGEST_EXTENT_KM:g} km and no pole")
     chart_west, chart_south, chart_east, chart_north = chart.extent
     extent = shapely.box(*chart.extent)
     if given and not shapely.box(*given).intersects(extent):
@@ -156,7 +156,7 @@ def _check_near(corners: Array, name: str, box: Box, place: Entry) -> None:
     """
     off = off_km(shapely.MultiPoint(corners).convex_hull, box)
     swapped = swapped_meets(corners, box)
-    if off > 0 and (swapped or off > TUNING.largest_extent_km):
+    if off > 0 and (swapped or off > LARGEST_EXTENT_KM):
         expected = LAT_LON_SWAPPED if swapped else ", expected corners [latitude, longitude] near them"
         raise place.error(f"of {name!r} lies {off:.4g} km outside the bounds{expected}")
     for number in np.flatnonzero(far_outside(corners, box)).tolist():

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.charts.zones import in_metres
 from expdesign.sea_area import LocalFrame
+
+WALL_HALF_WIDTH_M = 1.0  # half the width given to walls and pontoons drawn as lines
+
 
 SOLID = (
     *("LNDARE", "SLCONS", "PONTON", "HULKES", "FLODOC", "DRYDOC", "GATCON", "DAMCON", "DYKCON", "CAUSWY", "LOGPON"),
@@ -104,9 +106,9 @@ def closed_water(
         "buoys": ([item for item in charted if item.kind in BUOYS], rules.margin_m),
         "bridges, cables and pipes overhead" + _height(rules.air_draught_m): (
             [item for item in charted if item.kind in OVERHEAD and not _passable(item, rules.air_draught_m)],
-            TUNING.wall_half_width_m,
+            WALL_HALF_WIDTH_M,
         ),
-        "restricted areas": (restricted, TUNING.wall_half_width_m),
+        "restricted areas": (restricted, WALL_HALF_WIDTH_M),
     }
     solid = [item for item in charted if item.kind in SOLID]
     whys = Counter(item.why for item in restricted)
@@ -126,7 +128,7 @@ def united(
     """The union in metres: points with a margin around them, lines as thin walls, areas as they are."""
     cut = [item.geometry.intersection(window) for item in objects if item.geometry.intersects(window)]
     metres = [in_metres(geometry, frame) for geometry in cut]
-    widths = np.array([(margin_m, TUNING.wall_half_width_m, 0.0)[shapely.get_dimensions(item)] for item in metres])
+    widths = np.array([(margin_m, WALL_HALF_WIDTH_M, 0.0)[shapely.get_dimensions(item)] for item in metres])
     grown = shapely.buffer(metres, widths, quad_segs=8) if metres else []
     return shapely.union_all([item for item in grown if not item.is_empty])
 

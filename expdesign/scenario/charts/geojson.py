@@ -26,9 +26,11 @@ import numpy as np
 import shapely
 
 from expdesign.errors import InputError
-from expdesign.scenario.charts.tuning import TUNING
 from expdesign.scenario.tables import Entry, read_text, shown
 from expdesign.values import Array
+
+AREA_ROUNDING_DEG2 = 1e-13  # area of rounding, for outlines of about one degree; a tenth of a square decimetre
+
 
 # From GeoJSON files to features and the rings of their polygons; geometry is not checked here.
 
@@ -405,7 +407,7 @@ def _valid(polygon: shapely.Polygon, entry: Entry, repairs: Counter[str]) -> lis
     mended = shapely.make_valid(polygon, method="structure", keep_collapsed=False)
     parts = [part for part in shapely.get_parts(mended) if part.geom_type == "Polygon"]
     west, south, east, north = polygon.bounds
-    rounding = TUNING.area_rounding_deg2 * max(1.0, polygon.length * max(east - west, north - south) / 100)
+    rounding = AREA_ROUNDING_DEG2 * max(1.0, polygon.length * max(east - west, north - south) / 100)
     if sum(part.area for part in parts) <= rounding:
         raise entry.error(f"encloses no area{where}, expected an outline of land or water")
     if abs(sum(part.area for part in parts) - polygon.area) <= rounding:

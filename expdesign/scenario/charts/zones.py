@@ -11,9 +11,11 @@ import pyproj
 import shapely
 
 from expdesign.scenario.charts.area_tables import DepthTable
-from expdesign.scenario.charts.tuning import TUNING
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array
+
+LARGEST_EXTENT_KM = 250.0  # of a sea area, so that a local frame holds it
+
 
 # Chart geometry in degrees: to the metres of a local frame, and where it lies beside the bounds.
 
@@ -59,7 +61,7 @@ def far_outside(points: Array, box: Box) -> np.ndarray:
     west, south, east, north = box
     off = np.maximum(np.maximum((west, south) - points, points - (east, north)), 0.0)
     off[:, 0] *= np.cos(np.radians((south + north) / 2))
-    return np.asarray(np.hypot(*off.T) * KM_PER_DEGREE > TUNING.largest_extent_km)
+    return np.asarray(np.hypot(*off.T) * KM_PER_DEGREE > LARGEST_EXTENT_KM)
 
 
 def off_km(geometry: shapely.Geometry, box: Box) -> float:

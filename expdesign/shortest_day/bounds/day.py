@@ -25,14 +25,18 @@ from expdesign.plan.legs import through_water
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.values import Plan, SailedTrial
 from expdesign.shortest_day.accuracy import Accuracy
-from expdesign.shortest_day.bounds.fewest_samples import fewest_samples
+from expdesign.shortest_day.bounds.fewest_samples import BOX_GAP, fewest_samples
 from expdesign.shortest_day.bounds.motions import AFFINE, Affine, Motions, over_boxes
-from expdesign.shortest_day.bounds.tuning import TUNING
 from expdesign.shortest_day.prices import fewest_runs
 from expdesign.shortest_day.values import DayBound
 from expdesign.simulation import to_body
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY
+
+SPEEDS = 24  # ranges of speed whose gain and loss are bounded
+SPEED_ROUNDS, SPEED_BOXES = 20, 300  # of halving boxes of such a range, and most halved at once
+SLOW_START = 0.01  # share of the way's time that gaining speed must take for these boxes to be halved
+
 
 # The least time of a way from rest to rest: no ship gains or loses speed faster than its model and limits allow.
 
@@ -71,7 +75,7 @@ class SpeedChanges:
         return float(time_s + (way_m - covered_m) / self.edges[-1])
 
 
-def speed_changes(motions: Motions, most_mps: float, *, rounds: int = TUNING.speed_rounds) -> SpeedChanges | None:
+def speed_changes(motions: Motions, most_mps: float, *, rounds: int = SPEED_ROUNDS) -> SpeedChanges | None:
     """Bounds for speeds up to `most_mps`.
 
     Args:
@@ -84,7 +88,7 @@ def speed_changes(motions: Motions, most_mps: float, *, rounds: int = TUNING.spe
     """
     if motions.model.inertia is not None:
         return None
-    edges = np.linspace(0.0, most_mps, TUNING.speeds + 1)
+    edges = np.linspace(0.0, most_mps, SPEEDS + 1)
     ranges = np.array([_most(motions, low, high, rounds) for low, high in pairwise(edges.tolist())])
     return SpeedChanges(edges=edges, gain=ranges[:, 0], loss=ranges[:, 1])
 
@@ -96,9 +100,9 @@ def _most(motions: Motions, low: float, high: float, rounds: int) -> tuple[float
     bounds = _bounds(motions, centres, halves)
     for _ in range(rounds):
         found = _bounds(motions, centres, np.zeros_like(halves)).max(axis=1, keepdims=True)  # samples
-        most = np.where(np.isfinite(found), found + TUNING.box_gap * np.nan_to_num(np.abs(found), posinf=0.0), -np.inf)
+        most = np.where(np.isfinite(found), found + BOX_GAP * np.nan_to_num(np.abs(found), posinf=0.0), -np.inf)
         open_ = (bounds > most).any(axis=0)
-        order = np.flatnonzero(open_)[np.argsort(-bounds[:, open_].max(axis=0))][: TUNING.speed_boxes]
+        order = np.flatnonzero(open_)[np.argsort(-bounds[:, open_].max(axis=0))][:SPEED_BOXES]
         if not len(order):
             break
         across = np.argmax(halves[order, 1:] / (np.ptp(sides, axis=1)[1:] + 1e-12), axis=1) + 1
@@ -224,11 +228,11 @@ def _from_rest_to_rest_s(problem: PlanProblem, velocities: Array, speed_mps: flo
     except InputError:  # inputs without limits
         return way_s
     found_s = way_s
-    for rounds in (0, TUNING.speed_rounds):
+    for rounds in (0, SPEED_ROUNDS):
         changes = speed_changes(motions, speed_mps, rounds=rounds)
         if changes is not None:
             found_s = max(found_s, changes.least_s(way_s * speed_mps, begin_mps))
-        if found_s < (1 + TUNING.slow_start) * way_s:
+        if found_s < (1 + SLOW_START) * way_s:
             break
     return found_s
 

@@ -40,6 +40,22 @@ from expdesign.shortest_day.bounds.motions import Motions
 from expdesign.shortest_day.bounds.tuning import TUNING
 from expdesign.values import Array, seal
 
+FIRST_BOXES = 4096  # about as many to begin with, at most
+BOXES = 200_000  # most that a class of motions is parted into, where the bound is proved; fewer above four dimensions
+FEW_BOXES = 20_000  # the same while the measure is searched
+BOXES_AT_ONCE = 2000  # that are halved together
+BOX_GAP = 0.02  # relative gap at which halving ends
+KEPT_POINTS = 100  # best samples found, which the next measure may use
+ROUNDING = 1e-9  # share by which the largest value is raised for the rounding of numbers
+SAMPLES = 1500  # drawn from a class of motions for the first measure
+STEPS = 15  # of its weights in a round
+GAP = 0.01  # relative gap at which the measure is good enough
+ADDED = 40  # most samples added in a round
+ADDED_WEIGHT = 0.1  # of all of them
+LEAST_WEIGHT = 1e-4  # of a sample, as a share of an equal one; others are left out
+SEARCHES = 5  # for the sample that tells most, each with a better measure
+
+
 # The sample that tells most by a multiplier, over all motions of a class: a number found, and one proved.
 
 Indices = NDArray[np.intp]
@@ -63,7 +79,7 @@ class Richest:
         seal(self, points="c d")
 
 
-def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = TUNING.boxes) -> Richest:
+def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = BOXES) -> Richest:
     """The largest <G, B(x)> over a class of motions.
 
     Args:
@@ -76,15 +92,15 @@ def richest_sample(motions: Motions, multiplier: Array, *, most_boxes: int = TUN
     boxes = _bounded(motions, G, monomials, *_first_boxes(motions))
     found, left = _samples(boxes), most_boxes * 16 / max(16, 2 ** len(motions.low))  # the work goes with the corners
     while left > 0:
-        order = np.flatnonzero(boxes.bounds > found.best * (1 + TUNING.box_gap))
+        order = np.flatnonzero(boxes.bounds > found.best * (1 + BOX_GAP))
         if not len(order):
             break
-        order = order[np.argsort(-boxes.bounds[order])[: TUNING.boxes_at_once]]
+        order = order[np.argsort(-boxes.bounds[order])[:BOXES_AT_ONCE]]
         left -= 2 * len(order)
         new = _bounded(motions, G, monomials, *_halved(boxes, order, motions.high - motions.low))
         new = replace(new, bounds=np.minimum(new.bounds, np.tile(boxes.bounds[order], 2)))
         found, boxes = found.with_more(_samples(new)), boxes.without(order).with_more(new)
-    bound = max(found.best, float(boxes.bounds.max(initial=0.0))) * (1 + TUNING.rounding)
+    bound = max(found.best, float(boxes.bounds.max(initial=0.0))) * (1 + ROUNDING)
     return Richest(found=found.best, bound=bound, points=found.points)
 
 
@@ -135,12 +151,12 @@ class _Samples:
 
     def with_more(self, more: _Samples) -> _Samples:
         values = np.concatenate([self.values, more.values])
-        order = np.argsort(-values, kind="stable")[: TUNING.kept_points]
+        order = np.argsort(-values, kind="stable")[:KEPT_POINTS]
         return _Samples(np.concatenate([self.points, more.points])[order], values[order])
 
 
 def _samples(boxes: _Boxes) -> _Samples:
-    order = np.argsort(-boxes.values, kind="stable")[: TUNING.kept_points]
+    order = np.argsort(-boxes.values, kind="stable")[:KEPT_POINTS]
     return _Samples(boxes.points[order], boxes.values[order])
 
 
@@ -164,7 +180,7 @@ def _bounded(motions: Motions, G: Array, monomials: Array, centres: Array, halve
 def _first_boxes(motions: Motions) -> tuple[Array, Array]:
     """Centres and half sides (b, d): velocities are parted at zero, where moduli bend, other sides in up to eight."""
     edges, others = [], len(motions.low) - 3
-    parts = int(min(8.0, max(2.0, (TUNING.first_boxes / 8) ** (1 / max(others, 1)))))
+    parts = int(min(8.0, max(2.0, (FIRST_BOXES / 8) ** (1 / max(others, 1)))))
     for side, (low, high) in enumerate(zip(motions.low, motions.high, strict=True)):
         parted = [low, *([0.0] if low < 0 < high else []), high] if side < 3 else np.linspace(low, high, parts + 1)
         edges.append(np.array(parted))
@@ -205,7 +221,7 @@ class SampleBound:
 
 
 def fewest_samples(
-    accuracy: Accuracy, motions: Motions, *, mean_subtraction: str, most_boxes: int = TUNING.boxes
+    accuracy: Accuracy, motions: Motions, *, mean_subtraction: str, most_boxes: int = BOXES
 ) -> SampleBound | None:
     """The fewest samples of any motion of a class that reach an accuracy.
 
@@ -224,13 +240,13 @@ def fewest_samples(
     if accuracy.margin(np.zeros_like(accuracy.prior)) >= 0:
         raise InputError("the accuracy is reached without any sample")
     search = _Search(accuracy=accuracy, motions=motions, mean_subtraction=mean_subtraction)
-    for _ in range(TUNING.searches):
+    for _ in range(SEARCHES):
         measured = search.measured()
         if measured is None:
             return None
         multiplier, enough = measured
-        richest = richest_sample(motions, multiplier, most_boxes=min(most_boxes, TUNING.few_boxes))
-        if richest.found * enough < 1 + 2 * TUNING.gap:
+        richest = richest_sample(motions, multiplier, most_boxes=min(most_boxes, FEW_BOXES))
+        if richest.found * enough < 1 + 2 * GAP:
             break
         search.add(richest)
     proved = richest_sample(motions, multiplier, most_boxes=most_boxes)
@@ -263,7 +279,7 @@ class _Search:
         enough, cuts = np.inf, list[Array]()
         for _ in range(TUNING.rounds):
             cuts = []
-            for _ in range(TUNING.steps):
+            for _ in range(STEPS):
                 M = self._information()
                 margin = self.accuracy.margin(self.samples * self._centred(M))
                 if not np.isfinite(margin):
@@ -307,21 +323,21 @@ class _Search:
         power = 1.0 if self.accuracy.scarcest(self.samples * self._centred(self._information())) == "" else 0.5
         weights = self.weights * np.maximum(values, 0.0) ** power
         weights /= weights.sum()
-        kept = weights > TUNING.least_weight / len(weights)
+        kept = weights > LEAST_WEIGHT / len(weights)
         self.active, self.weights = self.active[kept], weights[kept] / weights[kept].sum()
 
     def _extended(self, G: Array) -> bool:
         """Adds the samples that tell most; whether the measure was good enough without."""
         values = sample_values(self.motions, G, self.rows)
         best = values.max(axis=1)
-        if best.max() * self.samples < 1 + TUNING.gap:
+        if best.max() * self.samples < 1 + GAP:
             return True
-        chosen = np.argsort(-best)[: TUNING.added]
+        chosen = np.argsort(-best)[:ADDED]
         chosen = chosen[best[chosen] * self.samples > 1]
         force = self.motions.forces[values[chosen].argmax(axis=1)]
         self.active = np.concatenate([self.active, _with_force(self.rows[:, chosen], force)])
-        more = np.full(len(chosen), TUNING.added_weight / len(chosen))
-        self.weights = np.concatenate([(1 - TUNING.added_weight) * self.weights, more])
+        more = np.full(len(chosen), ADDED_WEIGHT / len(chosen))
+        self.weights = np.concatenate([(1 - ADDED_WEIGHT) * self.weights, more])
         return False
 
     def _mixed(self, cuts: list[Array]) -> Array:
@@ -347,7 +363,7 @@ def _with_force(rows: Array, force: Array) -> Array:
 
 def _drawn(motions: Motions, rng: np.random.Generator) -> Array:
     """(b, d) samples of the class: even inside it, or at its limits, coordinate by coordinate."""
-    shape = (TUNING.samples, len(motions.low))
+    shape = (SAMPLES, len(motions.low))
     inside = rng.uniform(motions.low, motions.high, shape)
     ends = np.where(rng.random(shape) < 0.5, motions.low, motions.high)
     return np.asarray(np.where(rng.random(shape) < 0.5, ends, inside))

@@ -24,11 +24,13 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import InputError
-from expdesign.shortest_day.bounds.tuning import TUNING
 from expdesign.simulation import to_body
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Actuator, Operators, VesselModel, direct_terms, force_matrix, stem
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+
+FEWEST_SIDES, MOST_SIDES = 4, 24  # of the polygon that holds the force of an azimuth; several azimuths share the most
+
 
 # Affine arithmetic: what an expression can be over many boxes at once, with the correlation of its parts kept.
 
@@ -260,7 +262,7 @@ def _force_corners(actuators: Sequence[Actuator]) -> Array:
         InputError: an actuator that drives has no limits.
     """
     azimuths = sum(actuator.kind == "azimuth" for actuator in actuators)
-    sides = max(TUNING.fewest_sides, TUNING.most_sides // max(azimuths, 1))
+    sides = max(FEWEST_SIDES, MOST_SIDES // max(azimuths, 1))
     angles = 2 * np.pi * np.arange(sides) / sides
     polygon = np.stack([np.cos(angles), np.sin(angles)], axis=1) / np.cos(np.pi / sides)
     unit_forces, column, corners = force_matrix(tuple(actuators)), 0, np.zeros((1, 3))

@@ -32,6 +32,13 @@ from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
+LONGEST_HOLD_CONSTANTS = 15.0  # expected time constants after which a hold that is not steady is given up
+SETTLING_SHARE = 1 / 3  # beginning of the first hold that is not learnt from
+LEAST_PLATEAU_S = 10.0  # time that a steady state is held, for its mean
+LONGEST_TURN_S = 60.0  # a whole turn is made where it takes no longer, which takes a current out of the mean
+MOST_ATTEMPTS = 3  # at one step of a trial that is being sailed
+GAP_SAMPLE_TIMES = 1.5  # interval, in sample times, from which a trial that is being sailed has a gap
+
 
 def plateau_of(held: Held, sample_time_s: float, steps: StepList) -> Plateau:
     """Mean of the rows since a hold has been steady."""
@@ -94,7 +101,7 @@ class Setup:
     @property
     def longest_s(self) -> float:
         """Time after which a hold that is not steady is given up [s]."""
-        return TUNING.longest_hold_constants * max(self.constants_s)
+        return LONGEST_HOLD_CONSTANTS * max(self.constants_s)
 
 
 def beginning(setup: Setup) -> State:
@@ -134,12 +141,12 @@ def _gap_s(held: Held, row: Row) -> float:
     """Length of a gap before a row [s], zero where there is none; judged by the intervals so far."""
     step_s = row.time_s - held.rows[-1].time_s
     usual_s = held.elapsed_s / (len(held.rows) - 1) if len(held.rows) > 2 else math.inf
-    return step_s if step_s > TUNING.gap_sample_times * usual_s else 0.0
+    return step_s if step_s > GAP_SAMPLE_TIMES * usual_s else 0.0
 
 
 def _calibrated(state: State, held: Held, setup: Setup) -> StateAndEvents:
     step_s = held.elapsed_s / (len(held.rows) - 1)
-    settling = int(len(held.rows) * TUNING.settling_share)
+    settling = int(len(held.rows) * SETTLING_SHARE)
     speed = _states(held.rows[settling:])
     rng = np.random.default_rng(setup.seed)
     memories = [max(TUNING.memory_share * constant, LEAST_MEMORY_SAMPLES * step_s) for constant in setup.constants_s]
@@ -161,7 +168,7 @@ def _calibrated(state: State, held: Held, setup: Setup) -> StateAndEvents:
         steady = place if steady is None and all(part.mode == STEADY for part in state.watched) else steady
     learnt = Event(time_s=held.rows[-1].time_s, kind=values.LEARNT, inputs=setup.steps.start, seconds=step_s)
     if steady is not None:
-        held = replace(held, steady=settling + steady, hold_s=TUNING.least_plateau_s)
+        held = replace(held, steady=settling + steady, hold_s=LEAST_PLATEAU_S)
     state, events = _judged(replace(state, held=held), setup)
     return state, (learnt, *events)
 
@@ -256,11 +263,11 @@ def _judged(state: State, setup: Setup) -> StateAndEvents:
         return _over(state, held, setup) if _held_long_enough(held) else (state, ())
     if all(part.mode == STEADY for part in state.watched):
         turn_s = 2 * math.pi / max(abs(state.watched[1].mean), 1e-9)
-        hold_s = turn_s if turn_s <= TUNING.longest_turn_s else TUNING.least_plateau_s
+        hold_s = turn_s if turn_s <= LONGEST_TURN_S else LEAST_PLATEAU_S
         state = replace(state, held=replace(held, steady=len(held.rows) - 1, hold_s=hold_s))
         event = Event(
             time_s=now, kind=values.STEADY, step=held.step, inputs=held.inputs, seconds=hold_s,
-            whole_turn=turn_s <= TUNING.longest_turn_s,
+            whole_turn=turn_s <= LONGEST_TURN_S,
             state=(state.watched[0].mean, state.watched[1].mean),
         )  # fmt: skip
         return state, (event,)
@@ -275,7 +282,7 @@ def _held_long_enough(held: Held) -> bool:
     assert held.steady is not None
     rows = held.rows[held.steady :]
     passed = rows[-1].time_s - rows[0].time_s
-    if held.hold_s <= TUNING.least_plateau_s or passed < 0.9 * held.hold_s:
+    if held.hold_s <= LEAST_PLATEAU_S or passed < 0.9 * held.hold_s:
         return passed >= held.hold_s
     rates = np.array([row.motion[2] for row in rows])
     turned = abs(float(np.sum(rates))) * passed / (len(rows) - 1)
@@ -326,11 +333,11 @@ def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, qui
     if step is not None:
         again = step.failed(why)
         rest = tuple(other for other in state.left if other != step)
-        if again.attempts < TUNING.most_attempts:
+        if again.attempts < MOST_ATTEMPTS:
             state = replace(state, left=(*rest, again))
         else:
             state = replace(state, left=rest, left_out=(*state.left_out, again))
-    kind = values.LEFT_OUT if step is not None and step.attempts + 1 >= TUNING.most_attempts else values.BAD
+    kind = values.LEFT_OUT if step is not None and step.attempts + 1 >= MOST_ATTEMPTS else values.BAD
     following = None if quiet else _following(state, setup)
     event = Event(time_s=now, kind=kind, step=step, inputs=held.inputs or (), why=why, following=following)
     return state, (event, *_end(state, now))

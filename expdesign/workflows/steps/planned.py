@@ -33,7 +33,6 @@ from expdesign.plan.assembly import check_start_speed
 from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
 from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
@@ -41,6 +40,8 @@ from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.signals import AUXILIARY
 from expdesign.vessel import NOT_SUPPORTED, column_name
 from expdesign.workflows.steps.scored import growth_files, score_files
+
+MOST_RUNS = 1000  # runs in one plan
 
 
 def planned(
@@ -66,9 +67,9 @@ def plan_problem(
     """
     check_plannable(case)
     runs = sum(design.repeats)
-    if runs > PLAN.most_runs:
+    if runs > MOST_RUNS:
         raise InputError(
-            f"the design has {runs} runs, expected at most {PLAN.most_runs} in one plan: shorten design.total_s or "
+            f"the design has {runs} runs, expected at most {MOST_RUNS} in one plan: shorten design.total_s or "
             "lengthen the manoeuvres"
         )
     primitives = tuple(item.primitive for item in information)
