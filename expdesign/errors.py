@@ -132,13 +132,9 @@ class NoPlan(NoAnswer):
 
 
 class NoRoom(NoPlan):
-    """The water looked at has no path, or no place for a run; more of the chart may have one.
+    """The water looked at has no path, or no place for a run; more of the chart may have one."""
 
-    Attributes:
-        lacking: runs that have no place, where each was looked at by itself.
-    """
-
-    lacking: tuple[str, ...] = ()
+    lacking: tuple[str, ...] = ()  # runs that have no place, where each was looked at by itself
 
 
 class NotDrawn(UserWarning):

@@ -46,15 +46,10 @@ ABSENT = object()
 
 @dataclasses.dataclass(frozen=True)
 class Memory:
-    """A folder of results.
+    """A folder of results."""
 
-    Attributes:
-        folder: of this user alone.
-        most_bytes: size to which `trim` cuts it.
-    """
-
-    folder: Path
-    most_bytes: int = MOST_BYTES
+    folder: Path  # of this user alone
+    most_bytes: int = MOST_BYTES  # size to which `trim` cuts it
 
     def read(self, key: str) -> Any:
         """The result of a key, or `ABSENT`."""

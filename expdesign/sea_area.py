@@ -39,12 +39,9 @@ NARROW = 4.0
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Relates latitude/longitude (WGS84) to north/east metres.
+    """Relates latitude/longitude (WGS84) to north/east metres."""
 
-    Attributes:
-        lat_deg, lon_deg: the origin.
-    """
-
+    # lat_deg, lon_deg: the origin
     lat_deg: float
     lon_deg: float
 
@@ -72,26 +69,17 @@ class LocalFrame:
 
 @dataclass(frozen=True, kw_only=True)
 class SeaArea:
-    """Where the trial may take place. Polygon coordinates are (east_m, north_m), x to the right, as on a chart.
+    """Where the trial may take place. Polygon coordinates are (east_m, north_m), x to the right, as on a chart."""
 
-    Attributes:
-        name: for reports.
-        frame: relates metres to latitude and longitude.
-        water: allowed water before any clearance: deep enough, inside the bounds, outside land and no-go zones.
-        land: land inside the bounds, for drawing.
-        depth_rule: the rule for depth, in one sentence.
-        notes: on repairs and assumptions in the chart.
-        source: chart file and licence notice.
-        depths: (charted least depth [m], polygons) from shallow to deep, for drawing; empty where depth is not charted.
-    """
-
-    name: str
-    frame: LocalFrame
+    name: str  # for reports
+    frame: LocalFrame  # relates metres to latitude and longitude
+    # allowed water before any clearance: deep enough, inside the bounds, outside land and no-go zones
     water: shapely.MultiPolygon
-    land: shapely.MultiPolygon
-    depth_rule: str
-    notes: tuple[str, ...] = ()
-    source: str = ""
+    land: shapely.MultiPolygon  # land inside the bounds, for drawing
+    depth_rule: str  # the rule for depth, in one sentence
+    notes: tuple[str, ...] = ()  # on repairs and assumptions in the chart
+    source: str = ""  # chart file and licence notice
+    # (charted least depth [m], polygons) from shallow to deep, for drawing; empty where depth is not charted
     depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
@@ -167,21 +155,13 @@ def _tiles(
 
 @dataclass(frozen=True, kw_only=True)
 class Zones:
-    """The zones of a sea area, as valid polygons (east_m, north_m).
+    """The zones of a sea area, as valid polygons (east_m, north_m)."""
 
-    Attributes:
-        bounds: the trial stays inside.
-        land: the trial stays outside.
-        no_go: the trial stays outside.
-        deep: water known to be deep enough, or None when depth is not checked.
-        depths: (charted least depth [m], polygons), for drawing.
-    """
-
-    bounds: shapely.Geometry
-    land: shapely.Geometry
-    no_go: shapely.Geometry
-    deep: shapely.Geometry | None = None
-    depths: tuple[tuple[float, shapely.Geometry], ...] = ()
+    bounds: shapely.Geometry  # the trial stays inside
+    land: shapely.Geometry  # the trial stays outside
+    no_go: shapely.Geometry  # the trial stays outside
+    deep: shapely.Geometry | None = None  # water known to be deep enough, or None when depth is not checked
+    depths: tuple[tuple[float, shapely.Geometry], ...] = ()  # (charted least depth [m], polygons), for drawing
 
 
 def build_sea_area(

@@ -13,17 +13,11 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Commands:
-    """Actuator commands, each held from its sample to the next (zero-order hold).
+    """Actuator commands, each held from its sample to the next (zero-order hold)."""
 
-    Attributes:
-        sample_time_s: time between samples [s].
-        names: actuator signals, e.g. ("n1", "a1", "n2", "a2") or ("tau_x", "tau_y", "tau_psi").
-        values: (k, m) in SI units: rps, rad, or the model's own force unit.
-    """
-
-    sample_time_s: float
-    names: tuple[str, ...]
-    values: Array
+    sample_time_s: float  # time between samples [s]
+    names: tuple[str, ...]  # actuator signals, e.g. ("n1", "a1", "n2", "a2") or ("tau_x", "tau_y", "tau_psi").
+    values: Array  # (k, m) in SI units: rps, rad, or the model's own force unit
 
     def __post_init__(self) -> None:
         seal(self, values="k m")
@@ -56,18 +50,12 @@ accelerometer along the starboard axis, with gravity in it."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
-    """Motion sampled at the ends of every command: one sample more than there are commands.
+    """Motion sampled at the ends of every command: one sample more than there are commands."""
 
-    Attributes:
-        sample_time_s: time between samples [s].
-        pose: (k, 3) n-frame [north m, east m, heading rad]; heading is continuous, not wrapped.
-        velocity: (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground.
-        auxiliary: (k, 8) of `AUXILIARY`, nan in columns that the simulation does not give; None where it gives none.
-    """
-
-    sample_time_s: float
-    pose: Array
-    velocity: Array
+    sample_time_s: float  # time between samples [s]
+    pose: Array  # (k, 3) n-frame [north m, east m, heading rad]; heading is continuous, not wrapped
+    velocity: Array  # (k, 3) b-frame [u m/s, v m/s, r rad/s], over ground
+    # (k, 8) of `AUXILIARY`, nan in columns that the simulation does not give; None where it gives none
     auxiliary: Array | None = None
 
     def __post_init__(self) -> None:
@@ -89,21 +77,15 @@ class Trajectory:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Delivered:
-    """What actuators deliver within samples.
+    """What actuators deliver within samples."""
 
-    Attributes:
-        values: (k, s, m) means of the inputs over each part of a sample.
-        shares: (s,) of the sample that the parts take.
-        times: names of dead times and lags of the actuators that are not known exactly, as in `vessel.std_keys`.
-        values_by_time: (k, s, m, u) derivatives of the values by them [1/s].
-        shares_by_time: (s, u) those of the shares [1/s].
-    """
-
-    values: Array
-    shares: Array
+    values: Array  # (k, s, m) means of the inputs over each part of a sample
+    shares: Array  # (s,) of the sample that the parts take
+    # names of dead times and lags of the actuators that are not known exactly, as in `vessel.std_keys`
     times: tuple[str, ...] = ()
+    # (k, s, m, u) derivatives of the values by them [1/s]
     values_by_time: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
-    shares_by_time: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    shares_by_time: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (s, u) those of the shares [1/s]
 
     def __post_init__(self) -> None:
         if not self.times:
@@ -133,54 +115,40 @@ class Delivered:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Batch:
-    """One uninterrupted stretch of measured data; a difference or a lag never reaches into another batch.
+    """One uninterrupted stretch of measured data; a difference or a lag never reaches into another batch."""
 
-    Attributes:
-        name: for reports, e.g. "trial.csv, batch 2".
-        sample_time_s: time between samples [s].
-        input_names: actuator signals, e.g. ("n1", "a1"), or ("tau_x", "tau_y", "tau_psi").
-        inputs: (k, m) commands, held from their sample to the next.
-        velocity: (k, 3) b-frame u, v, r over ground, measured or derived from pose; a column that is neither is nan,
-            where the reader was asked to allow that.
-        pose: (k, 3) n-frame, heading continuous, or None when not measured; nan where a part is not measured.
-        wind: (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind,
-            or None when not measured.
-        depth_m: (k,) water depth, or None.
-        derived: those of u, v, r that are known to be derived from pose, not measured.
-        smoothed: whether those are smoothed, so that they hold motion of many samples before and after.
-        first_row: row of the first sample in its file (the header is row 1), 0 when not from a file.
-        interpolated: (k, 3) 1 where a velocity lies between the readings of its sensor, 0 where it is one; None where
-            all are readings.
-        vane_std_rad: standard deviation of the noise on the angle of the vane that gave the wind, where the wind is
-            divided by the shrinkage that it causes; else 0.
-        delivered: within samples, where actuators deliver other than held inputs; then `inputs` are the means over the
-            sample. None where inputs are held.
-        steered: (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the
-            data do not say.
-        planned: (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown.
-        reached: names of inputs that are positions which actuators reached, as measured, not commands: means over each
-            sample of the readings at its ends.
-        auxiliary: (k, 8) of `AUXILIARY`, as measured, nan where a column is not; None where none is.
-    """
-
-    name: str
-    sample_time_s: float
-    input_names: tuple[str, ...]
-    inputs: Array
+    name: str  # for reports, e.g. "trial.csv, batch 2".
+    sample_time_s: float  # time between samples [s]
+    input_names: tuple[str, ...]  # actuator signals, e.g. ("n1", "a1"), or ("tau_x", "tau_y", "tau_psi").
+    inputs: Array  # (k, m) commands, held from their sample to the next
+    # (k, 3) b-frame u, v, r over ground, measured or derived from pose; a column that is neither is nan, where the
+    # reader was asked to allow that
     velocity: Array
+    # (k, 3) n-frame, heading continuous, or None when not measured; nan where a part is not measured
     pose: Array | None = None
+    # (k, 2) relative wind in the b-frame, the air's velocity past the ship as (u_q, v_q) = velocity - wind, or None
+    # when not measured
     wind: Array | None = None
-    depth_m: Array | None = None
-    derived: tuple[str, ...] = ()
-    smoothed: bool = False
-    first_row: int = 0
+    depth_m: Array | None = None  # (k,) water depth, or None
+    derived: tuple[str, ...] = ()  # those of u, v, r that are known to be derived from pose, not measured
+    smoothed: bool = False  # whether those are smoothed, so that they hold motion of many samples before and after
+    first_row: int = 0  # row of the first sample in its file (the header is row 1), 0 when not from a file
+    # (k, 3) 1 where a velocity lies between the readings of its sensor, 0 where it is one; None where all are readings
     interpolated: Array | None = None
+    # standard deviation of the noise on the angle of the vane that gave the wind, where the wind is divided by the
+    # shrinkage that it causes; else 0
     vane_std_rad: float = 0.0
+    # within samples, where actuators deliver other than held inputs; then `inputs` are the means over the sample. None
+    # where inputs are held.
     delivered: Delivered | None = None
+    # (k,) 1 where the inputs follow the ship's motion, 0 where they were set beforehand; None where the data do not say
     steered: Array | None = None
+    # (k, p) what the first p inputs were planned to be, whatever the ship did; None where unknown
     planned: Array | None = None
+    # names of inputs that are positions which actuators reached, as measured, not commands: means over each sample of
+    # the readings at its ends
     reached: tuple[str, ...] = ()
-    auxiliary: Array | None = None
+    auxiliary: Array | None = None  # (k, 8) of `AUXILIARY`, as measured, nan where a column is not; None where none is
 
     def __post_init__(self) -> None:
         shapes = {
@@ -216,16 +184,9 @@ class Batch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
-    """Measured data, ready for estimation.
+    """Measured data, ready for estimation."""
 
-    Attributes:
-        batches: with the same inputs and the same sample time.
-        notes: on flaws of the files and their treatment, one sentence each.
-        doubts: those of the notes that put results into question, whatever is done with the data.
-        faults: those of the doubts that stand in the data as they are used.
-    """
-
-    batches: tuple[Batch, ...]
-    notes: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
+    batches: tuple[Batch, ...]  # with the same inputs and the same sample time
+    notes: tuple[str, ...] = ()  # on flaws of the files and their treatment, one sentence each
+    doubts: tuple[str, ...] = ()  # those of the notes that put results into question, whatever is done with the data
+    faults: tuple[str, ...] = ()  # those of the doubts that stand in the data as they are used

@@ -20,17 +20,11 @@ G_MPS2 = 9.81
 
 @dataclass(frozen=True, kw_only=True)
 class Jonswap:
-    """A sea.
+    """A sea."""
 
-    Attributes:
-        height_m: significant wave height.
-        peak_radps: frequency of the peak.
-        gamma: its sharpness, 1 to 7.
-    """
-
-    height_m: float
-    peak_radps: float
-    gamma: float = 3.3
+    height_m: float  # significant wave height
+    peak_radps: float  # frequency of the peak
+    gamma: float = 3.3  # its sharpness, 1 to 7
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -62,21 +56,13 @@ def encounter(frequency_radps: Array, *, speed_mps: float, heading_rad: float) -
 
 @dataclass(frozen=True, kw_only=True)
 class Waves:
-    """Long-crested waves that roll a ship by their slope across her; they do not sway or yaw her.
+    """Long-crested waves that roll a ship by their slope across her; they do not sway or yaw her."""
 
-    Attributes:
-        height_m: significant wave height.
-        period_s: of the spectrum's peak.
-        from_rad: whence they come, clockwise from north.
-        gamma: sharpness of the peak, 1 to 7.
-        slope_share: of the slope at a point that acts on the hull, 0 to 1; less where the beam is not small.
-    """
-
-    height_m: float
-    period_s: float
-    from_rad: float
-    gamma: float = 3.3
-    slope_share: float = 1.0
+    height_m: float  # significant wave height
+    period_s: float  # of the spectrum's peak
+    from_rad: float  # whence they come, clockwise from north
+    gamma: float = 3.3  # sharpness of the peak, 1 to 7
+    slope_share: float = 1.0  # of the slope at a point that acts on the hull, 0 to 1; less where the beam is not small
 
     def __post_init__(self) -> None:
         for name in ("height_m", "period_s"):

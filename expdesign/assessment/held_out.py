@@ -41,21 +41,13 @@ UNBIASED = ("iv", "oe", "ls")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeldOut:
-    """Errors of one method's predictions.
+    """Errors of one method's predictions."""
 
-    Attributes:
-        method: the method.
-        horizon_s: of output error [s], None for whole runs.
-        outputs: names.
-        shares: (n,) errors over standard deviations, geometric means over runs; nan where one never changes.
-        unseen: whether each run was predicted without it.
-    """
-
-    method: Method
-    horizon_s: float | None
-    outputs: tuple[str, ...]
-    shares: Array
-    unseen: bool
+    method: Method  # the method
+    horizon_s: float | None  # of output error [s], None for whole runs
+    outputs: tuple[str, ...]  # names
+    shares: Array  # (n,) errors over standard deviations, geometric means over runs; nan where one never changes
+    unseen: bool  # whether each run was predicted without it
 
     def __post_init__(self) -> None:
         seal(self, shares="n")
@@ -148,20 +140,14 @@ Refit = Callable[[Record], VesselModel]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
-    """A method with an estimate.
+    """A method with an estimate."""
 
-    Attributes:
-        method, horizon_s: as of `HeldOut`.
-        model: with the estimate.
-        wind: whether measured wind acts.
-        again: the same from other data.
-    """
-
+    # method, horizon_s: as of `HeldOut`
     method: Method
     horizon_s: float | None
-    model: VesselModel
-    wind: bool
-    again: Refit
+    model: VesselModel  # with the estimate
+    wind: bool  # whether measured wind acts
+    again: Refit  # the same from other data
 
 
 def held_out(

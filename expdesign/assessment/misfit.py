@@ -46,25 +46,16 @@ ESTIMATION, TEST = "estimation", "test"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunCheck:
-    """The simulation of one run and its errors.
+    """The simulation of one run and its errors."""
 
-    Attributes:
-        batch: the run.
-        use: "estimation" or "test".
-        outputs: the velocities that have an equation.
-        fit_percent: (n,) of the simulated output, nan where the measured one is constant or the simulation diverges.
-        rmse: (n,) root-mean-square error [m/s, rad/s], nan likewise.
-        simulated: (k, 3) u, v, r; None when the simulation diverges.
-        problem: why there is no simulation, or "".
-    """
-
-    batch: Batch
-    use: str
-    outputs: tuple[str, ...]
+    batch: Batch  # the run
+    use: str  # "estimation" or "test"
+    outputs: tuple[str, ...]  # the velocities that have an equation
+    # (n,) of the simulated output, nan where the measured one is constant or the simulation diverges
     fit_percent: Array
-    rmse: Array
-    simulated: Array | None
-    problem: str
+    rmse: Array  # (n,) root-mean-square error [m/s, rad/s], nan likewise
+    simulated: Array | None  # (k, 3) u, v, r; None when the simulation diverges
+    problem: str  # why there is no simulation, or ""
 
     def __post_init__(self) -> None:
         seal(self, fit_percent="n", rmse="n", **({} if self.simulated is None else {"simulated": "k 3"}))
@@ -109,30 +100,21 @@ def _simulated(model: VesselModel, batch: Batch, *, wind: bool, integration: Int
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """The decomposed misfit of one run.
+    """The decomposed misfit of one run."""
 
-    Attributes:
-        outputs: names.
-        constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that causes it.
-        parameters: (n,) squared misfit expected from the parameters' covariance, over the actual one.
-        ceiling_percent: (n,) lower bound on the fit with measurement noise alone: the noise is estimated by third
-            differences, which also contain motion that is fast at the sample time.
-        ahead_rms: (n,) of predictions `Tuning.ahead_s` ahead from measured velocities [m/s, rad/s].
-        ahead_share: (n,) the same over the standard deviation of the measured output.
-        growth: how many times an error of the first velocity is larger at the end of the run, at worst.
-        duration_s: of the run.
-    """
-
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # names
+    # constant, slow, quick: (n,) shares of the squared misfit by the kind of one-step residual that causes it
     constant: Array
     slow: Array
     quick: Array
-    parameters: Array
+    parameters: Array  # (n,) squared misfit expected from the parameters' covariance, over the actual one
+    # (n,) lower bound on the fit with measurement noise alone: the noise is estimated by third differences, which also
+    # contain motion that is fast at the sample time
     ceiling_percent: Array
-    ahead_rms: Array
-    ahead_share: Array
-    growth: float
-    duration_s: float
+    ahead_rms: Array  # (n,) of predictions `Tuning.ahead_s` ahead from measured velocities [m/s, rad/s]
+    ahead_share: Array  # (n,) the same over the standard deviation of the measured output
+    growth: float  # how many times an error of the first velocity is larger at the end of the run, at worst
+    duration_s: float  # of the run
 
     def __post_init__(self) -> None:
         names = ("constant", "slow", "quick", "parameters", "ceiling_percent", "ahead_rms", "ahead_share")
@@ -313,21 +295,13 @@ def _listed(limits: Limits, values: Array) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OneStep:
-    """Residuals nu(k) - nu(k - 1) - Phi(k - 1)^T theta, their mean taken off.
+    """Residuals nu(k) - nu(k - 1) - Phi(k - 1)^T theta, their mean taken off."""
 
-    Attributes:
-        outputs: names.
-        residuals: (k, n) in the unit of a sample-to-sample difference.
-        batch: (k,) number of the run.
-        explained: (n,) share of the variance of nu(k) - nu(k - 1) that the model explains, at most 1.
-        autocorrelation: (lags + 1, n), 1 at lag 0; pairs never reach across runs or missing samples.
-    """
-
-    outputs: tuple[str, ...]
-    residuals: Array
-    batch: Integers
-    explained: Array
-    autocorrelation: Array
+    outputs: tuple[str, ...]  # names
+    residuals: Array  # (k, n) in the unit of a sample-to-sample difference
+    batch: Integers  # (k,) number of the run
+    explained: Array  # (n,) share of the variance of nu(k) - nu(k - 1) that the model explains, at most 1
+    autocorrelation: Array  # (lags + 1, n), 1 at lag 0; pairs never reach across runs or missing samples
 
     def __post_init__(self) -> None:
         seal(self, residuals="k n", explained="n", autocorrelation="l n")

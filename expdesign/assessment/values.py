@@ -44,46 +44,27 @@ INSTRUMENTAL = "iv"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbances:
-    """Current and wind: as estimated, and as measured.
+    """Current and wind: as estimated, and as measured."""
 
-    Attributes:
-        current: its moments, or None where the method does not estimate them.
-        combined: of current and wind together, for equations in which they cannot be distinguished.
-        wind: the measured one, or None where none is used.
-    """
-
-    current: Moments | None
-    combined: tuple[Moments, ...]
-    wind: MeasuredWind | None
+    current: Moments | None  # its moments, or None where the method does not estimate them
+    combined: tuple[Moments, ...]  # of current and wind together, for equations in which they cannot be distinguished
+    wind: MeasuredWind | None  # the measured one, or None where none is used
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assessed:
-    """One method's estimate.
+    """One method's estimate."""
 
-    Attributes:
-        method: how it was made.
-        horizon_s: of output error [s], None for whole runs.
-        estimate: parameters with their uncertainty.
-        start: parameters of the first instruments, "nominal" or "ls"; "" for least squares.
-        model: the vessel's model with the estimate.
-        runs: every run simulated with it, first the estimation runs, then the test runs.
-        one_step: its residuals.
-        breaches: where the data break the excitation condition, for the signals this method uses.
-        disturbances: current and wind, from the nuisance parameters and from the measured wind.
-        std: as of `Vessel.std`, with those of dead times and lags that were estimated.
-    """
-
-    method: Method
-    horizon_s: float | None
-    estimate: Estimate
-    start: str
-    model: VesselModel
-    runs: tuple[RunCheck, ...]
-    one_step: OneStep
-    breaches: tuple[Breach, ...]
-    disturbances: Disturbances
-    std: Mapping[str, float]
+    method: Method  # how it was made
+    horizon_s: float | None  # of output error [s], None for whole runs
+    estimate: Estimate  # parameters with their uncertainty
+    start: str  # parameters of the first instruments, "nominal" or "ls"; "" for least squares
+    model: VesselModel  # the vessel's model with the estimate
+    runs: tuple[RunCheck, ...]  # every run simulated with it, first the estimation runs, then the test runs
+    one_step: OneStep  # its residuals
+    breaches: tuple[Breach, ...]  # where the data break the excitation condition, for the signals this method uses
+    disturbances: Disturbances  # current and wind, from the nuisance parameters and from the measured wind
+    std: Mapping[str, float]  # as of `Vessel.std`, with those of dead times and lags that were estimated
 
     @property
     def label(self) -> str:
@@ -103,37 +84,23 @@ class Assessed:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assessment:
-    """All methods on the same data.
+    """All methods on the same data."""
 
-    Attributes:
-        record: estimation data.
-        tests: test runs, not used for estimation; may be empty.
-        methods: one entry for each method that gave an estimate, in the order of the options.
-        failures: methods, or horizons of output error, that gave no estimate, and why.
-        notes: on methods that were not tried.
-        asked: names of the methods asked for; none where they are the program's choice.
-        compared: errors of predictions that decide which estimate is chosen; empty where nothing was to be decided.
-        chosen: index of the method whose estimate goes into the vessel file.
-        mean: how the mean was subtracted from instruments.
-        fixed: parameters held at the vessel file's values.
-        motion: "continuous" or "euler", as in `EstimateOptions`.
-        prior: "parameter_std" where estimates are joined with what the vessel file knew before, else "none".
-        limits: decomposed misfit of every run of the chosen estimate.
-    """
-
-    record: Record
-    tests: Record
-    methods: tuple[Assessed, ...]
+    record: Record  # estimation data
+    tests: Record  # test runs, not used for estimation; may be empty
+    methods: tuple[Assessed, ...]  # one entry for each method that gave an estimate, in the order of the options
+    # methods, or horizons of output error, that gave no estimate, and why
     failures: tuple[tuple[str, InputError | NoAnswer], ...]
-    notes: tuple[str, ...]
-    asked: tuple[str, ...]
+    notes: tuple[str, ...]  # on methods that were not tried
+    asked: tuple[str, ...]  # names of the methods asked for; none where they are the program's choice
+    # errors of predictions that decide which estimate is chosen; empty where nothing was to be decided
     compared: tuple[HeldOut, ...]
-    chosen: int
-    mean: str
-    fixed: tuple[str, ...]
-    motion: str
-    prior: str
-    limits: tuple[Limits, ...]
+    chosen: int  # index of the method whose estimate goes into the vessel file
+    mean: str  # how the mean was subtracted from instruments
+    fixed: tuple[str, ...]  # parameters held at the vessel file's values
+    motion: str  # "continuous" or "euler", as in `EstimateOptions`
+    prior: str  # "parameter_std" where estimates are joined with what the vessel file knew before, else "none"
+    limits: tuple[Limits, ...]  # decomposed misfit of every run of the chosen estimate
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -214,40 +181,28 @@ CHOICES = (HELD_OUT, INSTRUMENTS)
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateOptions:
-    """Options of an estimation.
+    """Options of an estimation."""
 
-    Attributes:
-        methods: names in `estimation.methods.METHODS`; empty for those that suit the data.
-        fixed: parameters held at the vessel's values.
-        mean: subtracted from the instruments: "none", "batch" or "complete".
-        blocks: of instruments: "one" for all runs, or one for each "batch" (4.45).
-        start: of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto"
-            for the vessel's values unless they are all zero or fail.
-        motion: "continuous" for parameters of the continuous-time motion, which plans use; "euler" for those of Euler's
-            map at the sample time.
-        horizon_s: simulation horizon of output error [s], None for whole runs.
-        constant: whether output error gives every run a constant force of its own.
-        steered: what becomes of samples marked as steered, one of `estimation.replay.STEERED`.
-        samples: "all", or "equation-wise": for each equation those that meet the excitation condition.
-        offset_mps: strongest current, and wind where it is not measured, that velocities inside an absolute value must
-            exceed in equation-wise samples, beside the sensors' noise [m/s].
-        prior: "parameter_std" to join estimates with what the vessel file knew before, or "none".
-        choice: of the best estimate: "held-out" for that which predicts best, see `held_out`; "instruments" for the
-            first stable one with instruments, and without output error unless that is among the methods.
-    """
-
-    methods: tuple[str, ...] = ()
-    fixed: tuple[str, ...] = ()
-    mean: str = "complete"
-    blocks: str = "one"
+    methods: tuple[str, ...] = ()  # names in `estimation.methods.METHODS`; empty for those that suit the data
+    fixed: tuple[str, ...] = ()  # parameters held at the vessel's values
+    mean: str = "complete"  # subtracted from the instruments: "none", "batch" or "complete"
+    blocks: str = "one"  # of instruments: "one" for all runs, or one for each "batch" (4.45)
+    # of the first instruments: "nominal" for the vessel's values, "ls" for the least-squares estimate, "auto" for the
+    # vessel's values unless they are all zero or fail
     start: str = AUTO
+    # "continuous" for parameters of the continuous-time motion, which plans use; "euler" for those of Euler's map at
+    # the sample time
     motion: str = CONTINUOUS
-    horizon_s: float | None = None
-    constant: bool = False
-    steered: str = AUTO
-    samples: str = ALL
+    horizon_s: float | None = None  # simulation horizon of output error [s], None for whole runs
+    constant: bool = False  # whether output error gives every run a constant force of its own
+    steered: str = AUTO  # what becomes of samples marked as steered, one of `estimation.replay.STEERED`
+    samples: str = ALL  # "all", or "equation-wise": for each equation those that meet the excitation condition
+    # strongest current, and wind where it is not measured, that velocities inside an absolute value must exceed in
+    # equation-wise samples, beside the sensors' noise [m/s]
     offset_mps: float = 0.0
-    prior: str = NONE
+    prior: str = NONE  # "parameter_std" to join estimates with what the vessel file knew before, or "none"
+    # of the best estimate: "held-out" for that which predicts best, see `held_out`; "instruments" for the first stable
+    # one with instruments, and without output error unless that is among the methods
     choice: str = HELD_OUT
 
     def __post_init__(self) -> None:

@@ -126,18 +126,13 @@ Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, a
 
 @dataclass(frozen=True)
 class Asked:
-    """A workflow and its arguments.
+    """A workflow and its arguments."""
 
-    Attributes:
-        workflow: name in `expdesign.workflows`.
-        arguments, options: of the function, without progress.
-        tells: whether the function also takes `tell`, for lines that are printed while it works.
-    """
-
-    workflow: str
+    workflow: str  # name in `expdesign.workflows`
+    # arguments, options: of the function, without progress
     arguments: tuple[object, ...]
     options: Mapping[str, object]
-    tells: bool = False
+    tells: bool = False  # whether the function also takes `tell`, for lines that are printed while it works
 
 
 def ask(workflow: str, *arguments: object, tells: bool = False, **options: object) -> Asked:

@@ -29,33 +29,24 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Numbers of this room.
+    """Numbers of this room."""
 
-    Attributes:
-        horizons_s: times after a start at which the growth of the error is measured [s].
-        largest_error: errors beyond so many standard deviations of the measurements count as that large; the simulation
-            has diverged, and the size of its error has no meaning.
-        stretch_samples: of a stretch of the residual analysis.
-        fewest_measured: samples of a stretch that must be measured.
-        groups: of stretches with similar values of a variable.
-        fewest_stretches: for a test.
-        largest_autocorrelation, smallest_autocorrelation: of successive residuals, beyond which they are bounded and
-            ignored.
-        fewest_samples: for a diagnosis.
-        constant_range: range of a constant input, as a share of its size.
-        least_response: response of the motion to the inputs' changes, in standard deviations of the noise, at least.
-    """
-
+    # times after a start at which the growth of the error is measured [s]
     horizons_s: tuple[float, ...] = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
+    # errors beyond so many standard deviations of the measurements count as that large; the simulation has diverged,
+    # and the size of its error has no meaning
     largest_error: float = 10.0
-    stretch_samples: int = 10
-    fewest_measured: int = 5
-    groups: int = 8
-    fewest_stretches: int = 16
+    stretch_samples: int = 10  # of a stretch of the residual analysis
+    fewest_measured: int = 5  # samples of a stretch that must be measured
+    groups: int = 8  # of stretches with similar values of a variable
+    fewest_stretches: int = 16  # for a test
+    # largest_autocorrelation, smallest_autocorrelation: of successive residuals, beyond which they are bounded and
+    # ignored
     largest_autocorrelation: float = 0.9
     smallest_autocorrelation: float = 0.01
-    fewest_samples: int = 100
-    constant_range: float = 1e-9
+    fewest_samples: int = 100  # for a diagnosis
+    constant_range: float = 1e-9  # range of a constant input, as a share of its size
+    # response of the motion to the inputs' changes, in standard deviations of the noise, at least
     least_response: float = 0.5
 
 
@@ -202,22 +193,16 @@ def _growth(ship: ExtendedModel, record: Record, columns: list[int]) -> tuple[Ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Accuracy:
-    """Accuracy per output over all batches, each simulated from its first state.
+    """Accuracy per output over all batches, each simulated from its first state."""
 
-    Attributes:
-        outputs: u, v, r, those that the model has.
-        fit, rmse, bias: (n,) fit [%], root mean square and mean of measured less simulated.
-        horizons_s: (h,) and growth (h, n): root mean square error that long after a start from a measured state.
-        per_batch: (b, n) fit of every batch.
-    """
-
-    outputs: tuple[str, ...]
+    outputs: tuple[str, ...]  # u, v, r, those that the model has
+    # fit, rmse, bias: (n,) fit [%], root mean square and mean of measured less simulated
     fit: Array
     rmse: Array
     bias: Array
-    horizons_s: Array
+    horizons_s: Array  # (h,) and growth (h, n): root mean square error that long after a start from a measured state
     growth: Array
-    per_batch: Array
+    per_batch: Array  # (b, n) fit of every batch
 
 
 # One-step residuals of a model, and the variables that they may depend on.
@@ -227,18 +212,13 @@ TINY = 1e-300
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dependence:
-    """Means of one output's residual over groups of stretches with similar values of a variable.
+    """Means of one output's residual over groups of stretches with similar values of a variable."""
 
-    Attributes:
-        middle: (b,) of the variable.
-        mean, std: (b,) of the residual, and its standard error.
-        p_value: that all groups have one mean.
-    """
-
-    middle: Array
+    middle: Array  # (b,) of the variable
+    # mean, std: (b,) of the residual, and its standard error
     mean: Array
     std: Array
-    p_value: float
+    p_value: float  # that all groups have one mean
 
 
 def one_step_residuals(ship: ExtendedModel, windows: Windows) -> Residuals:
@@ -357,19 +337,13 @@ def _group_numbers(x: Array, *, by_value: bool) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Residuals:
-    """Missing acceleration of every stretch, and the variables there.
+    """Missing acceleration of every stretch, and the variables there."""
 
-    Attributes:
-        outputs: of the model.
-        stretch_s: length of a stretch [s].
-        acceleration: (k, n) measured less simulated acceleration [m/s^2, rad/s^2].
-        variables: (k,) means over the stretch by name: u v r as measured, inputs, `u_q v_q` through the air and `depth`
-            where they are measured, `heading` (0 to 2 pi), `time` since the data began and number of the `run`.
-    """
-
-    outputs: tuple[str, ...]
-    stretch_s: float
-    acceleration: Array
+    outputs: tuple[str, ...]  # of the model
+    stretch_s: float  # length of a stretch [s]
+    acceleration: Array  # (k, n) measured less simulated acceleration [m/s^2, rad/s^2]
+    # (k,) means over the stretch by name: u v r as measured, inputs, `u_q v_q` through the air and `depth` where they
+    # are measured, `heading` (0 to 2 pi), `time` since the data began and number of the `run`
     variables: Mapping[str, Array]
 
     @property

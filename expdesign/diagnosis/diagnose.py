@@ -91,27 +91,19 @@ simulations of all data."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Selected:
-    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units.
-
-    Attributes:
-        as_stated: errors of the model in use as its file states it.
-        held: of the model before any cause, then after every one that was kept.
-        re_estimated: of the model before any cause with its uncertain parameters fitted; None where it has none.
-        validation: of other fits.
-        rest: what is missing beside all causes, or instead of them.
-        replaced: causes that the search found, in whose place one stands that predicts better.
-        compared: causes by their predictions; None where the search found what predicts as well, or explains much.
-    """
+    """Causes by forward selection, those that backward elimination kept, and their errors on held-out units."""
 
     found: Selection
     kept: Selection
-    as_stated: HeldOut
-    held: list[HeldOut]
+    as_stated: HeldOut  # errors of the model in use as its file states it
+    held: list[HeldOut]  # of the model before any cause, then after every one that was kept
+    # of the model before any cause with its uncertain parameters fitted; None where it has none
     re_estimated: HeldOut | None
-    validation: CrossValidation
-    rest: Remainder
+    validation: CrossValidation  # of other fits
+    rest: Remainder  # what is missing beside all causes, or instead of them
+    # causes by their predictions; None where the search found what predicts as well, or explains much
     compared: Compared | None
-    replaced: tuple[Step, ...]
+    replaced: tuple[Step, ...]  # causes that the search found, in whose place one stands that predicts better
 
     @property
     def refused(self) -> tuple[Step, ...]:

@@ -23,19 +23,12 @@ PROPOSED = 240
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Proposal:
-    """A manoeuvre that may distinguish causes.
+    """A manoeuvre that may distinguish causes."""
 
-    Attributes:
-        name: of the primitive.
-        inputs: (k, m) commands in the model's order.
-        velocity: (3,) to start with.
-        sample_time_s: of the commands.
-    """
-
-    name: str
-    inputs: Array
-    velocity: Array
-    sample_time_s: float
+    name: str  # of the primitive
+    inputs: Array  # (k, m) commands in the model's order
+    velocity: Array  # (3,) to start with
+    sample_time_s: float  # of the commands
 
 
 def most_discriminating(

@@ -57,22 +57,15 @@ CURRENT = "current"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComparedCause:
-    """A cause compared with the same model without it.
+    """A cause compared with the same model without it."""
 
-    Attributes:
-        point: where its fit began.
-        fit: to all short stretches.
-        held: errors on held-out stretches.
-        gain, gain_interval: on the model without it [points].
-        p_value: of the signed-rank test over stretches, times the number of causes that were compared.
-    """
-
-    point: StartingPoint
-    fit: Fit
-    held: HeldOut
+    point: StartingPoint  # where its fit began
+    fit: Fit  # to all short stretches
+    held: HeldOut  # errors on held-out stretches
+    # gain, gain_interval: on the model without it [points]
     gain: float
     gain_interval: tuple[float, float]
-    p_value: float
+    p_value: float  # of the signed-rank test over stretches, times the number of causes that were compared
 
     @property
     def cause(self) -> str:
@@ -98,19 +91,12 @@ class ComparedCause:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Compared:
-    """Causes compared by predictions.
+    """Causes compared by predictions."""
 
-    Attributes:
-        without: errors on held-out stretches of the model without any of them, its uncertain parameters fitted.
-        causes: with the largest gain first.
-        tests: that chose them.
-        short: data in short stretches.
-    """
-
-    without: HeldOut
-    causes: tuple[ComparedCause, ...]
-    tests: tuple[ScoreTest, ...]
-    short: Windows
+    without: HeldOut  # errors on held-out stretches of the model without any of them, its uncertain parameters fitted
+    causes: tuple[ComparedCause, ...]  # with the largest gain first
+    tests: tuple[ScoreTest, ...]  # that chose them
+    short: Windows  # data in short stretches
 
     def of(self, found: Fit) -> HeldOut | None:
         """Errors on held-out stretches of another model, fitted in the same way; None where it cannot be fitted."""

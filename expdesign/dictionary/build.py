@@ -200,19 +200,12 @@ def _not_held(vessel: Vessel, velocity: Array) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExcitedRuns:
-    """Commands and entry states of specifications of one duration.
+    """Commands and entry states of specifications of one duration."""
 
-    Attributes:
-        possible: (n,) 1 where the settings are consistent and the vessel can hold the entry state, else 0.
-        velocity: (n, 3) entry u, v, r through water.
-        entry_inputs: (n, m) commands before the run.
-        commands: (n, k, m) within limits and rates.
-    """
-
-    possible: Array
-    velocity: Array
-    entry_inputs: Array
-    commands: Array
+    possible: Array  # (n,) 1 where the settings are consistent and the vessel can hold the entry state, else 0
+    velocity: Array  # (n, 3) entry u, v, r through water
+    entry_inputs: Array  # (n, m) commands before the run
+    commands: Array  # (n, k, m) within limits and rates
 
     def __post_init__(self) -> None:
         seal(self, possible="n", velocity="n 3", entry_inputs="n m", commands="n k m")

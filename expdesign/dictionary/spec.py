@@ -22,22 +22,15 @@ number of a random draw; "" for a setting that a search leaves at its default.""
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One parameter of a family.
+    """One parameter of a family."""
 
-    Attributes:
-        name: with its unit, e.g. "yaw_rate_radps".
-        default: value when not given, or None when it must be given.
-        low, high: allowed range, ends included.
-        meaning: one line for the user.
-        searched: one of `SEARCHED`.
-    """
-
-    name: str
-    meaning: str
-    default: float | None = None
+    name: str  # with its unit, e.g. "yaw_rate_radps".
+    meaning: str  # one line for the user
+    default: float | None = None  # value when not given, or None when it must be given
+    # low, high: allowed range, ends included
     low: float = -np.inf
     high: float = np.inf
-    searched: str = ""
+    searched: str = ""  # one of `SEARCHED`
 
     def __post_init__(self) -> None:
         if self.searched not in SEARCHED:
@@ -54,36 +47,22 @@ Reference = Callable[[Mapping[str, float], Array], Array]
 
 @dataclass(frozen=True, kw_only=True)
 class PrimitiveSpec:
-    """A request for one member of a family.
+    """A request for one member of a family."""
 
-    Attributes:
-        name: unique in the dictionary.
-        family: name of the family.
-        settings: every setting of the family, by name.
-        commands: of a "recorded" primitive; None for the other families.
-        place: file and key of the request, for messages; "" when it comes from no file.
-    """
-
-    name: str
-    family: str
-    settings: Mapping[str, float]
-    commands: Commands | None = None
-    place: str = ""
+    name: str  # unique in the dictionary
+    family: str  # name of the family
+    settings: Mapping[str, float]  # every setting of the family, by name
+    commands: Commands | None = None  # of a "recorded" primitive; None for the other families
+    place: str = ""  # file and key of the request, for messages; "" when it comes from no file
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Excitation:
-    """Commands of a run, and the steady state before it.
+    """Commands of a run, and the steady state before it."""
 
-    Attributes:
-        velocity: (3,) u, v, r through water at the start.
-        inputs: (m,) commands that hold it.
-        commands: (k, m).
-    """
-
-    velocity: Array
-    inputs: Array
-    commands: Array
+    velocity: Array  # (3,) u, v, r through water at the start
+    inputs: Array  # (m,) commands that hold it
+    commands: Array  # (k, m)
 
 
 Orders = Callable[[Vessel, PrimitiveSpec], Excitation]
@@ -91,22 +70,15 @@ Orders = Callable[[Vessel, PrimitiveSpec], Excitation]
 
 @dataclass(frozen=True, kw_only=True)
 class Family:
-    """A kind of manoeuvre, defined either by desired velocities or by commands.
+    """A kind of manoeuvre, defined either by desired velocities or by commands."""
 
-    Attributes:
-        name: as in dictionary files.
-        summary: one line for the user.
-        settings: its parameters; each family also has `duration_s`.
-        reference: desired velocities; the builder computes commands within the actuators' limits.
-        orders: commands, also for vessels with propeller and rudder, whose models have no generalised forces.
-        closed_loop: whether its commands depend on the simulated motion; its candidates are simulated one by one.
-    """
-
-    name: str
-    summary: str
-    settings: tuple[Setting, ...]
-    reference: Reference | None = None
+    name: str  # as in dictionary files
+    summary: str  # one line for the user
+    settings: tuple[Setting, ...]  # its parameters; each family also has `duration_s`
+    reference: Reference | None = None  # desired velocities; the builder computes commands within the actuators' limits
+    # commands, also for vessels with propeller and rudder, whose models have no generalised forces
     orders: Orders | None = None
+    # whether its commands depend on the simulated motion; its candidates are simulated one by one
     closed_loop: bool = False
 
     def __post_init__(self) -> None:
@@ -141,23 +113,14 @@ def complete_settings(family: Family, given: Mapping[str, float]) -> dict[str, f
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Primitive:
-    """One entry of the dictionary, simulated with the nominal vessel in calm water from the origin, heading north.
+    """One entry of the dictionary, simulated with the nominal vessel in calm water from the origin, heading north."""
 
-    Attributes:
-        name: unique in its dictionary.
-        family: the manoeuvre family that made it.
-        settings: the family's parameters, units in the names.
-        commands: actuator commands (k samples).
-        entry_inputs: (m,) actuator commands before the run.
-        trajectory: simulated motion, k + 1 samples; its first velocity is the entry velocity through water.
-    """
-
-    name: str
-    family: str
-    settings: Mapping[str, float]
-    commands: Commands
-    entry_inputs: Array
-    trajectory: Trajectory
+    name: str  # unique in its dictionary
+    family: str  # the manoeuvre family that made it
+    settings: Mapping[str, float]  # the family's parameters, units in the names
+    commands: Commands  # actuator commands (k samples)
+    entry_inputs: Array  # (m,) actuator commands before the run
+    trajectory: Trajectory  # simulated motion, k + 1 samples; its first velocity is the entry velocity through water
 
     def __post_init__(self) -> None:
         seal(self, entry_inputs="m")

@@ -36,28 +36,18 @@ class Certificate:
 
     For any feasible v the criterion is at most `value` + slope (v - w), with the slope of the Lagrangian. The largest
     value of that over all feasible v is the bound.
-
-    Attributes:
-        kind: the theorem, or why there is none.
-        value: the criterion at the design, as a logarithm.
-        bound: upper bound on the criterion of any feasible design; inf when there is no certificate.
-        degree: doubling the information raises the value by degree x log 2.
-        level: upper bound on every sensitivity less its price, reached where no limit on the time is active.
-        mixture: (m,) weights of the sampled models.
-        prices: (q,) part of each sensitivity that is due to limits.
-        multipliers: Lagrange multiplier of every limit by name; zero for inactive limits.
-        guaranteed: for recorded primitives, the log det guaranteed by the symmetric part; -inf when it is nowhere
-            positive definite; nan where the problem is convex.
     """
 
-    kind: str
-    value: float
-    bound: float
-    degree: int
-    level: float
-    mixture: Array
-    prices: Array
-    multipliers: Mapping[str, float]
+    kind: str  # the theorem, or why there is none
+    value: float  # the criterion at the design, as a logarithm
+    bound: float  # upper bound on the criterion of any feasible design; inf when there is no certificate
+    degree: int  # doubling the information raises the value by degree x log 2
+    level: float  # upper bound on every sensitivity less its price, reached where no limit on the time is active
+    mixture: Array  # (m,) weights of the sampled models
+    prices: Array  # (q,) part of each sensitivity that is due to limits
+    multipliers: Mapping[str, float]  # Lagrange multiplier of every limit by name; zero for inactive limits
+    # for recorded primitives, the log det guaranteed by the symmetric part; -inf when it is nowhere positive definite;
+    # nan where the problem is convex
     guaranteed: float = float("nan")
 
     def __post_init__(self) -> None:
@@ -71,50 +61,31 @@ class Certificate:
 
 @dataclass(frozen=True, kw_only=True)
 class Solver:
-    """What found optimal fractions.
+    """What found optimal fractions."""
 
-    Attributes:
-        name: of the method, or of the solver.
-        versions: of the packages that it is part of.
-        wall_s: how long it took [s], with loading these packages where they were not there.
-    """
-
-    name: str
-    versions: Mapping[str, str]
-    wall_s: float
+    name: str  # of the method, or of the solver
+    versions: Mapping[str, str]  # of the packages that it is part of
+    wall_s: float  # how long it took [s], with loading these packages where they were not there
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DurationDesign:
-    """Optimal durations with their certificate.
+    """Optimal durations with their certificate."""
 
-    Attributes:
-        problem: the duration problem.
-        fractions: (q,) optimal time fractions, sum 1; less where budgets make it better to leave time unused.
-        sensitivities: (q,) gradient of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`,
-            equal where w_q > 0.
-        log_det: log det B at `fractions`, by the nominal model.
-        gap: upper bound on the improvement by any other design, in the criterion's logarithm (for D in log det).
-        repeats: (q,) whole runs.
-        efficiency_repeats: efficiency of the whole runs by the criterion: the optimum reaches the same in this share
-            of the time.
-        efficiency_uniform: the same for equal time on every primitive that is not excluded, whether other limits allow
-            that or not.
-        certificate: proof of optimality.
-        note: a warning about the whole runs in one sentence, or "".
-        solver: what found the fractions; the result does not depend on how long it took.
-    """
-
-    problem: DurationProblem
-    fractions: Array
+    problem: DurationProblem  # the duration problem
+    fractions: Array  # (q,) optimal time fractions, sum 1; less where budgets make it better to leave time unused
+    # (q,) gradient of the criterion; for D trace(B(w)^-1 B_q), at the optimum at most `dimension`, equal where w_q > 0
     sensitivities: Array
-    log_det: float
-    gap: float
-    repeats: tuple[int, ...]
+    log_det: float  # log det B at `fractions`, by the nominal model
+    gap: float  # upper bound on the improvement by any other design, in the criterion's logarithm (for D in log det)
+    repeats: tuple[int, ...]  # (q,) whole runs
+    # efficiency of the whole runs by the criterion: the optimum reaches the same in this share of the time
     efficiency_repeats: float
+    # the same for equal time on every primitive that is not excluded, whether other limits allow that or not
     efficiency_uniform: float
-    certificate: Certificate
-    note: str = ""
+    certificate: Certificate  # proof of optimality
+    note: str = ""  # a warning about the whole runs in one sentence, or ""
+    # what found the fractions; the result does not depend on how long it took
     solver: Solver | None = field(default=None, metadata=ASIDE)
 
     def __post_init__(self) -> None:

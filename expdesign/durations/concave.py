@@ -32,19 +32,12 @@ T = "T"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConcaveProblem:
-    """Maximise a concave objective over time fractions.
+    """Maximise a concave objective over time fractions."""
 
-    Attributes:
-        objective: to maximise.
-        polytope: linear limits.
-        floors: concave functions that must not be negative.
-        floor_names: of the floors.
-    """
-
-    objective: Objective
-    polytope: Polytope
-    floors: tuple[Objective, ...] = ()
-    floor_names: tuple[str, ...] = ()
+    objective: Objective  # to maximise
+    polytope: Polytope  # linear limits
+    floors: tuple[Objective, ...] = ()  # concave functions that must not be negative
+    floor_names: tuple[str, ...] = ()  # of the floors
 
     @property
     def smooth(self) -> bool:
@@ -176,17 +169,11 @@ def collected_measure(problem: DurationProblem, name: str) -> Measure:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """The criterion as a function of time shares of any sum.
+    """The criterion as a function of time shares of any sum."""
 
-    Attributes:
-        pieces: one for each model.
-        worst: the least over models instead of the average.
-        symmetric: whether matrices are symmetric; else the magnitude of the determinant counts.
-    """
-
-    pieces: tuple[Piece, ...]
-    worst: bool
-    symmetric: bool = True
+    pieces: tuple[Piece, ...]  # one for each model
+    worst: bool  # the least over models instead of the average
+    symmetric: bool = True  # whether matrices are symmetric; else the magnitude of the determinant counts
 
     @staticmethod
     def of(problem: DurationProblem, name: str | None = None) -> Collected:

@@ -23,18 +23,12 @@ class Efficiencies:
     """Efficiency of designs by one criterion, against the optimum under the same limits.
 
     An efficiency of 0.8 means that the optimum reaches the same with 80 % of the time, without prior information.
-
-    Attributes:
-        criterion: its name.
-        title: the quantity that it minimises.
-        of: design -> efficiency; empty when the criterion cannot be evaluated.
-        missing: the reason, or "".
     """
 
-    criterion: str
-    title: str
-    of: Mapping[str, float]
-    missing: str = ""
+    criterion: str  # its name
+    title: str  # the quantity that it minimises
+    of: Mapping[str, float]  # design -> efficiency; empty when the criterion cannot be evaluated
+    missing: str = ""  # the reason, or ""
 
 
 def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
@@ -69,21 +63,13 @@ def efficiencies(design: DurationDesign) -> tuple[Efficiencies, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """How far a budget is used, or a balance or a least information is reached.
+    """How far a budget is used, or a balance or a least information is reached."""
 
-    Attributes:
-        name: of the limit.
-        limit: of the budget; for a balance the least share; the least information.
-        continuous: used or reached by the optimal fractions.
-        repeats: used or reached by the whole runs, which may fall short of a balance.
-        price: Lagrange multiplier in the certificate; zero when the limit is not active.
-    """
-
-    name: str
-    limit: float
-    continuous: float
-    repeats: float
-    price: float
+    name: str  # of the limit
+    limit: float  # of the budget; for a balance the least share; the least information
+    continuous: float  # used or reached by the optimal fractions
+    repeats: float  # used or reached by the whole runs, which may fall short of a balance
+    price: float  # Lagrange multiplier in the certificate; zero when the limit is not active
 
 
 def limits_kept(design: DurationDesign) -> tuple[Kept, ...]:

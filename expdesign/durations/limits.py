@@ -25,37 +25,25 @@ LEAST_FRACTION = 1e-9  # fractions less than this above their bound are set to i
 
 @dataclass(frozen=True, kw_only=True)
 class Budget:
-    """A limited resource, e.g. energy or wear.
+    """A limited resource, e.g. energy or wear."""
 
-    Attributes:
-        name: for reports.
-        cost_per_s: use per second of each primitive, by name; 0 for primitives without an entry.
-        limit: amount available, in the same unit.
-    """
-
-    name: str
-    cost_per_s: Mapping[str, float]
-    limit: float
+    name: str  # for reports
+    cost_per_s: Mapping[str, float]  # use per second of each primitive, by name; 0 for primitives without an entry
+    limit: float  # amount available, in the same unit
 
 
 @dataclass(frozen=True, kw_only=True)
 class Constraints:
-    """Limits on the durations, by names of primitives.
+    """Limits on the durations, by names of primitives."""
 
-    Attributes:
-        least_s, most_s: least and most total time of a primitive [s].
-        required: primitives that get at least one whole run.
-        excluded: primitives that get no time.
-        budgets: limited resources.
-        balance: from 0 to 1: least D-efficiency of the information about the parameters of each equation (surge, sway,
-            yaw), relative to the optimum for that equation alone.
-    """
-
+    # least_s, most_s: least and most total time of a primitive [s]
     least_s: Mapping[str, float] = field(default_factory=dict)
     most_s: Mapping[str, float] = field(default_factory=dict)
-    required: tuple[str, ...] = ()
-    excluded: tuple[str, ...] = ()
-    budgets: tuple[Budget, ...] = ()
+    required: tuple[str, ...] = ()  # primitives that get at least one whole run
+    excluded: tuple[str, ...] = ()  # primitives that get no time
+    budgets: tuple[Budget, ...] = ()  # limited resources
+    # from 0 to 1: least D-efficiency of the information about the parameters of each equation (surge, sway, yaw),
+    # relative to the optimum for that equation alone
     balance: float = 0.0
 
     def __post_init__(self) -> None:
@@ -72,20 +60,14 @@ NO_CONSTRAINTS = Constraints()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Polytope:
-    """Feasible time fractions.
+    """Feasible time fractions."""
 
-    Attributes:
-        least, most: (q,) bounds, 0 to 1.
-        rows: (i, q) use per unit of fraction, each as a share of its limit.
-        limits: (i,) all 1, or 0 for budgets of 0.
-        labels: (i) names of the rows.
-    """
-
+    # least, most: (q,) bounds, 0 to 1
     least: Array
     most: Array
-    rows: Array
-    limits: Array
-    labels: tuple[str, ...]
+    rows: Array  # (i, q) use per unit of fraction, each as a share of its limit
+    limits: Array  # (i,) all 1, or 0 for budgets of 0
+    labels: tuple[str, ...]  # (i) names of the rows
 
     def __post_init__(self) -> None:
         seal(self, least="q", most="q", rows="i q", limits="i")

@@ -31,26 +31,18 @@ ALL_SUBSETS = 20_000  # up to this number, every subset of batches is evaluated
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Subset:
-    """The chosen batches.
+    """The chosen batches."""
 
-    Attributes:
-        names: of all batches, in the order of greedy selection.
-        chosen: names of the selected batches.
-        efficiency: against all batches together, by the criterion.
-        bound: upper bound on the efficiency of any subset of that size; equal to `efficiency` when exact, nan when
-            unknown.
-        exact: whether all subsets were evaluated.
-        symmetric: whether the symmetric part of the information counted; else the magnitude of its determinant, which
-            is not a guaranteed value.
-        first: (N,) efficiency of the first 1, 2, ... N of `names`; 0 while they do not inform about every parameter.
-    """
-
-    names: tuple[str, ...]
-    chosen: tuple[str, ...]
-    efficiency: float
+    names: tuple[str, ...]  # of all batches, in the order of greedy selection
+    chosen: tuple[str, ...]  # names of the selected batches
+    efficiency: float  # against all batches together, by the criterion
+    # upper bound on the efficiency of any subset of that size; equal to `efficiency` when exact, nan when unknown
     bound: float
-    exact: bool
+    exact: bool  # whether all subsets were evaluated
+    # whether the symmetric part of the information counted; else the magnitude of its determinant, which is not a
+    # guaranteed value
     symmetric: bool
+    # (N,) efficiency of the first 1, 2, ... N of `names`; 0 while they do not inform about every parameter.
     first: Array
 
     def __post_init__(self) -> None:

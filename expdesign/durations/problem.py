@@ -39,20 +39,13 @@ class InformationFloor:
 
     With M = prior + sum_q w_q matrices_q, information 1 / trace(L^T M^-1 L) must be at least `least`. Of one
     combination that is its Schur complement; of several it is no more than the smallest eigenvalue of theirs.
-
-    Attributes:
-        name: for reports.
-        matrices: (q, d, d) information if all of the time is spent on one primitive.
-        prior: (d, d).
-        L: (d, k) combinations in its columns.
-        least: what is asked for.
     """
 
-    name: str
-    matrices: Array
-    prior: Array
-    L: Array
-    least: float
+    name: str  # for reports
+    matrices: Array  # (q, d, d) information if all of the time is spent on one primitive
+    prior: Array  # (d, d)
+    L: Array  # (d, k) combinations in its columns
+    least: float  # what is asked for
 
     def __post_init__(self) -> None:
         seal(self, matrices="q d d", prior="d d", L="d k")
@@ -69,43 +62,31 @@ class DurationProblem:
     of their own, I is a diagonal of their shares, with a column for each stratum of samples; D is then D_s of all
     parameters.
 
-    Attributes:
-        names: of the primitives.
-        parameters: names of the p parameters.
-        mean_subtraction: "none", "batch" or "complete".
-        matrices: (q, d, d) B_q of the nominal model, in physical parameter scale.
-        run_s: (q,) duration of one whole run of each primitive [s].
-        total_s: total time of all primitives [s].
-        aim: the criterion with its settings.
-        constraints: limits on the durations.
-        prior: (d, d) prior information, per sample of the total time (thesis (7.58)).
-        robust: one of `ROBUST`.
-        sampled: (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal".
-        equations: (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it.
-        nuisance: parameters of disturbances in the augmented predictor; where runs make two of their regressors
-            coincide, the estimator merges them, see `estimation.nuisance`.
-        floors: least information about other parameters.
-        excitation: which samples count in each equation, see `information.excitation`.
-        excites: primitive -> equation -> whether the excitation condition holds; () where it was not looked at.
 
     Source: F. Ljungberg, doctoral thesis, Linköping University, (7.50)-(7.58); Schur complement form derived here.
     """
 
-    names: tuple[str, ...]
-    parameters: tuple[str, ...]
-    mean_subtraction: str
-    matrices: Array
-    run_s: Array
-    total_s: float
-    aim: Aim = field(default_factory=Aim)
-    constraints: Constraints = NO_CONSTRAINTS
+    names: tuple[str, ...]  # of the primitives
+    parameters: tuple[str, ...]  # names of the p parameters
+    mean_subtraction: str  # "none", "batch" or "complete"
+    matrices: Array  # (q, d, d) B_q of the nominal model, in physical parameter scale
+    run_s: Array  # (q,) duration of one whole run of each primitive [s]
+    total_s: float  # total time of all primitives [s]
+    aim: Aim = field(default_factory=Aim)  # the criterion with its settings
+    constraints: Constraints = NO_CONSTRAINTS  # limits on the durations
+    # (d, d) prior information, per sample of the total time (thesis (7.58))
     prior: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    robust: str = "nominal"
+    robust: str = "nominal"  # one of `ROBUST`
+    # (m, q, d, d) B_q of models drawn from the prior of the nominal parameters; m is 0 for "nominal"
     sampled: Array = field(default_factory=lambda: np.zeros((0, 0, 0, 0)))
+    # (p) equation, "u", "v" or "r", of each parameter; only `constraints.balance` needs it
     equations: tuple[str, ...] = ()
+    # parameters of disturbances in the augmented predictor; where runs make two of their regressors coincide, the
+    # estimator merges them, see `estimation.nuisance`
     nuisance: tuple[str, ...] = ()
-    floors: tuple[InformationFloor, ...] = ()
-    excitation: str = "free"
+    floors: tuple[InformationFloor, ...] = ()  # least information about other parameters
+    excitation: str = "free"  # which samples count in each equation, see `information.excitation`
+    # primitive -> equation -> whether the excitation condition holds; () where it was not looked at
     excites: tuple[Mapping[str, bool], ...] = ()
 
     def __post_init__(self) -> None:

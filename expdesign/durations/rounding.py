@@ -155,27 +155,18 @@ def efficiency_of_shares(problem: DurationProblem, fractions: Array, shares: Arr
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
-    """The quantities common to all sets of runs.
+    """The quantities common to all sets of runs."""
 
-    Attributes:
-        problem: the duration problem.
-        collected: the criterion.
-        pieces: for each model (q, d, d) share of one run in the total time, times B_q.
-        shares: (q,) that share.
-        added: for each model (d, d) prior and a small share of the optimal design, and of equal shares where that is
-            nearly singular.
-        gain: least gain of an exchange.
-        polytope: limits.
-        fewest, most_runs: (q,) least and most runs.
-    """
-
-    problem: DurationProblem
-    collected: Collected
-    pieces: Totals
-    shares: Array
+    problem: DurationProblem  # the duration problem
+    collected: Collected  # the criterion
+    pieces: Totals  # for each model (q, d, d) share of one run in the total time, times B_q
+    shares: Array  # (q,) that share
+    # for each model (d, d) prior and a small share of the optimal design, and of equal shares where that is nearly
+    # singular
     added: Totals
-    gain: float
-    polytope: Polytope
+    gain: float  # least gain of an exchange
+    polytope: Polytope  # limits
+    # fewest, most_runs: (q,) least and most runs
     fewest: NDArray[np.int64]
     most_runs: NDArray[np.int64]
 

@@ -44,23 +44,16 @@ COMBINED = ("u", "v")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moments:
-    """Mean and second moments of a disturbance (N, E), over ground to north and to east.
+    """Mean and second moments of a disturbance (N, E), over ground to north and to east."""
 
-    Attributes:
-        of: "current", or the equation "u" or "v" in whose quadratic terms current and wind are combined.
-        shares: parameters of the air, and those of the water that hold both, where combined; () for a current.
-        mean: (2,) E N and E E [m/s].
-        second: (2,) E N^2 - E E^2 and E N E [m^2/s^2]; nan where nothing tells them.
-        central: (2,) the same about the mean: var N - var E and cov(N, E) [m^2/s^2].
-        covariance: (6, 6) of mean, second and central, to first order; intervals of 95 % from it held second moments
-            of a current in 82 to 93 of 100 simulated trials.
-    """
-
-    of: str
+    of: str  # "current", or the equation "u" or "v" in whose quadratic terms current and wind are combined
+    # parameters of the air, and those of the water that hold both, where combined; () for a current
     shares: tuple[tuple[str, str], ...]
-    mean: Array
-    second: Array
-    central: Array
+    mean: Array  # (2,) E N and E E [m/s]
+    second: Array  # (2,) E N^2 - E E^2 and E N E [m^2/s^2]; nan where nothing tells them
+    central: Array  # (2,) the same about the mean: var N - var E and cov(N, E) [m^2/s^2]
+    # (6, 6) of mean, second and central, to first order; intervals of 95 % from it held second moments of a current in
+    # 82 to 93 of 100 simulated trials
     covariance: Array
 
     def __post_init__(self) -> None:
@@ -69,17 +62,11 @@ class Moments:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredWind:
-    """Mean and covariance over samples of the measured wind, over ground to north and to east.
+    """Mean and covariance over samples of the measured wind, over ground to north and to east."""
 
-    Attributes:
-        mean: (2,) [m/s].
-        covariance: (2, 2) [m^2/s^2], with the noise of the sensors.
-        samples: with wind, velocity and heading.
-    """
-
-    mean: Array
-    covariance: Array
-    samples: int
+    mean: Array  # (2,) [m/s]
+    covariance: Array  # (2, 2) [m^2/s^2], with the noise of the sensors
+    samples: int  # with wind, velocity and heading
 
     def __post_init__(self) -> None:
         seal(self, mean="2", covariance="2 2")

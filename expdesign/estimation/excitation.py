@@ -61,19 +61,14 @@ STATES = ("u", "v", "r", *AIR)
 
 @dataclass(frozen=True, kw_only=True)
 class WorstCase:
-    """Largest magnitudes, zero for absent disturbances.
+    """Largest magnitudes, zero for absent disturbances."""
 
-    Attributes:
-        velocity_mps, yaw_rate_radps, wind_sensor_mps: measurement noise of u and v, of r, and of the relative wind.
-        current_mps: speed of the current.
-        wind_mps: speed of the wind; counts only where no wind is measured.
-    """
-
+    # velocity_mps, yaw_rate_radps, wind_sensor_mps: measurement noise of u and v, of r, and of the relative wind
     velocity_mps: float = 0.0
     yaw_rate_radps: float = 0.0
     wind_sensor_mps: float = 0.0
-    current_mps: float = 0.0
-    wind_mps: float = 0.0
+    current_mps: float = 0.0  # speed of the current
+    wind_mps: float = 0.0  # speed of the wind; counts only where no wind is measured
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -94,25 +89,15 @@ def worst_case(sensors: Sensors, *, current_mps: float = 0.0, wind_mps: float = 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Breach:
-    """One modulus that does not keep its sign over a batch.
+    """One modulus that does not keep its sign over a batch."""
 
-    Attributes:
-        batch: name of the batch.
-        inside: what stands in the modulus, e.g. "u".
-        parameters: whose terms hold it.
-        margin: how far from zero it had to stay.
-        samples: (j,) samples, from 0, at which it does not.
-        rows: the same as rows of the file; samples again where the batch is not from a file.
-        count: samples of the batch.
-    """
-
-    batch: str
-    inside: str
-    parameters: tuple[str, ...]
-    margin: float
-    samples: Integers
-    rows: Integers
-    count: int
+    batch: str  # name of the batch
+    inside: str  # what stands in the modulus, e.g. "u".
+    parameters: tuple[str, ...]  # whose terms hold it
+    margin: float  # how far from zero it had to stay
+    samples: Integers  # (j,) samples, from 0, at which it does not
+    rows: Integers  # the same as rows of the file; samples again where the batch is not from a file
+    count: int  # samples of the batch
 
     def __post_init__(self) -> None:
         for name in ("samples", "rows"):
@@ -150,15 +135,10 @@ def check_excitation(
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """On which side of zero what stands in a modulus is.
+    """On which side of zero what stands in a modulus is."""
 
-    Attributes:
-        side: (k,) 1 or -1 where it is farther from zero than its margin, else 0.
-        equations: whose terms hold the modulus.
-    """
-
-    side: Integers
-    equations: tuple[str, ...]
+    side: Integers  # (k,) 1 or -1 where it is farther from zero than its margin, else 0
+    equations: tuple[str, ...]  # whose terms hold the modulus
 
 
 def clear_sides(model: VesselModel, table: SignalTable, *, worst: WorstCase, wind_measured: bool) -> dict[str, Sides]:

@@ -57,19 +57,12 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Feedback:
-    """Outcome of the test.
+    """Outcome of the test."""
 
-    Attributes:
-        statistic: Bartlett's, chi-square where inputs are external.
-        freedom: its degrees of freedom.
-        chance: of a statistic as large where inputs are external.
-        samples: residuals compared.
-    """
-
-    statistic: float
-    freedom: int
-    chance: float
-    samples: int
+    statistic: float  # Bartlett's, chi-square where inputs are external
+    freedom: int  # its degrees of freedom
+    chance: float  # of a statistic as large where inputs are external
+    samples: int  # residuals compared
 
     @property
     def found(self) -> bool:

@@ -32,44 +32,30 @@ STARTS = ("nominal", "ls")
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Choices of an estimate.
+    """Choices of an estimate."""
 
-    Attributes:
-        fixed: parameters held at the model's values.
-        weighting: how IV equations are formed; least squares subtracts no mean and uses one block.
-        start: first instruments from the "nominal" model or from the "ls" estimate.
-        most_refinements: 0 for instruments of the first model only.
-        heading: of the instruments, "measured" or "simulated".
-        wind: of the instruments, "lagged", "mean" or "measured".
-        integration: how models are simulated, for instruments and for output error.
-        horizon_s: of output error [s], None for whole runs.
-        constant: whether output error gives each run a constant acceleration of its own.
-        quadrature: of regressors and instruments over a sample interval, "euler" or "trapezoid".
-        steered: what becomes of samples marked as steered: "use", "leave-out", "planned" for instruments from the
-            inputs as planned, or "auto", see `replay.treatment_of`.
-        samples: "all", or "equation-wise", see `equation_wise`; output error uses all.
-        worst: what signals inside a modulus must exceed in equation-wise samples.
-        times: dead times and lags that output error estimates beside the parameters.
-        sensors: whose noise leaves the first velocities of output error uncertain.
-        begun: where output error goes on; None to begin with least squares.
-    """
-
-    fixed: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()  # parameters held at the model's values
+    # how IV equations are formed; least squares subtracts no mean and uses one block
     weighting: Weighting = field(default_factory=lambda: Weighting(mean="complete"))
-    start: str = "nominal"
-    most_refinements: int = TUNING.most_refinements
-    heading: str = "measured"
-    wind: str = "lagged"
+    start: str = "nominal"  # first instruments from the "nominal" model or from the "ls" estimate
+    most_refinements: int = TUNING.most_refinements  # 0 for instruments of the first model only
+    heading: str = "measured"  # of the instruments, "measured" or "simulated"
+    wind: str = "lagged"  # of the instruments, "lagged", "mean" or "measured"
+    # how models are simulated, for instruments and for output error
     integration: Integration = field(default_factory=Integration)
-    horizon_s: float | None = None
-    constant: bool = False
-    quadrature: str = "euler"
+    horizon_s: float | None = None  # of output error [s], None for whole runs
+    constant: bool = False  # whether output error gives each run a constant acceleration of its own
+    quadrature: str = "euler"  # of regressors and instruments over a sample interval, "euler" or "trapezoid"
+    # what becomes of samples marked as steered: "use", "leave-out", "planned" for instruments from the inputs as
+    # planned, or "auto", see `replay.treatment_of`
     steered: str = "auto"
-    samples: str = ALL
+    samples: str = ALL  # "all", or "equation-wise", see `equation_wise`; output error uses all
+    # what signals inside a modulus must exceed in equation-wise samples
     worst: WorstCase = field(default_factory=WorstCase)
-    times: tuple[ActuatorTime, ...] = ()
+    times: tuple[ActuatorTime, ...] = ()  # dead times and lags that output error estimates beside the parameters
+    # whose noise leaves the first velocities of output error uncertain
     sensors: Sensors = field(default_factory=Sensors)
-    begun: Begun | None = None
+    begun: Begun | None = None  # where output error goes on; None to begin with least squares
 
     def __post_init__(self) -> None:
         if self.steered not in STEERED:

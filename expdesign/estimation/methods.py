@@ -41,19 +41,12 @@ from expdesign.vessel import NOT_SUPPORTED, VesselModel
 
 @dataclass(frozen=True)
 class Method:
-    """One way to estimate.
+    """One way to estimate."""
 
-    Attributes:
-        name: as users type it.
-        title: for tables.
-        predictor: a name in `predictors.PREDICTORS`.
-        solver: "ls", "iv" (with simulated, refined instruments) or "oe" (least simulation error).
-    """
-
-    name: str
-    title: str
-    predictor: str
-    solver: str
+    name: str  # as users type it
+    title: str  # for tables
+    predictor: str  # a name in `predictors.PREDICTORS`
+    solver: str  # "ls", "iv" (with simulated, refined instruments) or "oe" (least simulation error)
 
     @property
     def estimates_steady_current(self) -> bool:

@@ -23,25 +23,15 @@ from expdesign.vessel import VesselModel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Residuals:
-    """Statistics of the one-step residuals (for "oe": of the simulated output).
+    """Statistics of the one-step residuals (for "oe": of the simulated output)."""
 
-    Attributes:
-        outputs: names.
-        std: (n,) standard deviation, in the unit of a sample-to-sample difference (for "oe": of the output).
-        correlation: (n,) with the sample before; -0.5 is measurement noise, +1 is a missing slow effect.
-        rows: samples used by any equation.
-        rows_of: (n,) samples that each equation uses.
-        left_out: samples left out because numbers are missing.
-        lags: last lag that the covariance of the estimate counts.
-    """
-
-    outputs: tuple[str, ...]
-    std: Array
-    correlation: Array
-    rows: int
-    rows_of: Integers
-    left_out: int
-    lags: int
+    outputs: tuple[str, ...]  # names
+    std: Array  # (n,) standard deviation, in the unit of a sample-to-sample difference (for "oe": of the output)
+    correlation: Array  # (n,) with the sample before; -0.5 is measurement noise, +1 is a missing slow effect
+    rows: int  # samples used by any equation
+    rows_of: Integers  # (n,) samples that each equation uses
+    left_out: int  # samples left out because numbers are missing
+    lags: int  # last lag that the covariance of the estimate counts
 
     def __post_init__(self) -> None:
         seal(self, std="n", correlation="n")
@@ -52,42 +42,26 @@ class Residuals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Estimate:
-    """Parameters of a vessel model from data.
+    """Parameters of a vessel model from data."""
 
-    Attributes:
-        method: name of the method.
-        names: estimated parameters, in model order.
-        values: (p,) in the model's own form.
-        covariance: (p, p).
-        held: parameters not estimated, and the values they were given.
-        nuisance_names: nuisance parameters.
-        nuisance_values: (q,).
-        nuisance_shares: what each nuisance parameter is the sum of: parameters times moments of disturbances.
-        partners: parameters of the air that are in others' values because no wind was used, and the names of those.
-        joint_covariance: (p + q, p + q) of parameters, then nuisance parameters.
-        residuals: statistics.
-        null_space: what the data cannot see, or see faintly.
-        refinements: number of repeated simulations of the instruments.
-        warnings: one sentence each.
-        steered: samples marked as steered, and what became of them.
-        feedback: the test whether inputs that instruments are simulated from follow disturbances; None without one.
-    """
-
-    method: str
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    held: Mapping[str, float]
-    nuisance_names: tuple[str, ...]
-    nuisance_values: Array
+    method: str  # name of the method
+    names: tuple[str, ...]  # estimated parameters, in model order
+    values: Array  # (p,) in the model's own form
+    covariance: Array  # (p, p)
+    held: Mapping[str, float]  # parameters not estimated, and the values they were given
+    nuisance_names: tuple[str, ...]  # nuisance parameters
+    nuisance_values: Array  # (q,)
+    # what each nuisance parameter is the sum of: parameters times moments of disturbances
     nuisance_shares: tuple[tuple[Share, ...], ...]
+    # parameters of the air that are in others' values because no wind was used, and the names of those
     partners: Mapping[str, str]
-    joint_covariance: Array
-    residuals: Residuals
-    null_space: NullSpace
-    refinements: int
-    warnings: tuple[str, ...]
-    steered: Steered
+    joint_covariance: Array  # (p + q, p + q) of parameters, then nuisance parameters
+    residuals: Residuals  # statistics
+    null_space: NullSpace  # what the data cannot see, or see faintly
+    refinements: int  # number of repeated simulations of the instruments
+    warnings: tuple[str, ...]  # one sentence each
+    steered: Steered  # samples marked as steered, and what became of them
+    # the test whether inputs that instruments are simulated from follow disturbances; None without one
     feedback: Feedback | None
 
     def __post_init__(self) -> None:

@@ -46,20 +46,13 @@ HEADER = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ForesightContent:
-    """The values that page and file show.
+    """The values that page and file show."""
 
-    Attributes:
-        scenario: its name.
-        vessel: its name.
-        source: the trial, in words.
-        found: what is foreseen.
-        command, version: to reproduce it.
-    """
-
-    scenario: str
-    vessel: str
-    source: str
-    found: Foresight
+    scenario: str  # its name
+    vessel: str  # its name
+    source: str  # the trial, in words
+    found: Foresight  # what is foreseen
+    # command, version: to reproduce it
     command: str
     version: str
 
@@ -217,17 +210,13 @@ FINDS = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class OperationContent:
-    """The values that page and file show.
+    """The values that page and file show."""
 
-    Attributes:
-        scenario, vessel: their names.
-        found: what is foreseen.
-        command, version: to reproduce it.
-    """
-
+    # scenario, vessel: their names
     scenario: str
     vessel: str
-    found: OperationForesight
+    found: OperationForesight  # what is foreseen
+    # command, version: to reproduce it
     command: str
     version: str
 

@@ -26,20 +26,13 @@ HARDLY = 0.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadContent:
-    """The values that page and files show.
+    """The values that page and files show."""
 
-    Attributes:
-        scenario: its name.
-        plan: the load cases.
-        known: parameters that are not sought, by name.
-        commands: that plan each load case, and estimate from the data.
-        command, version: to reproduce it.
-    """
-
-    scenario: str
-    plan: LoadPlan
-    known: Mapping[str, float]
-    commands: tuple[str, ...]
+    scenario: str  # its name
+    plan: LoadPlan  # the load cases
+    known: Mapping[str, float]  # parameters that are not sought, by name
+    commands: tuple[str, ...]  # that plan each load case, and estimate from the data
+    # command, version: to reproduce it
     command: str
     version: str
 

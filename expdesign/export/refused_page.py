@@ -36,26 +36,19 @@ WIDTH_IN = 6.4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refusal:
-    """A refused plan.
+    """A refused plan."""
 
-    Attributes:
-        scenario: name.
-        vessel, area: who and where.
-        start, goal: (3,) poses.
-        clearance_m: asked for [m].
-        error: the refusal.
-        earlier: names of results of an earlier attempt in the same folder.
-        command, version: how it came about.
-    """
-
-    scenario: str
+    scenario: str  # name
+    # vessel, area: who and where
     vessel: Vessel
     area: SeaArea
+    # start, goal: (3,) poses
     start: Array
     goal: Array
-    clearance_m: float
-    error: NoPlan
-    earlier: tuple[str, ...] = ()
+    clearance_m: float  # asked for [m]
+    error: NoPlan  # the refusal
+    earlier: tuple[str, ...] = ()  # names of results of an earlier attempt in the same folder
+    # command, version: how it came about
     command: str = ""
     version: str = ""
 

@@ -37,24 +37,16 @@ LEAST_CHANCE = 1e-4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollContent:
-    """The values that page and files show.
+    """The values that page and files show."""
 
-    Attributes:
-        estimate: the parameters.
-        report: the combinations that the data do not determine.
-        filter: that the data passed.
-        notes: on the data.
-        command, version: to reproduce it.
-        scale: of the ship to the model that was tried; None for a ship.
-    """
-
-    estimate: RollEstimate
-    report: NullSpace
-    filter: LowPass
-    notes: tuple[str, ...]
+    estimate: RollEstimate  # the parameters
+    report: NullSpace  # the combinations that the data do not determine
+    filter: LowPass  # that the data passed
+    notes: tuple[str, ...]  # on the data
+    # command, version: to reproduce it
     command: str
     version: str
-    scale: float | None = None
+    scale: float | None = None  # of the ship to the model that was tried; None for a ship
 
 
 def parameter_rows(content: RollContent) -> list[tuple[str, ...]]:

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        noticed: relative differences below this are not reported.
-    """
-
-    noticed: float = 0.02
+    noticed: float = 0.02  # relative differences below this are not reported
 
 
 TUNING = Tuning()

@@ -45,21 +45,15 @@ ERROR_LIMIT = 1.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ValidationContent:
-    """The values that page and file show.
+    """The values that page and file show."""
 
-    Attributes:
-        scenario: its name.
-        rehearsal: the simulated trials.
-        results: of every design.
-        noisy_moduli: primitives of the optimised design in which noise or weather may change the sign of a velocity
-            inside an absolute value.
-        command, version: to reproduce it.
-    """
-
-    scenario: str
-    rehearsal: Rehearsal
-    results: tuple[Validated, ...]
+    scenario: str  # its name
+    rehearsal: Rehearsal  # the simulated trials
+    results: tuple[Validated, ...]  # of every design
+    # primitives of the optimised design in which noise or weather may change the sign of a velocity inside an absolute
+    # value
     noisy_moduli: tuple[str, ...]
+    # command, version: to reproduce it
     command: str
     version: str
 

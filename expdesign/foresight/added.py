@@ -31,23 +31,14 @@ ENDLESS = 1e5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Offers:
-    """Runs that may be added to a trial, with their information.
+    """Runs that may be added to a trial, with their information."""
 
-    Attributes:
-        names: (q,) of the manoeuvres.
-        run_s: (q,) duration of a run [s].
-        known: (c + m, c + m) information of the trial as it is, about nuisance and about effects at their sizes.
-        each: (q, c + m, c + m) information of one run.
-        precision: (c, c) prior precision of the nuisance.
-        blocks: per effect, its rows among the m; of several the worst mixture counts.
-    """
-
-    names: tuple[str, ...]
-    run_s: Array
-    known: Array
-    each: Array
-    precision: Array
-    blocks: tuple[NDArray[np.int64], ...]
+    names: tuple[str, ...]  # (q,) of the manoeuvres
+    run_s: Array  # (q,) duration of a run [s]
+    known: Array  # (c + m, c + m) information of the trial as it is, about nuisance and about effects at their sizes
+    each: Array  # (q, c + m, c + m) information of one run
+    precision: Array  # (c, c) prior precision of the nuisance
+    blocks: tuple[NDArray[np.int64], ...]  # per effect, its rows among the m; of several the worst mixture counts
 
     def noncentralities(self, runs: Array) -> Array:
         """(e,) noncentrality of every effect once so many runs (q,) are added."""

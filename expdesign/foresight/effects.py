@@ -21,15 +21,10 @@ from expdesign.vessel import stem
 
 @dataclass(frozen=True, kw_only=True)
 class Direction:
-    """One number by which a cause may act.
+    """One number by which a cause may act."""
 
-    Attributes:
-        shares: effect of the extended model -> its share of the size.
-        fixed: effects that say which candidate it is.
-    """
-
-    shares: Mapping[str, float]
-    fixed: Mapping[str, float] = field(default_factory=dict)
+    shares: Mapping[str, float]  # effect of the extended model -> its share of the size
+    fixed: Mapping[str, float] = field(default_factory=dict)  # effects that say which candidate it is
 
     def at(self, size: float) -> dict[str, float]:
         """Effects of the extended model at a size."""
@@ -43,15 +38,10 @@ class Direction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HiddenEffect:
-    """One way in which a cause may act.
+    """One way in which a cause may act."""
 
-    Attributes:
-        candidate: of the catalogue, whose test looks for it.
-        directions: its numbers; of several the worst mixture counts.
-    """
-
-    candidate: Candidate
-    directions: tuple[Direction, ...]
+    candidate: Candidate  # of the catalogue, whose test looks for it
+    directions: tuple[Direction, ...]  # its numbers; of several the worst mixture counts
 
     @property
     def cause(self) -> str:

@@ -68,26 +68,21 @@ def unit_information(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulatedUnits:
-    """How simulated errors of u, v, r over k units of the data change with c nuisance effects and m others.
+    """How simulated errors of u, v, r over k units of the data change with c nuisance effects and m others."""
 
-    Attributes:
-        information: (k, c + m, c + m) of each unit, whitened; predicted: of its u, v, r alone, whose predictions are
-            compared, in so many blocks of time that tell as much.
-        samples: (k,) measured numbers of u, v, r.
-        products: (k, 3, c + m, c + m) inner products of the sensitivities; with_error: (n, k, 3, c + m) with the errors
-            of n records where nothing is hidden; squared_error, squared_deviation: (n, k, 3).
-        precision: (c, c) prior precision of the nuisance.
-    """
-
+    # (k, c + m, c + m) of each unit, whitened; predicted: of its u, v, r alone, whose predictions are compared, in so
+    # many blocks of time that tell as much
     information: Array
     predicted: Array
     blocks: int
-    samples: Array
+    samples: Array  # (k,) measured numbers of u, v, r
+    # (k, 3, c + m, c + m) inner products of the sensitivities; with_error: (n, k, 3, c + m) with the errors of n
+    # records where nothing is hidden; squared_error, squared_deviation: (n, k, 3)
     products: Array
     with_error: Array
     squared_error: Array
     squared_deviation: Array
-    precision: Array
+    precision: Array  # (c, c) prior precision of the nuisance
 
 
 def simulated_units(
@@ -156,19 +151,14 @@ def beside_nuisance(whole: Array, precision: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class JointInformation:
-    """Information of a trial about hidden effects at their sizes, then about all tested candidates.
+    """Information of a trial about hidden effects at their sizes, then about all tested candidates."""
 
-    Attributes:
-        whole: (c + m, c + m) nuisance first; beside: (m, m) beside nuisance.
-        directions, sizes: of the effects' own rows.
-        blocks: per effect, its rows among the m; rows: per tested candidate.
-    """
-
-    whole: Array
+    whole: Array  # (c + m, c + m) nuisance first; beside: (m, m) beside nuisance
     beside: Array
+    # directions, sizes: of the effects' own rows
     directions: tuple[Direction, ...]
     sizes: tuple[float, ...]
-    blocks: tuple[NDArray[np.int64], ...]
+    blocks: tuple[NDArray[np.int64], ...]  # per effect, its rows among the m; rows: per tested candidate
     rows: tuple[NDArray[np.int64], ...]
 
 

@@ -53,77 +53,48 @@ MOST_VOYAGES = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class HiddenChange:
-    """A way in which a ship may change in operation.
+    """A way in which a ship may change in operation."""
 
-    Attributes:
-        name: in words, e.g. "more mass".
-        effects: effect -> value per share of the change.
-        right: effects that name it rightly.
-    """
-
-    name: str
-    effects: Mapping[str, float]
-    right: tuple[str, ...]
+    name: str  # in words, e.g. "more mass".
+    effects: Mapping[str, float]  # effect -> value per share of the change
+    right: tuple[str, ...]  # effects that name it rightly
 
 
 @dataclass(frozen=True, kw_only=True)
 class Watched:
-    """One voyage that was watched.
+    """One voyage that was watched."""
 
-    Attributes:
-        delay_s: from its beginning to the alarm [s]; None without one.
-        named: effect that the alarm names last; as_likely: others that explain the data as well.
-    """
-
-    delay_s: float | None
-    named: str = ""
+    delay_s: float | None  # from its beginning to the alarm [s]; None without one
+    named: str = ""  # effect that the alarm names last; as_likely: others that explain the data as well
     as_likely: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Detectability:
-    """What a watch makes of a change of some size.
+    """What a watch makes of a change of some size."""
 
-    Attributes:
-        change: in words.
-        size: share.
-        voyages: simulated.
-        found: of them with an alarm; named: of those found, rightly named; likely: right among what is as likely.
-        delay_s: median time to the alarm of all voyages, infinite where less than half are found [s].
-        taken_for: other changes that alarms name, most frequent first, with their numbers.
-    """
-
-    change: str
-    size: float
-    voyages: int
-    found: int
+    change: str  # in words
+    size: float  # share
+    voyages: int  # simulated
+    found: int  # of them with an alarm; named: of those found, rightly named; likely: right among what is as likely
     named: int
     likely: int
-    delay_s: float
-    taken_for: tuple[tuple[str, int], ...]
+    delay_s: float  # median time to the alarm of all voyages, infinite where less than half are found [s]
+    taken_for: tuple[tuple[str, int], ...]  # other changes that alarms name, most frequent first, with their numbers
 
 
 @dataclass(frozen=True, kw_only=True)
 class OperationForesight:
-    """What a watch over a ship would find.
+    """What a watch over a ship would find."""
 
-    Attributes:
-        rows: by change and size.
-        voyage_s: length of the voyages [s].
-        nominal: voyages without a change; false_alarms: of them with an alarm.
-        false_alarm_days: average time between false alarms that the threshold allows at most [d].
-        watched: changes that the reference determines well enough; not_watched: the others, in words.
-        reference_s: length of the reference [s].
-    """
-
-    rows: tuple[Detectability, ...]
-    voyage_s: float
-    nominal: int
+    rows: tuple[Detectability, ...]  # by change and size
+    voyage_s: float  # length of the voyages [s]
+    nominal: int  # voyages without a change; false_alarms: of them with an alarm
     false_alarms: int
-    false_alarm_days: float
-    watched: tuple[str, ...]
+    false_alarm_days: float  # average time between false alarms that the threshold allows at most [d]
+    watched: tuple[str, ...]  # changes that the reference determines well enough; not_watched: the others, in words
     not_watched: tuple[str, ...]
-    reference_s: float
+    reference_s: float  # length of the reference [s]
 
 
 def interval(count: int, trials: int) -> tuple[float, float]:

@@ -79,19 +79,13 @@ def _estimated(candidate: Candidate) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rivals:
-    """All candidates of a catalogue, and how their scores scatter where nothing is hidden.
+    """All candidates of a catalogue, and how their scores scatter where nothing is hidden."""
 
-    Attributes:
-        tests: tested candidates.
-        whitening: (m, w) of scores to independent numbers, those of each candidate side by side; parts: (t,) their
-            beginnings.
-        noise: (n, m) drawn scores; white: (n, w) the same whitened.
-    """
-
-    tests: tuple[ScoreTest, ...]
+    tests: tuple[ScoreTest, ...]  # tested candidates
+    # (m, w) of scores to independent numbers, those of each candidate side by side; parts: (t,) their beginnings
     whitening: Array
     parts: NDArray[np.int64]
-    noise: Array
+    noise: Array  # (n, m) drawn scores; white: (n, w) the same whitened
     white: Array
 
     @property
@@ -184,19 +178,12 @@ def share_shown(
 
 
 class _Trials(NamedTuple):
-    """Drawn trials.
+    """Drawn trials."""
 
-    Attributes:
-        truth: (n, r) numbers.
-        score: (n, k, r) of each unit.
-        noise: (n, k, b, r) of the scores of blocks of each unit, when its samples are predicted.
-        record: (n,) whose errors are those of its units.
-    """
-
-    truth: Array
-    score: Array
-    noise: Array
-    record: NDArray[np.int64]
+    truth: Array  # (n, r) numbers
+    score: Array  # (n, k, r) of each unit
+    noise: Array  # (n, k, b, r) of the scores of blocks of each unit, when its samples are predicted
+    record: NDArray[np.int64]  # (n,) whose errors are those of its units
 
 
 def _are_shown(units: SimulatedUnits, kept: NDArray[np.int64], trials: _Trials, prior: Array, A: Array) -> list[bool]:

@@ -41,29 +41,20 @@ NOT_BY_RUNS = ("change_point",)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Wanted:
-    """One effect that a trial must reveal, or distinguish from another.
+    """One effect that a trial must reveal, or distinguish from another."""
 
-    Attributes:
-        cause, effect: names.
-        size: of the effect, in its unit; of several numbers the first.
-        unit: of it.
-        apart_from: the other cause, or "".
-        each: (q, d, d) information of one run of every manoeuvre: nuisance, the other effect if any, then the effect.
-        prior: (d, d).
-        columns: number of the effect's own rows, the last ones.
-        least: noncentrality that is needed.
-        freedom, level: of its test; where it is distinguished from another cause, of a gain that decides.
-    """
-
+    # cause, effect: names
     cause: str
     effect: str
-    size: float
-    unit: str
-    apart_from: str
+    size: float  # of the effect, in its unit; of several numbers the first
+    unit: str  # of it
+    apart_from: str  # the other cause, or ""
+    # (q, d, d) information of one run of every manoeuvre: nuisance, the other effect if any, then the effect
     each: Array
-    prior: Array
-    columns: int
-    least: float
+    prior: Array  # (d, d)
+    columns: int  # number of the effect's own rows, the last ones
+    least: float  # noncentrality that is needed
+    # freedom, level: of its test; where it is distinguished from another cause, of a gain that decides
     freedom: int
     level: float
 
@@ -174,19 +165,13 @@ def wanted(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Several:
-    """Hidden effects with the information of every manoeuvre about all of them.
+    """Hidden effects with the information of every manoeuvre about all of them."""
 
-    Attributes:
-        known: the trial that gave noise and tests.
-        hidden: the effects; sizes: of their directions; rows: of each in the information.
-        each: (q, c + m, c + m).
-    """
-
-    known: Background
-    hidden: tuple[HiddenEffect, ...]
+    known: Background  # the trial that gave noise and tests
+    hidden: tuple[HiddenEffect, ...]  # the effects; sizes: of their directions; rows: of each in the information
     sizes: tuple[tuple[float, ...], ...]
     rows: tuple[Array, ...]
-    each: Array
+    each: Array  # (q, c + m, c + m)
 
     def revealed(self, place: int) -> Wanted:
         """An effect with the wanted power."""

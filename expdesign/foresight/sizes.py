@@ -48,35 +48,22 @@ NEGLIGIBLE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """A size that matters.
+    """A size that matters."""
 
-    Attributes:
-        value: in the unit of the effect; nan where no size is known.
-        rule: why, in words.
-    """
-
-    value: float
-    rule: str
+    value: float  # in the unit of the effect; nan where no size is known
+    rule: str  # why, in words
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StandardTrials:
-    """Turning circle, zig-zags and stop of the vessel in use, without noise.
+    """Turning circle, zig-zags and stop of the vessel in use, without noise."""
 
-    Attributes:
-        vessel: the ship.
-        speed_mps: approach speed.
-        ship: its extended model; linear: its motion in them, in the mean wind of the trial.
-        deviation: (n,) sum of squares of each output about its means.
-        outcomes: of `OUTCOMES`.
-    """
-
-    vessel: Vessel
-    speed_mps: float
-    ship: ExtendedModel
+    vessel: Vessel  # the ship
+    speed_mps: float  # approach speed
+    ship: ExtendedModel  # its extended model; linear: its motion in them, in the mean wind of the trial
     linear: LinearisedMotion
-    deviation: Array
-    outcomes: Mapping[str, float]
+    deviation: Array  # (n,) sum of squares of each output about its means
+    outcomes: Mapping[str, float]  # of `OUTCOMES`
 
 
 def standard_trials(vessel: Vessel, weather: Environment) -> StandardTrials | None:

@@ -25,20 +25,13 @@ RECORDS = 12  # of a trial with nothing hidden, from which the errors of held-ou
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrialRun:
-    """One uninterrupted stretch of a trial.
+    """One uninterrupted stretch of a trial."""
 
-    Attributes:
-        name: of its batch.
-        commands: k samples.
-        pose: (3,) at the first sample [m, m, rad].
-        velocity: (3,) over ground in the b-frame at the first sample [m/s, m/s, rad/s].
-        standing: (m,) commands that stood before the first sample; None for those of the first sample.
-    """
-
-    name: str
-    commands: Commands
-    pose: Array
-    velocity: Array
+    name: str  # of its batch
+    commands: Commands  # k samples
+    pose: Array  # (3,) at the first sample [m, m, rad]
+    velocity: Array  # (3,) over ground in the b-frame at the first sample [m/s, m/s, rad/s]
+    # (m,) commands that stood before the first sample; None for those of the first sample
     standing: Array | None = None
 
     def __post_init__(self) -> None:
@@ -144,21 +137,14 @@ UNSEEN = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Background:
-    """A trial with nothing hidden, as a diagnosis sees it before it looks for causes.
+    """A trial with nothing hidden, as a diagnosis sees it before it looks for causes."""
 
-    Attributes:
-        base: the fit of uncertain parameters and of the noise.
-        windows: the data.
-        again: the same runs with other noise, simulated by the model in use as it is and cut like the data.
-        candidates: of the catalogue.
-        tests: of those candidates that differ from everything in the fit.
-    """
-
-    base: Fit
-    windows: Windows
+    base: Fit  # the fit of uncertain parameters and of the noise
+    windows: Windows  # the data
+    # the same runs with other noise, simulated by the model in use as it is and cut like the data
     again: tuple[Motion, ...]
-    candidates: tuple[Candidate, ...]
-    tests: tuple[ScoreTest, ...]
+    candidates: tuple[Candidate, ...]  # of the catalogue
+    tests: tuple[ScoreTest, ...]  # of those candidates that differ from everything in the fit
 
 
 def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *, seed: int = 0) -> Background:

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Numbers of this room.
+    """Numbers of this room."""
 
-    Attributes:
-        told_apart: probability below which two causes count as not told apart.
-    """
-
-    told_apart: float = 0.5
+    told_apart: float = 0.5  # probability below which two causes count as not told apart
 
 
 TUNING = Tuning()

@@ -13,74 +13,43 @@ WANTED_POWER = 0.9  # of a cause that counts as revealed
 
 @dataclass(frozen=True)
 class Confusion:
-    """A cause that a hidden effect may be taken for.
+    """A cause that a hidden effect may be taken for."""
 
-    Attributes:
-        cause: the other cause.
-        cosine: between both directions, beside nuisance; 1 where no data of this trial tell them apart.
-        noncentrality: of the hidden effect where the other cause is free.
-        told_apart: probability that the likelihood prefers the right one by as much as a diagnosis asks for.
-    """
-
-    cause: str
-    cosine: float
-    noncentrality: float
-    told_apart: float
+    cause: str  # the other cause
+    cosine: float  # between both directions, beside nuisance; 1 where no data of this trial tell them apart
+    noncentrality: float  # of the hidden effect where the other cause is free
+    told_apart: float  # probability that the likelihood prefers the right one by as much as a diagnosis asks for
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AddedRuns:
-    """Whole runs that bring a cause to the wanted power.
+    """Whole runs that bring a cause to the wanted power."""
 
-    Attributes:
-        runs: (name of the manoeuvre, number).
-        time_s: of all of them.
-    """
-
-    runs: tuple[tuple[str, int], ...]
-    time_s: float
+    runs: tuple[tuple[str, int], ...]  # (name of the manoeuvre, number)
+    time_s: float  # of all of them
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Foreseen:
-    """One hidden effect.
+    """One hidden effect."""
 
-    Attributes:
-        effect: how the cause acts.
-        name: in results.
-        change: of that number, at the size that matters; nan where no size is known.
-        unit: of it.
-        rule: why this size matters.
-        noncentrality: of its test.
-        freedom: numbers tested at once.
-        level: p-value of the test alone that is accepted.
-        power: probability that the test of its cause finds it.
-        found: probability that a diagnosis finds it: held-out runs are then simulated or predicted better too.
-        named: probability that a diagnosis finds it and no other cause explains the data better.
-        least_change: change of the same number with the wanted power; infinite where there is none.
-        confusions: causes that it is not told apart from.
-        added: the manoeuvre whose added runs bring it to the wanted power soonest; None where none does, or none is
-            needed.
-        best_power: largest power with added runs of one manoeuvre.
-        within_std: no data suffice, as the effect is within the vessel file's standard deviations.
-    """
-
-    effect: HiddenEffect
-    name: str
-    change: float
-    unit: str
-    rule: str
-    noncentrality: float
-    freedom: int
-    level: float
-    power: float
-    found: float
-    named: float
-    least_change: float
-    confusions: tuple[Confusion, ...] = ()
+    effect: HiddenEffect  # how the cause acts
+    name: str  # in results
+    change: float  # of that number, at the size that matters; nan where no size is known
+    unit: str  # of it
+    rule: str  # why this size matters
+    noncentrality: float  # of its test
+    freedom: int  # numbers tested at once
+    level: float  # p-value of the test alone that is accepted
+    power: float  # probability that the test of its cause finds it
+    found: float  # probability that a diagnosis finds it: held-out runs are then simulated or predicted better too
+    named: float  # probability that a diagnosis finds it and no other cause explains the data better
+    least_change: float  # change of the same number with the wanted power; infinite where there is none
+    confusions: tuple[Confusion, ...] = ()  # causes that it is not told apart from
+    # the manoeuvre whose added runs bring it to the wanted power soonest; None where none does, or none is needed
     added: AddedRuns | None = None
-    best_power: float = 0.0
-    within_std: bool = False
+    best_power: float = 0.0  # largest power with added runs of one manoeuvre
+    within_std: bool = False  # no data suffice, as the effect is within the vessel file's standard deviations
 
     @property
     def cause(self) -> str:
@@ -105,26 +74,17 @@ class Foreseen:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Foresight:
-    """What a diagnosis of a trial would find.
+    """What a diagnosis of a trial would find."""
 
-    Attributes:
-        effects: in the order of the catalogue.
-        unseen: (cause, why) of causes that these records cannot show.
-        duration_s: of the trial.
-        wanted_power: of what counts as revealed.
-        random_current_mps: standard deviation of the wandering current that the diagnosis allows for.
-        together: runs that bring every effect which can be brought there to the wanted power; None where none is
-            needed, or no runs are offered.
-        beyond: effects that no runs of the dictionary bring there.
-    """
-
-    effects: tuple[Foreseen, ...]
-    unseen: tuple[tuple[str, str], ...]
-    duration_s: float
-    wanted_power: float
-    random_current_mps: float
+    effects: tuple[Foreseen, ...]  # in the order of the catalogue
+    unseen: tuple[tuple[str, str], ...]  # (cause, why) of causes that these records cannot show
+    duration_s: float  # of the trial
+    wanted_power: float  # of what counts as revealed
+    random_current_mps: float  # standard deviation of the wandering current that the diagnosis allows for
+    # runs that bring every effect which can be brought there to the wanted power; None where none is needed, or no runs
+    # are offered
     together: AddedRuns | None = None
-    beyond: tuple[Foreseen, ...] = ()
+    beyond: tuple[Foreseen, ...] = ()  # effects that no runs of the dictionary bring there
 
     @property
     def weakest(self) -> tuple[Foreseen, ...]:

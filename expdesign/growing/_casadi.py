@@ -29,27 +29,16 @@ CALMNESS = 1e-4  # weight of the squared changes of commands, relative to the in
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeForm:
-    """Find the commands whose run has the largest trace(G B).
+    """Find the commands whose run has the largest trace(G B)."""
 
-    Attributes:
-        vessel: nominal, in calm water.
-        names: parameters to estimate.
-        gradient: (d, d) G, for the D criterion B(w)^-1.
-        mean_subtraction: "none", "batch" or "complete".
-        limits: (3, 2) low and high of u, v, r.
-        entry_inputs: (m,) commands before the run.
-        commands: (k, m) initial guess.
-        velocity: (k + 1, 3) motion under the guess; its first row is fixed.
-    """
-
-    vessel: Vessel
-    names: tuple[str, ...]
-    gradient: Array
-    mean_subtraction: str
-    limits: Array
-    entry_inputs: Array
-    commands: Array
-    velocity: Array
+    vessel: Vessel  # nominal, in calm water
+    names: tuple[str, ...]  # parameters to estimate
+    gradient: Array  # (d, d) G, for the D criterion B(w)^-1
+    mean_subtraction: str  # "none", "batch" or "complete"
+    limits: Array  # (3, 2) low and high of u, v, r
+    entry_inputs: Array  # (m,) commands before the run
+    commands: Array  # (k, m) initial guess
+    velocity: Array  # (k + 1, 3) motion under the guess; its first row is fixed
 
     def __post_init__(self) -> None:
         seal(self, gradient="d d", limits="3 2", entry_inputs="m", commands="k m", velocity="n 3")

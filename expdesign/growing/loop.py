@@ -34,17 +34,11 @@ FREE_FORM_EXCESS = 1e-6  # share of a range by which optimised commands may exce
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """Shares of the time, the optimal ones or others, and their information.
+    """Shares of the time, the optimal ones or others, and their information."""
 
-    Attributes:
-        fractions: (q,) time fractions.
-        log_det: in physical scale.
-        inverse: (d, d) B^-1 in physical scale.
-    """
-
-    fractions: Array
-    log_det: float
-    inverse: Array
+    fractions: Array  # (q,) time fractions
+    log_det: float  # in physical scale
+    inverse: Array  # (d, d) B^-1 in physical scale
 
     def __post_init__(self) -> None:
         seal(self, fractions="q", inverse="d d")

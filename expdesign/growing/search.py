@@ -38,17 +38,12 @@ LEAST_COST = 0.02  # least cost of a second of a run that makes way good, in sec
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Worth:
-    """What a run's information is worth, per second that the run costs.
+    """What a run's information is worth, per second that the run costs."""
 
-    Attributes:
-        gradient: (d, d) G; information B is worth trace(G B). For the D criterion B(w)^-1, which gives the sensitivity.
-        leg_s: time of the leg that each run brings.
-        saved_s_per_m: time that a metre made good saves elsewhere.
-    """
-
+    # (d, d) G; information B is worth trace(G B). For the D criterion B(w)^-1, which gives the sensitivity.
     gradient: Array
-    leg_s: float = 0.0
-    saved_s_per_m: float = 0.0
+    leg_s: float = 0.0  # time of the leg that each run brings
+    saved_s_per_m: float = 0.0  # time that a metre made good saves elsewhere
 
     def __post_init__(self) -> None:
         seal(self, gradient="d d")
@@ -61,17 +56,11 @@ class Worth:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Runs:
-    """Evaluated specifications.
+    """Evaluated specifications."""
 
-    Attributes:
-        matrices: (n, d, d) B of each; 0 for impossible runs.
-        excess: (n,) violations of the limits; infinite for impossible runs.
-        made_good_m: (n,) distance from begin to end through water.
-    """
-
-    matrices: Array
-    excess: Array
-    made_good_m: Array
+    matrices: Array  # (n, d, d) B of each; 0 for impossible runs
+    excess: Array  # (n,) violations of the limits; infinite for impossible runs
+    made_good_m: Array  # (n,) distance from begin to end through water
 
     def __post_init__(self) -> None:
         seal(self, matrices="n d d", excess="n", made_good_m="n")
@@ -91,20 +80,15 @@ class Runs:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measure:
-    """Information matrix, limit violation and way of a specification.
+    """Information matrix, limit violation and way of a specification."""
 
-    Attributes:
-        vessel, names, environment, mean_subtraction: as in `information.many.bordered_runs`.
-        limits: (3, 2) low and high of u, v, r.
-        courses: (c,) that runs make good; None where they are unknown.
-    """
-
+    # vessel, names, environment, mean_subtraction: as in `information.many.bordered_runs`
     vessel: Vessel
     names: tuple[str, ...]
     environment: Environment
     mean_subtraction: str
-    limits: Array
-    courses: Array | None = None
+    limits: Array  # (3, 2) low and high of u, v, r
+    courses: Array | None = None  # (c,) that runs make good; None where they are unknown
 
     def __call__(self, specs: Sequence[PrimitiveSpec]) -> Runs:
         """The runs of specifications; those of one duration are simulated together, the longest first."""
@@ -157,34 +141,21 @@ def violation(motion: Array, limits: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
-    """An evaluated run.
+    """An evaluated run."""
 
-    Attributes:
-        spec: of it.
-        merit: its worth.
-        matrix: (d, d) B.
-        made_good_m: distance from begin to end through water.
-    """
-
-    spec: PrimitiveSpec
-    merit: float
-    matrix: Array
-    made_good_m: float
+    spec: PrimitiveSpec  # of it
+    merit: float  # its worth
+    matrix: Array  # (d, d) B
+    made_good_m: float  # distance from begin to end through water
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Archive:
-    """All evaluated candidates of one family.
+    """All evaluated candidates of one family."""
 
-    Attributes:
-        space: the family's.
-        points: (n, a) places in the unit cube.
-        runs: n of them.
-    """
-
-    space: FamilySpace
-    points: Array
-    runs: Runs
+    space: FamilySpace  # the family's
+    points: Array  # (n, a) places in the unit cube
+    runs: Runs  # n of them
 
     def merits(self, worth: Worth) -> Array:
         """(n,) worth of those within limits, minus the violation of the others."""

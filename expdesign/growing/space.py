@@ -21,18 +21,13 @@ HELM_DEG = 35.0  # largest searched helm angle
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Axis:
-    """One searched setting.
+    """One searched setting."""
 
-    Attributes:
-        name: of the setting.
-        low, high: its range.
-        scale: "linear", "log" or "whole".
-    """
-
-    name: str
+    name: str  # of the setting
+    # low, high: its range
     low: float
     high: float
-    scale: str = "linear"
+    scale: str = "linear"  # "linear", "log" or "whole"
 
     def value(self, share: float) -> float:
         """The setting at a place from 0 to 1."""
@@ -44,17 +39,11 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FamilySpace:
-    """All members of a family with one duration and within velocity limits.
+    """All members of a family with one duration and within velocity limits."""
 
-    Attributes:
-        family: the family.
-        axes: its searched settings.
-        run_s: duration of a run [s].
-    """
-
-    family: Family
-    axes: tuple[Axis, ...]
-    run_s: float
+    family: Family  # the family
+    axes: tuple[Axis, ...]  # its searched settings
+    run_s: float  # duration of a run [s]
 
     def spec(self, point: Array) -> PrimitiveSpec:
         """The member at a point (a,) of the unit cube."""
@@ -125,28 +114,19 @@ def _axis(vessel: Vessel, setting: Setting, limits: Array, run_s: float) -> Axis
 
 @dataclass(frozen=True, kw_only=True)
 class GrowSettings:
-    """Settings of the search for manoeuvres that add information to a dictionary.
+    """Settings of the search for manoeuvres that add information to a dictionary."""
 
-    Attributes:
-        families: names of the searched families; () for all that the vessel can do.
-        rounds: most primitives to add.
-        tolerance: the search ends when no candidate found has a sensitivity above (1 + tolerance) x dimension.
-        limits: key -> (low, high) of u [m/s], v [m/s] and r [rad/s] of an addition in calm water; without a key, the
-            range of the present dictionary.
-        free_form: whether the commands of the best candidate are optimised.
-        run_s: duration of an added run [s], or None for the median duration of the present runs.
-        pool: initial candidates of every family.
-        seed: of the search; None for the command's.
-    """
-
-    families: tuple[str, ...] = ()
-    rounds: int = 12
+    families: tuple[str, ...] = ()  # names of the searched families; () for all that the vessel can do
+    rounds: int = 12  # most primitives to add
+    # the search ends when no candidate found has a sensitivity above (1 + tolerance) x dimension
     tolerance: float = 0.01
+    # key -> (low, high) of u [m/s], v [m/s] and r [rad/s] of an addition in calm water; without a key, the range of the
+    # present dictionary
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    free_form: bool = False
-    run_s: float | None = None
-    pool: int = 256
-    seed: int | None = None
+    free_form: bool = False  # whether the commands of the best candidate are optimised
+    run_s: float | None = None  # duration of an added run [s], or None for the median duration of the present runs
+    pool: int = 256  # initial candidates of every family
+    seed: int | None = None  # of the search; None for the command's
 
     def __post_init__(self) -> None:
         if self.rounds < 1:
@@ -159,50 +139,31 @@ class GrowSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class GrowRound:
-    """One primitive that was added.
+    """One primitive that was added."""
 
-    Attributes:
-        name, family, settings: of the addition.
-        sensitivity: its d = trace(B(w)^-1 B) at the optimum without it.
-        searched: the largest d among candidates of the families, before commands were optimised.
-        log_det_gain: increase of the optimal log det.
-        efficiency: ratio of the new optimum to the first, determinant to the power 1/p.
-        excitation_condition: as in `PrimitiveInformation`.
-    """
-
+    # name, family, settings: of the addition
     name: str
     family: str
     settings: Mapping[str, float]
-    sensitivity: float
-    searched: float
-    log_det_gain: float
-    efficiency: float
-    excitation_condition: bool
+    sensitivity: float  # its d = trace(B(w)^-1 B) at the optimum without it
+    searched: float  # the largest d among candidates of the families, before commands were optimised
+    log_det_gain: float  # increase of the optimal log det
+    efficiency: float  # ratio of the new optimum to the first, determinant to the power 1/p
+    excitation_condition: bool  # as in `PrimitiveInformation`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Growth:
-    """A grown dictionary.
+    """A grown dictionary."""
 
-    Attributes:
-        specs: of the additions, in order.
-        information: of the whole dictionary, additions last.
-        rounds: one for each addition.
-        limits: (3, 2) low and high of u, v, r of all additions.
-        evaluated: number of evaluated candidates.
-        dimension: p, plus means with complete mean subtraction.
-        parameters: p.
-        best_left: largest sensitivity found at the end.
-    """
-
-    specs: tuple[PrimitiveSpec, ...]
-    information: tuple[PrimitiveInformation, ...]
-    rounds: tuple[GrowRound, ...]
-    limits: Array
-    evaluated: int
-    dimension: int
-    parameters: int
-    best_left: float
+    specs: tuple[PrimitiveSpec, ...]  # of the additions, in order
+    information: tuple[PrimitiveInformation, ...]  # of the whole dictionary, additions last
+    rounds: tuple[GrowRound, ...]  # one for each addition
+    limits: Array  # (3, 2) low and high of u, v, r of all additions
+    evaluated: int  # number of evaluated candidates
+    dimension: int  # p, plus means with complete mean subtraction
+    parameters: int  # p
+    best_left: float  # largest sensitivity found at the end
 
     def __post_init__(self) -> None:
         seal(self, limits="3 2")

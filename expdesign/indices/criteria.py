@@ -24,38 +24,23 @@ DEGREE = math.pi / 180.0
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """One limit.
+    """One limit."""
 
-    Attributes:
-        key: of the index, unit in the name.
-        name: for people.
-        limit: largest value allowed [m or rad].
-        rule: the limit in words.
-    """
-
-    key: str
-    name: str
-    limit: float
-    rule: str
+    key: str  # of the index, unit in the name
+    name: str  # for people
+    limit: float  # largest value allowed [m or rad]
+    rule: str  # the limit in words
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One index compared with its limit.
+    """One index compared with its limit."""
 
-    Attributes:
-        criterion: the limit.
-        run: name of the run that shows the index.
-        side: "starboard", "port", or "" where there is none.
-        value: of the index [m or rad], or None where the run does not show it.
-        tolerance: of the value [m or rad].
-    """
-
-    criterion: Criterion
-    run: str
-    side: str
-    value: float | None
-    tolerance: float = 0.0
+    criterion: Criterion  # the limit
+    run: str  # name of the run that shows the index
+    side: str  # "starboard", "port", or "" where there is none
+    value: float | None  # of the index [m or rad], or None where the run does not show it
+    tolerance: float = 0.0  # of the value [m or rad]
 
     @property
     def met(self) -> bool | None:
@@ -145,46 +130,27 @@ STRONGEST_WIND, HIGHEST_SEA, DEPTH_BY_DRAUGHT = 5, 4, 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """Place and weather of a planned trial.
+    """Place and weather of a planned trial."""
 
-    Attributes:
-        draught_m: mean draught.
-        least_depth_m: least charted depth under the track, or None when it is not charted.
-        wind_mps: expected mean wind speed.
-        wind_std_mps: standard deviation of its components.
-        sea_state: World Meteorological Organization code, or None when not given.
-        current_mps: expected mean current.
-        current_std_mps: standard deviation of its components.
-        room_m: least distance from the hull to forbidden water over the trial.
-        required_room_m: the required least distance.
-    """
-
-    draught_m: float
-    least_depth_m: float | None
-    wind_mps: float
-    wind_std_mps: float
-    sea_state: int | None
-    current_mps: float
-    current_std_mps: float
-    room_m: float
-    required_room_m: float
+    draught_m: float  # mean draught
+    least_depth_m: float | None  # least charted depth under the track, or None when it is not charted
+    wind_mps: float  # expected mean wind speed
+    wind_std_mps: float  # standard deviation of its components
+    sea_state: int | None  # World Meteorological Organization code, or None when not given
+    current_mps: float  # expected mean current
+    current_std_mps: float  # standard deviation of its components
+    room_m: float  # least distance from the hull to forbidden water over the trial
+    required_room_m: float  # the required least distance
 
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
-    """One condition of a trial.
+    """One condition of a trial."""
 
-    Attributes:
-        what: the condition.
-        found: its expected value, in words.
-        required: the requirement of the source.
-        met: True, False, or None where it cannot be known in advance.
-    """
-
-    what: str
-    found: str
-    required: str
-    met: bool | None
+    what: str  # the condition
+    found: str  # its expected value, in words
+    required: str  # the requirement of the source
+    met: bool | None  # True, False, or None where it cannot be known in advance
 
 
 def beaufort(wind_mps: float) -> int:

@@ -39,15 +39,10 @@ Samples = NDArray[np.intp]
 
 @dataclass(frozen=True, kw_only=True)
 class NotStandard:
-    """A run that is no standard trial.
+    """A run that is no standard trial."""
 
-    Attributes:
-        name: of the run.
-        reason: one phrase.
-    """
-
-    name: str
-    reason: str
+    name: str  # of the run
+    reason: str  # one phrase
 
 
 Found = Circle | ZigZag | Stop | NotStandard
@@ -106,17 +101,11 @@ def _steered_run(vessel: Vessel, batch: Batch, forward_m: float) -> SteeredRun:
 
 @dataclass(frozen=True, kw_only=True)
 class _Held:
-    """A stretch over which the helm is held.
+    """A stretch over which the helm is held."""
 
-    Attributes:
-        order_s: when the helm was ordered there, or None where the record begins with the helm over.
-        level_rad: the angle held.
-        last: last sample of the stretch.
-    """
-
-    order_s: float | None
-    level_rad: float
-    last: int
+    order_s: float | None  # when the helm was ordered there, or None where the record begins with the helm over
+    level_rad: float  # the angle held
+    last: int  # last sample of the stretch
 
 
 def _held(run: SteeredRun) -> tuple[_Held, ...]:

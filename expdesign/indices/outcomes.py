@@ -30,21 +30,15 @@ ZIGZAGS = (math.radians(10.0), math.radians(20.0))
 
 @dataclass(frozen=True, kw_only=True)
 class StandardResults:
-    """All standard trials of one vessel at one approach speed.
+    """All standard trials of one vessel at one approach speed."""
 
-    Attributes:
-        speed_mps: approach speed.
-        helm: steering actuators, in words.
-        circles, zigzags, stops: the trials, starboard before port.
-        not_run: why a trial could not be run, one sentence each.
-    """
-
-    speed_mps: float
-    helm: str
+    speed_mps: float  # approach speed
+    helm: str  # steering actuators, in words
+    # circles, zigzags, stops: the trials, starboard before port
     circles: tuple[Circle, ...]
     zigzags: tuple[ZigZag, ...]
     stops: tuple[Stop, ...]
-    not_run: tuple[str, ...]
+    not_run: tuple[str, ...]  # why a trial could not be run, one sentence each
 
     @property
     def trials(self) -> tuple[Circle | ZigZag | Stop, ...]:

@@ -20,27 +20,16 @@ Curve = Callable[[float], float]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SteeredRun:
-    """Motion and orders of one run; between samples positions and heading are cubics that fit the velocities.
+    """Motion and orders of one run; between samples positions and heading are cubics that fit the velocities."""
 
-    Attributes:
-        name: for reports.
-        length_m: of the ship.
-        time_s: (k,).
-        pose: (k, 3) midship point north, east [m]; heading [rad], continuous.
-        velocity: (k, 3) over ground, b-frame.
-        helm_rad: (j,) helm angle in the actuators' own sense, each from its sample to the next.
-        drive: (j,) engine order or mean propeller speed, ahead positive, likewise.
-        tolerance_s: of the times of orders: one sample of a record, 0 in a simulation.
-    """
-
-    name: str
-    length_m: float
-    time_s: Array
-    pose: Array
-    velocity: Array
-    helm_rad: Array
-    drive: Array
-    tolerance_s: float
+    name: str  # for reports
+    length_m: float  # of the ship
+    time_s: Array  # (k,)
+    pose: Array  # (k, 3) midship point north, east [m]; heading [rad], continuous
+    velocity: Array  # (k, 3) over ground, b-frame
+    helm_rad: Array  # (j,) helm angle in the actuators' own sense, each from its sample to the next
+    drive: Array  # (j,) engine order or mean propeller speed, ahead positive, likewise
+    tolerance_s: float  # of the times of orders: one sample of a record, 0 in a simulation
 
     def __post_init__(self) -> None:
         seal(self, time_s="k", pose="k 3", velocity="k 3", helm_rad="j", drive="j")

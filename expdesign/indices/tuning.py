@@ -8,13 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        zigzag_deviation_rad: largest deviation of helm and reversals of a 10/10 or 20/20 zig-zag from the nominal
-            angles [rad].
-    """
-
+    # largest deviation of helm and reversals of a 10/10 or 20/20 zig-zag from the nominal angles [rad]
     zigzag_deviation_rad: float = math.radians(2.0)
 
 

@@ -11,105 +11,65 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Circle:
-    """A turning circle; None where the trial ended too early to show it.
+    """A turning circle; None where the trial ended too early to show it."""
 
-    Attributes:
-        name: of the run.
-        side: "starboard" or "port", to which the ship turned.
-        helm_rad: size of the helm, positive.
-        speed_mps: approach speed; None where the record begins later.
-        advance_m: distance along the approach heading from the rudder order to 90 degrees change of heading.
-        transfer_m: distance across it to 90 degrees.
-        tactical_diameter_m: distance across it to 180 degrees.
-        initial_turning_m: distance sailed until the heading has changed by 10 degrees.
-        steady_diameter_m: of the steady turn.
-        current_north_mps, current_east_mps: uniform current, estimated from the turn and subtracted, or None.
-        tolerance_m: of advance and initial turning.
-        remarks: on the approach, the helm, and what is missing.
-    """
-
-    name: str
-    side: str
-    helm_rad: float
-    speed_mps: float | None
-    advance_m: float | None
-    transfer_m: float | None
-    tactical_diameter_m: float | None
-    initial_turning_m: float | None
-    steady_diameter_m: float | None
+    name: str  # of the run
+    side: str  # "starboard" or "port", to which the ship turned
+    helm_rad: float  # size of the helm, positive
+    speed_mps: float | None  # approach speed; None where the record begins later
+    advance_m: float | None  # distance along the approach heading from the rudder order to 90 degrees change of heading
+    transfer_m: float | None  # distance across it to 90 degrees
+    tactical_diameter_m: float | None  # distance across it to 180 degrees
+    initial_turning_m: float | None  # distance sailed until the heading has changed by 10 degrees
+    steady_diameter_m: float | None  # of the steady turn
+    # current_north_mps, current_east_mps: uniform current, estimated from the turn and subtracted, or None
     current_north_mps: float | None = None
     current_east_mps: float | None = None
-    tolerance_m: float = 0.0
-    remarks: tuple[str, ...] = ()
+    tolerance_m: float = 0.0  # of advance and initial turning
+    remarks: tuple[str, ...] = ()  # on the approach, the helm, and what is missing
 
 
 @dataclass(frozen=True, kw_only=True)
 class Execute:
-    """A rudder order of a zig-zag.
+    """A rudder order of a zig-zag."""
 
-    Attributes:
-        time_s: since the start of the run.
-        heading_rad: change of heading from the approach, positive to the side of the first turn.
-        tolerance_rad: of that heading.
-    """
-
-    time_s: float
-    heading_rad: float
-    tolerance_rad: float = 0.0
+    time_s: float  # since the start of the run
+    heading_rad: float  # change of heading from the approach, positive to the side of the first turn
+    tolerance_rad: float = 0.0  # of that heading
 
 
 @dataclass(frozen=True, kw_only=True)
 class ZigZag:
-    """A zig-zag.
+    """A zig-zag."""
 
-    Attributes:
-        name: of the run.
-        side: of the first turn; "" where the record begins later.
-        heading_rad, helm_rad: mean change of heading at which the helm was reversed, and the helm's size, positive.
-        speed_mps: approach speed; None where the record begins later.
-        executes: rudder orders, the first included; where the record begins later, its reversals, with headings from
-            the middle of the swings.
-        overshoots_rad: change of heading from the second, third, ... of `executes` to the largest heading, positive.
-        initial_turning_m: distance sailed from the first execute until the heading has changed by 10 degrees; None
-            where the helm is reversed well before.
-        tolerance_m: of initial turning.
-        remarks: on the approach, the helm, and what is missing.
-    """
-
-    name: str
-    side: str
+    name: str  # of the run
+    side: str  # of the first turn; "" where the record begins later
+    # heading_rad, helm_rad: mean change of heading at which the helm was reversed, and the helm's size, positive
     heading_rad: float
     helm_rad: float
-    speed_mps: float | None
+    speed_mps: float | None  # approach speed; None where the record begins later
+    # rudder orders, the first included; where the record begins later, its reversals, with headings from the middle of
+    # the swings
     executes: tuple[Execute, ...]
+    # change of heading from the second, third, ... of `executes` to the largest heading, positive.
     overshoots_rad: tuple[float, ...]
+    # distance sailed from the first execute until the heading has changed by 10 degrees; None where the helm is
+    # reversed well before
     initial_turning_m: float | None
-    tolerance_m: float = 0.0
-    remarks: tuple[str, ...] = ()
+    tolerance_m: float = 0.0  # of initial turning
+    remarks: tuple[str, ...] = ()  # on the approach, the helm, and what is missing
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A stopping trial.
+    """A stopping trial."""
 
-    Attributes:
-        name: of the run.
-        speed_mps: approach speed.
-        track_reach_m: distance sailed from the order astern until the ship has no headway.
-        head_reach_m: the same along the approach heading.
-        lateral_m: deviation to starboard of the approach heading.
-        heading_change_rad: at the end, positive to starboard.
-        time_s: from the order.
-        tolerance_m: of track reach and head reach.
-        remarks: on the approach.
-    """
-
-    name: str
-    speed_mps: float
-    track_reach_m: float
-    head_reach_m: float
-    lateral_m: float
-    heading_change_rad: float
-    time_s: float
-    tolerance_m: float = 0.0
-    remarks: tuple[str, ...] = ()
+    name: str  # of the run
+    speed_mps: float  # approach speed
+    track_reach_m: float  # distance sailed from the order astern until the ship has no headway
+    head_reach_m: float  # the same along the approach heading
+    lateral_m: float  # deviation to starboard of the approach heading
+    heading_change_rad: float  # at the end, positive to starboard
+    time_s: float  # from the order
+    tolerance_m: float = 0.0  # of track reach and head reach
+    remarks: tuple[str, ...] = ()  # on the approach

@@ -28,19 +28,12 @@ from expdesign.vessel import NUMPY, Vessel
 
 @dataclass(frozen=True, kw_only=True)
 class AugmentedInformation:
-    """A dictionary scored with nuisance regressors.
+    """A dictionary scored with nuisance regressors."""
 
-    Attributes:
-        information: of each primitive, about all columns.
-        parameters: names of all columns: parameters of the ship, then of the disturbances.
-        interest: names of the ship's parameters that are estimated.
-        equations: of all columns.
-    """
-
-    information: tuple[PrimitiveInformation, ...]
-    parameters: tuple[str, ...]
-    interest: tuple[str, ...]
-    equations: tuple[str, ...]
+    information: tuple[PrimitiveInformation, ...]  # of each primitive, about all columns
+    parameters: tuple[str, ...]  # names of all columns: parameters of the ship, then of the disturbances
+    interest: tuple[str, ...]  # names of the ship's parameters that are estimated
+    equations: tuple[str, ...]  # of all columns
 
 
 def score_augmented(

@@ -44,21 +44,13 @@ SINGULAR = 1e12  # condition number above which a trial counts as uninformative
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrialPart:
-    """Consecutive samples of a trial: commands run from a velocity.
+    """Consecutive samples of a trial: commands run from a velocity."""
 
-    Attributes:
-        commands: k samples.
-        velocity: (3,) over ground at the first sample.
-        heading_rad: at the first sample; matters in wind or current.
-        standing: (m,) commands before the first sample; None for those of the first sample.
-        repeats: number of runs, with independent noise; may be a fraction, as an average.
-    """
-
-    commands: Commands
-    velocity: Array
-    heading_rad: float = 0.0
-    standing: Array | None = None
-    repeats: float = 1.0
+    commands: Commands  # k samples
+    velocity: Array  # (3,) over ground at the first sample
+    heading_rad: float = 0.0  # at the first sample; matters in wind or current
+    standing: Array | None = None  # (m,) commands before the first sample; None for those of the first sample
+    repeats: float = 1.0  # number of runs, with independent noise; may be a fraction, as an average
 
     def __post_init__(self) -> None:
         seal(self, velocity="3")

@@ -20,17 +20,11 @@ GRADIENT_AGREEMENT = 0.05  # change of a gradient when the step is halved, relat
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OutcomeGradients:
-    """Outcomes and their gradients.
+    """Outcomes and their gradients."""
 
-    Attributes:
-        names: of the outcomes.
-        values: (o,) at the nominal parameters.
-        gradients: (o, p) derivative by each parameter.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    gradients: Array
+    names: tuple[str, ...]  # of the outcomes
+    values: Array  # (o,) at the nominal parameters
+    gradients: Array  # (o, p) derivative by each parameter
 
     def __post_init__(self) -> None:
         seal(self, values="o", gradients="o p")

@@ -29,23 +29,14 @@ REGRESSORS = ("measured", "simulated")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BatchInformation:
-    """Per-sample moments of one measured batch.
+    """Per-sample moments of one measured batch."""
 
-    Attributes:
-        name: of the batch.
-        seconds: its length [s].
-        samples: number of regression rows.
-        X: (p, p) mean of Phi Z^T.
-        Y: (p, n) mean of Phi.
-        Z: (p, n) mean of the instruments.
-    """
-
-    name: str
-    seconds: float
-    samples: int
-    X: Array
-    Y: Array
-    Z: Array
+    name: str  # of the batch
+    seconds: float  # its length [s]
+    samples: int  # number of regression rows
+    X: Array  # (p, p) mean of Phi Z^T
+    Y: Array  # (p, n) mean of Phi
+    Z: Array  # (p, n) mean of the instruments
 
     def __post_init__(self) -> None:
         seal(self, X="p p", Y="p n", Z="p n")

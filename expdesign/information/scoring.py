@@ -204,18 +204,13 @@ def _groups(primitives: Sequence[Primitive], copies: int) -> Iterator[list[int]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Runs:
-    """Simulated runs: models m, headings h, primitives n, samples k.
+    """Simulated runs: models m, headings h, primitives n, samples k."""
 
-    Attributes:
-        vessel, environment: as given.
-        inputs: (k, inputs, n) mean delivered input of each sample.
-        states: (k, 6, m, h, n) at the start of every command; nan where a run diverges.
-    """
-
+    # vessel, environment: as given
     vessel: Vessel
     environment: Environment
-    inputs: Array
-    states: Array
+    inputs: Array  # (k, inputs, n) mean delivered input of each sample
+    states: Array  # (k, 6, m, h, n) at the start of every command; nan where a run diverges
 
     @staticmethod
     def of(vessel: Vessel, primitives: Sequence[Primitive], parameters: Array, environment: Environment) -> _Runs:

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        headings: evenly spread headings over which information is averaged in wind or current.
-        runs_at_once: runs simulated together, so that their states stay in the processor's cache.
-    """
-
-    headings: int = 8
-    runs_at_once: int = 2048
+    headings: int = 8  # evenly spread headings over which information is averaged in wind or current
+    runs_at_once: int = 2048  # runs simulated together, so that their states stay in the processor's cache
 
 
 TUNING = Tuning()

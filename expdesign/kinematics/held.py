@@ -42,19 +42,12 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """How a signal is read.
+    """How a signal is read."""
 
-    Attributes:
-        interval: between readings [samples], more than 1.
-        interpolated: a straight line is drawn between readings, where others are repeated.
-        even: readings come in even intervals, so that their times are known.
-        changes: number that tells.
-    """
-
-    interval: float
-    interpolated: bool
-    even: bool
-    changes: int
+    interval: float  # between readings [samples], more than 1
+    interpolated: bool  # a straight line is drawn between readings, where others are repeated
+    even: bool  # readings come in even intervals, so that their times are known
+    changes: int  # number that tells
 
 
 def held(values: Array) -> Held | None:

@@ -50,20 +50,14 @@ DEGREE = np.pi / 180.0
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What one comparison of instruments tells.
+    """What one comparison of instruments tells."""
 
-    Attributes:
-        name: of the quantity, as a vessel file calls it where it may stand there.
-        value, std: estimate and standard error, in the unit that the name ends in.
-        rest: root mean square of what the comparison leaves over a window, in the unit of what is compared.
-        text: a sentence.
-    """
-
-    name: str
+    name: str  # of the quantity, as a vessel file calls it where it may stand there
+    # value, std: estimate and standard error, in the unit that the name ends in
     value: float
     std: float
-    rest: float
-    text: str
+    rest: float  # root mean square of what the comparison leaves over a window, in the unit of what is compared
+    text: str  # a sentence
 
 
 def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterator[Finding]:
@@ -125,21 +119,14 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Log:
-    """How positions follow the way that a log tells.
+    """How positions follow the way that a log tells."""
 
-    Attributes:
-        ahead: positions on the way ahead, or on all way where that to the side has the same scale.
-        names: of the other regressors, in order: "drift", "arm", and of "side", "positions", "log" those that differ
-            for certain.
-        sample_s: time between samples.
-        late_s: by which the velocities were late, and were moved before.
-        apart: the same with a scale of sway of its own, which is not certainly another; None where nothing tells.
-    """
-
-    ahead: Relation
+    ahead: Relation  # positions on the way ahead, or on all way where that to the side has the same scale
+    # of the other regressors, in order: "drift", "arm", and of "side", "positions", "log" those that differ for certain
     names: tuple[str, ...]
-    sample_s: float
-    late_s: float = 0.0
+    sample_s: float  # time between samples
+    late_s: float = 0.0  # by which the velocities were late, and were moved before
+    # the same with a scale of sway of its own, which is not certainly another; None where nothing tells
     apart: _Log | None = None
 
     def of(self, name: str) -> tuple[complex, Array]:

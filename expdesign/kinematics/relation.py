@@ -31,27 +31,16 @@ TOLD = 0.02
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Relation:
-    """How y follows x.
+    """How y follows x."""
 
-    Attributes:
-        ratio: a, of y on x.
-        inverse: size of the ratio of x on y, not smaller than |a|.
-        std: standard error of the real part of a, and of its imaginary part.
-        others: (n,) b.
-        others_std: (n, 2) standard errors of their real and imaginary parts.
-        share: of the squares of y, less what z explains, that x explains.
-        rest: root mean square of what is left, in the unit of y.
-        own: share of the squares of x that z does not explain.
-    """
-
-    ratio: complex
-    inverse: float
-    std: tuple[float, float]
-    others: Array
-    others_std: Array
-    share: float
-    rest: float
-    own: float
+    ratio: complex  # a, of y on x
+    inverse: float  # size of the ratio of x on y, not smaller than |a|
+    std: tuple[float, float]  # standard error of the real part of a, and of its imaginary part
+    others: Array  # (n,) b
+    others_std: Array  # (n, 2) standard errors of their real and imaginary parts
+    share: float  # of the squares of y, less what z explains, that x explains
+    rest: float  # root mean square of what is left, in the unit of y
+    own: float  # share of the squares of x that z does not explain
 
     @property
     def size(self) -> float:

@@ -30,43 +30,28 @@ BY_VOLUME = Aim()
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """The best plan with so many loads.
+    """The best plan with so many loads."""
 
-    Attributes:
-        options: places of the loads among the candidates.
-        efficiency: by the criterion, relative to all candidates.
-        smallest: singular value of the relative sensitivity of their equations.
-    """
-
-    options: tuple[int, ...]
-    efficiency: float
-    smallest: float
+    options: tuple[int, ...]  # places of the loads among the candidates
+    efficiency: float  # by the criterion, relative to all candidates
+    smallest: float  # singular value of the relative sensitivity of their equations
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadPlan:
-    """Load cases of a trial.
+    """Load cases of a trial."""
 
-    Attributes:
-        question: that it answers.
-        manoeuvres: names of the manoeuvres, each with a duration of one run [s].
-        steps: from all candidate loads to the fewest that still determine all parameters.
-        chosen: the step that is followed.
-        design: time shares over pairs of its loads and all manoeuvres, loads first, with certificate and whole runs.
-        repeats: (l, q) whole runs at each load of the step.
-        std_before, std_after: (p,) standard deviations of the free parameters, infinite where nothing is known.
-        faintest: the combination with the least information, relative standard deviation 1 / size.
-    """
-
-    question: Question
-    manoeuvres: dict[str, float]
-    steps: tuple[Step, ...]
-    chosen: Step
+    question: Question  # that it answers
+    manoeuvres: dict[str, float]  # names of the manoeuvres, each with a duration of one run [s]
+    steps: tuple[Step, ...]  # from all candidate loads to the fewest that still determine all parameters
+    chosen: Step  # the step that is followed
+    # time shares over pairs of its loads and all manoeuvres, loads first, with certificate and whole runs
     design: DurationDesign
-    repeats: Array
+    repeats: Array  # (l, q) whole runs at each load of the step
+    # std_before, std_after: (p,) standard deviations of the free parameters, infinite where nothing is known
     std_before: Array
     std_after: Array
-    faintest: Direction
+    faintest: Direction  # the combination with the least information, relative standard deviation 1 / size
 
     def __post_init__(self) -> None:
         seal(self, repeats="l q", std_before="p", std_after="p")

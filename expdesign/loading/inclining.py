@@ -29,19 +29,12 @@ def heel_of_shift(*, mass_kg: float, shift_m: float, displacement_kg: float, met
 
 @dataclass(frozen=True, kw_only=True)
 class Inclining:
-    """What a test tells.
+    """What a test tells."""
 
-    Attributes:
-        heel_rad: of the shift.
-        metacentric_height_std_m: of the height from the heel.
-        inertia_kgm2: about the axis, added inertia included.
-        inertia_std_kgm2: from the height and the period; infinite without a decay.
-    """
-
-    heel_rad: float
-    metacentric_height_std_m: float
-    inertia_kgm2: float
-    inertia_std_kgm2: float
+    heel_rad: float  # of the shift
+    metacentric_height_std_m: float  # of the height from the heel
+    inertia_kgm2: float  # about the axis, added inertia included
+    inertia_std_kgm2: float  # from the height and the period; infinite without a decay
 
 
 def inclining(

@@ -33,15 +33,10 @@ RATE, ANGLE, READING = (AUXILIARY.index(name) for name in ("roll_rate_radps", "r
 
 @dataclass(frozen=True, kw_only=True)
 class LoadOption:
-    """A load case that a trial may have.
+    """A load case that a trial may have."""
 
-    Attributes:
-        name: for reports.
-        load: on board; None for the one that is sought.
-    """
-
-    name: str
-    load: Load | None
+    name: str  # for reports
+    load: Load | None  # on board; None for the one that is sought
 
 
 def run_information(vessel: Vessel, theta: Array, option: LoadOption, primitives: Sequence[Primitive]) -> Array:

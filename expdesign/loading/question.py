@@ -23,23 +23,14 @@ WEIGHED = ("m", "z_m")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question:
-    """What is sought, from which ship with which loads.
+    """What is sought, from which ship with which loads."""
 
-    Attributes:
-        vessel: with a pendulum.
-        options: candidate loads, their names once each.
-        free: names of the parameters sought.
-        theta: (9,) parameters, as believed.
-        size: (p,) of each free parameter, positive: its value, or its standard deviation where it is about zero.
-        prior: (p, p) information about relative changes, change over size, before the trial.
-    """
-
-    vessel: Vessel
-    options: tuple[LoadOption, ...]
-    free: tuple[str, ...]
-    theta: Array
-    size: Array
-    prior: Array
+    vessel: Vessel  # with a pendulum
+    options: tuple[LoadOption, ...]  # candidate loads, their names once each
+    free: tuple[str, ...]  # names of the parameters sought
+    theta: Array  # (9,) parameters, as believed
+    size: Array  # (p,) of each free parameter, positive: its value, or its standard deviation where it is about zero
+    prior: Array  # (p, p) information about relative changes, change over size, before the trial
 
     def __post_init__(self) -> None:
         seal(self, theta="9", size="p", prior="p p")

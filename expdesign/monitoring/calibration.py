@@ -39,35 +39,21 @@ STEPS = np.array([-4.0, -2.0, -1.0, 1.0, 2.0])
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration:
-    """What a reference tells of noise, of the unmeasured force and of the ship.
+    """What a reference tells of noise, of the unmeasured force and of the ship."""
 
-    Attributes:
-        std: (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured.
-        force: the unmeasured force.
-        baseline: (m,) differences of the ship from its model in the reference, in sizes of the changes.
-        baseline_std: (m,) their standard errors, all free at once, with a prior of one size.
-        inflation: (m,) variance of sums of scores over that of independent stretches, at least one.
-        rate: (m,) information of a stretch, on average, in inverse squared sizes and after inflation.
-        alike: (m, m) correlation of scores: one where two changes cannot be told apart.
-        stretches: number of stretches of the reference.
-        stretch_s: their length [s].
-        misfit_limit: misfit per measured number beyond which a stretch is not judged.
-        surprise: of a stretch on average, see `force.surprise`: how well the weather is predicted.
-        load: (m,) standard deviation of what a port call may change of the load, in sizes.
-    """
-
+    # (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured
     std: Array
-    force: Force
-    baseline: Array
-    baseline_std: Array
-    inflation: Array
-    rate: Array
-    alike: Array
-    stretches: int
-    stretch_s: float
-    misfit_limit: float
-    surprise: float
-    load: Array
+    force: Force  # the unmeasured force
+    baseline: Array  # (m,) differences of the ship from its model in the reference, in sizes of the changes
+    baseline_std: Array  # (m,) their standard errors, all free at once, with a prior of one size
+    inflation: Array  # (m,) variance of sums of scores over that of independent stretches, at least one
+    rate: Array  # (m,) information of a stretch, on average, in inverse squared sizes and after inflation
+    alike: Array  # (m, m) correlation of scores: one where two changes cannot be told apart
+    stretches: int  # number of stretches of the reference
+    stretch_s: float  # their length [s]
+    misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
+    surprise: float  # of a stretch on average, see `force.surprise`: how well the weather is predicted
+    load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
 
     def __post_init__(self) -> None:
         seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m", load="m")

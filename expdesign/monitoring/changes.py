@@ -20,23 +20,14 @@ EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """One way in which the ship may differ from its model.
+    """One way in which the ship may differ from its model."""
 
-    Attributes:
-        effect: key of an effect of the extended model, e.g. "theta:N_r".
-        size: change that matters, in the effect's unit; CUSUM is tuned to it in both directions.
-        unit: of sizes in words: a divisor and what it gives, e.g. (0.01, "%").
-        words: e.g. "parameter N_r".
-        whole: value of the effect that is the whole term: of a parameter itself; zero where there is no term.
-        load: standard deviation of what another load changes, in sizes; zero where it changes nothing.
-    """
-
-    effect: str
-    size: float
-    unit: tuple[float, str]
-    words: str
-    whole: float = 0.0
-    load: float = 0.0
+    effect: str  # key of an effect of the extended model, e.g. "theta:N_r".
+    size: float  # change that matters, in the effect's unit; CUSUM is tuned to it in both directions
+    unit: tuple[float, str]  # of sizes in words: a divisor and what it gives, e.g. (0.01, "%").
+    words: str  # e.g. "parameter N_r".
+    whole: float = 0.0  # value of the effect that is the whole term: of a parameter itself; zero where there is no term
+    load: float = 0.0  # standard deviation of what another load changes, in sizes; zero where it changes nothing
 
     def in_words(self, value: float, std: float | None = None) -> str:
         """A value in words, e.g. "+12 +- 3 %"."""

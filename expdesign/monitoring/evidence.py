@@ -50,26 +50,17 @@ PER_CURRENT = 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Grams:
-    """Inner products of the sensitivities and the error of w stretches, by channel.
+    """Inner products of the sensitivities and the error of w stretches, by channel."""
 
-    Attributes:
-        time_s: (w,) beginning of each stretch, since the data began [s].
-        duration_s: (w,) measured time in it [s]: `stretch_s`, or less where the data end or pause.
-        products: (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading.
-        counts: (4, w) measured samples.
-        budget: (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of
-            inertia, the acceleration itself; zero for changes that are no term.
-        kind: (w,) number in `KINDS`.
-        stretch_s: length of a whole one [s].
-    """
-
-    time_s: Array
-    duration_s: Array
-    products: Array
-    counts: Array
+    time_s: Array  # (w,) beginning of each stretch, since the data began [s]
+    duration_s: Array  # (w,) measured time in it [s]: `stretch_s`, or less where the data end or pause
+    products: Array  # (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading
+    counts: Array  # (4, w) measured samples
+    # (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of inertia, the
+    # acceleration itself; zero for changes that are no term
     budget: Array
-    kind: NDArray[np.int64]
-    stretch_s: float
+    kind: NDArray[np.int64]  # (w,) number in `KINDS`
+    stretch_s: float  # length of a whole one [s]
 
     def __post_init__(self) -> None:
         seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3")
@@ -241,19 +232,12 @@ def _forces(linear: LinearisedMotion) -> list[Disturbance]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretches:
-    """What w stretches hold, for a known noise and whatever their initial velocities are.
+    """What w stretches hold, for a known noise and whatever their initial velocities are."""
 
-    Attributes:
-        time_s: (w,) beginning of each stretch [s].
-        products: (w, c, c) inner products of the columns X (m), F (q) and e, in standard deviations of the noise.
-        counts: (w,) measured numbers.
-        changes: m.
-    """
-
-    time_s: Array
-    products: Array
-    counts: Array
-    changes: int
+    time_s: Array  # (w,) beginning of each stretch [s]
+    products: Array  # (w, c, c) inner products of the columns X (m), F (q) and e, in standard deviations of the noise
+    counts: Array  # (w,) measured numbers
+    changes: int  # m
 
     def __post_init__(self) -> None:
         seal(self, time_s="w", products="w c c", counts="w")

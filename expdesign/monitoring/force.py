@@ -23,15 +23,10 @@ NO_LOADS = np.array([], dtype=np.int64)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Force:
-    """Covariance of the unmeasured force over time, and of a load.
+    """Covariance of the unmeasured force over time, and of a load."""
 
-    Attributes:
-        variance: (..., 2 q) of the quick processes, then of the slow ones; then (..., l) zeros for the load.
-        time_s: (..., 2 q + l) their correlation times [s]; infinite for the load.
-    """
-
-    variance: Array
-    time_s: Array
+    variance: Array  # (..., 2 q) of the quick processes, then of the slow ones; then (..., l) zeros for the load
+    time_s: Array  # (..., 2 q + l) their correlation times [s]; infinite for the load
 
     def memory(self, gap_s: float) -> Array:
         """(..., 2 q + l) autocorrelation over a time."""
@@ -47,15 +42,10 @@ class Force:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """What is known of force and load at the beginning of a stretch: normal with this mean and covariance.
+    """What is known of force and load at the beginning of a stretch: normal with this mean and covariance."""
 
-    Attributes:
-        mean: (..., n), n = 2 q + l.
-        covariance: (..., n, n).
-    """
-
-    mean: Array
-    covariance: Array
+    mean: Array  # (..., n), n = 2 q + l
+    covariance: Array  # (..., n, n)
 
     @classmethod
     def nothing(cls, force: Force) -> Known:
@@ -66,31 +56,21 @@ class Known:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judged:
-    """A stretch under what was known of the force before it.
+    """A stretch under what was known of the force before it."""
 
-    Attributes:
-        score: (..., m) of every change, were the filter unaware of it until now.
-        information: (..., m, m).
-        by_force: (..., m, n) inner products of the changes' sensitivities with the force's.
-        force_score, force_information: (..., n) and (..., n, n).
-        quadratic: (...) squared prediction error, in standard deviations.
-        grown: (..., n, n) whose determinant is that of the prediction error's covariance, but for a factor that
-            does not depend on the force.
-        gain: (..., n, n) covariance of the force after the stretch.
-        towards: (..., n) by which its mean moves.
-        seen: (n, m) and (n, n), the products of the data alone.
-    """
-
-    score: Array
-    information: Array
-    by_force: Array
+    score: Array  # (..., m) of every change, were the filter unaware of it until now
+    information: Array  # (..., m, m)
+    by_force: Array  # (..., m, n) inner products of the changes' sensitivities with the force's
+    # force_score, force_information: (..., n) and (..., n, n)
     force_score: Array
     force_information: Array
-    quadratic: Array
+    quadratic: Array  # (...) squared prediction error, in standard deviations
+    # (..., n, n) whose determinant is that of the prediction error's covariance, but for a factor that does not depend
+    # on the force
     grown: Array
-    gain: Array
-    towards: Array
-    seen: tuple[Array, Array]
+    gain: Array  # (..., n, n) covariance of the force after the stretch
+    towards: Array  # (..., n) by which its mean moves
+    seen: tuple[Array, Array]  # (n, m) and (n, n), the products of the data alone
 
 
 def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Judged:

@@ -28,56 +28,40 @@ PORT_P = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class RollEvent:
-    """A change of roll.
+    """A change of roll."""
 
-    Attributes:
-        since_s, time_s: begin and end of the piece that told it first [s].
-        after_call: whether a port call came before, so that it is no alarm.
-        settled: whether a whole piece after the change gives the sizes.
-        p_value: chance of as large a difference without a change.
-        causes, sizes, stds, load: of the best explanation, as in `RollChange`; no causes where none is enough.
-        others: causes of explanations that are about as good.
-        values: parameters before.
-        righting_nm: righting moment before and after [N m/rad].
-        mass_kg: of ship and load, before.
-    """
-
+    # since_s, time_s: begin and end of the piece that told it first [s]
     since_s: float
     time_s: float
-    after_call: bool
-    settled: bool
-    p_value: float
+    after_call: bool  # whether a port call came before, so that it is no alarm
+    settled: bool  # whether a whole piece after the change gives the sizes
+    p_value: float  # chance of as large a difference without a change
+    # causes, sizes, stds, load: of the best explanation, as in `RollChange`; no causes where none is enough
     causes: tuple[str, ...]
     sizes: tuple[float, ...]
     stds: tuple[float, ...]
     load: tuple[float, float] | None
-    others: tuple[tuple[str, ...], ...]
-    values: dict[str, float]
-    righting_nm: tuple[float, float]
-    mass_kg: float
+    others: tuple[tuple[str, ...], ...]  # causes of explanations that are about as good
+    values: dict[str, float]  # parameters before
+    righting_nm: tuple[float, float]  # righting moment before and after [N m/rad]
+    mass_kg: float  # of ship and load, before
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollWatch:
-    """What is known of roll, from piece to piece.
+    """What is known of roll, from piece to piece."""
 
-    Attributes:
-        free: names of the parameters that are estimated from pieces.
-        mean, covariance: (p,), (p, p) of the reference; none before the first piece.
-        called: whether a port call came after the last piece.
-        judged_s, left_out_s: of the data, judged or not [s]; learnt_s, of the references.
-        reason: why the last piece was left out that was.
-        events: so far; of the last one, if it is not settled, the reference still is the one before.
-    """
-
-    free: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()  # names of the parameters that are estimated from pieces
+    # mean, covariance: (p,), (p, p) of the reference; none before the first piece
     mean: Array | None = None
     covariance: Array | None = None
-    called: bool = False
+    called: bool = False  # whether a port call came after the last piece
+    # judged_s, left_out_s: of the data, judged or not [s]; learnt_s, of the references
     judged_s: float = 0.0
     left_out_s: float = 0.0
     learnt_s: float = 0.0
-    reason: str = ""
+    reason: str = ""  # why the last piece was left out that was
+    # so far; of the last one, if it is not settled, the reference still is the one before
     events: tuple[RollEvent, ...] = ()
 
     @property

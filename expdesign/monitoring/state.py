@@ -15,54 +15,34 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Alarm:
-    """A change that was noticed.
+    """A change that was noticed."""
 
-    Attributes:
-        time_s: when the sum passed its threshold [s].
-        since_s: when that sum began, the estimate of when the change happened [s].
-        statistic: the sum, a log-likelihood ratio, when the alarm was raised.
-        change: number of the change that explains the data since then best.
-        value, std: its estimate in sizes, and the standard error.
-        as_likely: numbers of other changes that explain them as well, best first.
-        unexplained: log-likelihood that all changes together gain beyond the best one.
-        named: the change was named, and its size is being refined.
-        settled: its size, too, is as sure as it is going to be, and the watch goes on from the changed ship.
-        judged_s: end of the data that the estimate is from [s].
-    """
-
-    time_s: float
-    since_s: float
-    statistic: float
-    change: int
+    time_s: float  # when the sum passed its threshold [s]
+    since_s: float  # when that sum began, the estimate of when the change happened [s]
+    statistic: float  # the sum, a log-likelihood ratio, when the alarm was raised
+    change: int  # number of the change that explains the data since then best
+    # value, std: its estimate in sizes, and the standard error
     value: float = 0.0
     std: float = 0.0
-    as_likely: tuple[int, ...] = ()
-    unexplained: float = 0.0
-    named: bool = False
-    settled: bool = False
-    judged_s: float = 0.0
+    as_likely: tuple[int, ...] = ()  # numbers of other changes that explain them as well, best first
+    unexplained: float = 0.0  # log-likelihood that all changes together gain beyond the best one
+    named: bool = False  # the change was named, and its size is being refined
+    settled: bool = False  # its size, too, is as sure as it is going to be, and the watch goes on from the changed ship
+    judged_s: float = 0.0  # end of the data that the estimate is from [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sums:
-    """What was added up since n beginnings.
+    """What was added up since n beginnings."""
 
-    Attributes:
-        since_s: (n,) the beginnings [s].
-        taken: (n, f, m) what the filter has taken of each change for the unmeasured force and the load.
-        score, information: (n, m) and (n, m, m).
-        stretches: (n,) that were added.
-        surprise: (n,) sums of `force.surprise`, in that of a stretch of the reference.
-        weather: (n,) `State.weather` as they began.
-    """
-
-    since_s: Array
-    taken: Array
+    since_s: Array  # (n,) the beginnings [s]
+    taken: Array  # (n, f, m) what the filter has taken of each change for the unmeasured force and the load
+    # score, information: (n, m) and (n, m, m)
     score: Array
     information: Array
-    stretches: Array
-    surprise: Array
-    weather: Array
+    stretches: Array  # (n,) that were added
+    surprise: Array  # (n,) sums of `force.surprise`, in that of a stretch of the reference
+    weather: Array  # (n,) `State.weather` as they began
 
     @property
     def count(self) -> int:
@@ -137,54 +117,34 @@ class Sums:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Load:
-    """What the ship carries since a port call, or since the watch began.
+    """What the ship carries since a port call, or since the watch began."""
 
-    Attributes:
-        since_s: end of the port call [s].
-        stay_s: time in port [s]; zero where the watch began.
-        judged: stretches since then.
-        rounds: how often it was taken for the ship's.
-        taken: (m,) changes that were, in sizes, less what the filter held before the call.
-    """
-
-    since_s: float
-    stay_s: float
-    judged: int
-    rounds: int
-    taken: Array
+    since_s: float  # end of the port call [s]
+    stay_s: float  # time in port [s]; zero where the watch began
+    judged: int  # stretches since then
+    rounds: int  # how often it was taken for the ship's
+    taken: Array  # (m,) changes that were, in sizes, less what the filter held before the call
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Call:
-    """A port call whose load was estimated.
+    """A port call whose load was estimated."""
 
-    Attributes:
-        time_s: its end [s].
-        stay_s: its length [s].
-        value, std: (m,) what it changed, in sizes, and the standard errors.
-    """
-
-    time_s: float
-    stay_s: float
+    time_s: float  # its end [s]
+    stay_s: float  # its length [s]
+    # value, std: (m,) what it changed, in sizes, and the standard errors
     value: Array
     std: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Budget:
-    """What terms contributed and what was told, by kind of stretch.
+    """What terms contributed and what was told, by kind of stretch."""
 
-    Attributes:
-        stretches: (k,) that were judged or left out for their weather, for each of `KINDS`.
-        duration_s: (k,) of them [s].
-        terms: (k, m, 3) sums of their `Grams.budget`.
-        information: (k, m) sums of the information about every change, in inverse squared sizes.
-    """
-
-    stretches: Array
-    duration_s: Array
-    terms: Array
-    information: Array
+    stretches: Array  # (k,) that were judged or left out for their weather, for each of `KINDS`
+    duration_s: Array  # (k,) of them [s]
+    terms: Array  # (k, m, 3) sums of their `Grams.budget`
+    information: Array  # (k, m) sums of the information about every change, in inverse squared sizes
 
     @classmethod
     def begun(cls, changes: int) -> Budget:
@@ -208,45 +168,31 @@ class Budget:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """State of a watch between two stretches.
+    """State of a watch between two stretches."""
 
-    Attributes:
-        until_s: end of the last stretch that was looked at [s].
-        known: of the unmeasured force and the load, then.
-        ratios: (2 m,) sums of log-likelihood ratios, of increases and then of decreases.
-        sums: since they began, 2 m of them.
-        shift: (m,) changes of the ship that were found, in sizes; before: the same before the last alarm.
-        whole: sums since the watch began, or since the last change was settled.
-        load: since the last port call; calls: those before, the latest of them.
-        budget: of the stretches judged.
-        alarm: the alarm that is not yet settled, or None; pending: sums since its change.
-        judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
-            beyond the reference [s].
-        beyond_s: the latest of that left out for its weather; a change that is noticed may explain it yet [s].
-        undecided_s: how long the largest sum has been above the threshold and too short to be judged [s].
-        brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged.
-        weather: of late, the `surprise` of stretches in that of the reference.
-    """
-
-    until_s: float
-    known: Known
-    ratios: Array
-    sums: Sums
-    shift: Array
+    until_s: float  # end of the last stretch that was looked at [s]
+    known: Known  # of the unmeasured force and the load, then
+    ratios: Array  # (2 m,) sums of log-likelihood ratios, of increases and then of decreases
+    sums: Sums  # since they began, 2 m of them
+    shift: Array  # (m,) changes of the ship that were found, in sizes; before: the same before the last alarm
     before: Array
-    whole: Sums
-    load: Load
-    budget: Budget
+    whole: Sums  # sums since the watch began, or since the last change was settled
+    load: Load  # since the last port call; calls: those before, the latest of them
+    budget: Budget  # of the stretches judged
     calls: tuple[Call, ...] = ()
-    alarm: Alarm | None = None
+    alarm: Alarm | None = None  # the alarm that is not yet settled, or None; pending: sums since its change
     pending: Sums | None = None
+    # judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
+    # beyond the reference [s]
     judged_s: float = 0.0
     left_out_s: float = 0.0
+    # the latest of that left out for its weather; a change that is noticed may explain it yet [s]
     beyond_s: float = 0.0
-    undecided_s: float = 0.0
+    undecided_s: float = 0.0  # how long the largest sum has been above the threshold and too short to be judged [s]
+    # brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged
     brief: int = 0
     by_weather: int = 0
-    weather: float = 1.0
+    weather: float = 1.0  # of late, the `surprise` of stretches in that of the reference
 
     @property
     def largest(self) -> Sums:
@@ -272,30 +218,19 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Rules:
-    """When an alarm is raised, and what counts as a port call.
+    """When an alarm is raised, and what counts as a port call."""
 
-    Attributes:
-        limit: threshold of the sums.
-        port_s: time without a stretch under way from which the ship may carry another load [s].
-    """
-
-    limit: float
-    port_s: float = math.inf
+    limit: float  # threshold of the sums
+    port_s: float = math.inf  # time without a stretch under way from which the ship may carry another load [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """Outcome of one stretch.
+    """Outcome of one stretch."""
 
-    Attributes:
-        time_s: its end [s].
-        statistic: the largest of all sums.
-        change: whose.
-        compared: whether it is compared with the threshold: not where it is above and too short to tell a change of
-            the ship from weather, or where weather explains it.
-    """
-
-    time_s: float
-    statistic: float
-    change: int
+    time_s: float  # its end [s]
+    statistic: float  # the largest of all sums
+    change: int  # whose
+    # whether it is compared with the threshold: not where it is above and too short to tell a change of the ship from
+    # weather, or where weather explains it
     compared: bool = True

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Sizes, lengths and limits.
+    """Sizes, lengths and limits."""
 
-    Attributes:
-        known_within: a change is watched for where its size is so many standard errors of the reference.
-        relative_size: change of a parameter, a gain or an inertia that matters, as a share.
-    """
-
-    known_within: float = 6.0
-    relative_size: float = 0.1
+    known_within: float = 6.0  # a change is watched for where its size is so many standard errors of the reference
+    relative_size: float = 0.1  # change of a parameter, a gain or an inertia that matters, as a share
 
 
 TUNING = Tuning()

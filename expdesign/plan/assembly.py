@@ -59,15 +59,10 @@ MORE_CORNERS = ((1.0, 700), (16.0, 12000))  # the same, where no path was found 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanRoom:
-    """What a plan is made in.
+    """What a plan is made in."""
 
-    Attributes:
-        water: that legs keep to.
-        space: that runs are placed in.
-    """
-
-    water: LegWater
-    space: SearchSpace
+    water: LegWater  # that legs keep to
+    space: SearchSpace  # that runs are placed in
 
 
 class Phases(NamedTuple):

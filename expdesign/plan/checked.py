@@ -34,22 +34,15 @@ LATENESS_STREAM, LATENESS_TRIALS = 2, 60
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Refused:
-    """A plan that is too risky.
+    """A plan that is too risky."""
 
-    Attributes:
-        sailed: commands, motion and legs.
-        risk, trials: by drawn trials.
-        failed: why it is refused.
-        water: that legs of it keep to.
-        spent_s: counted work that it took.
-    """
-
-    sailed: SailedTrial
+    sailed: SailedTrial  # commands, motion and legs
+    # risk, trials: by drawn trials
     risk: RiskEstimate
     trials: Trials
-    failed: str
-    water: LegWater
-    spent_s: float
+    failed: str  # why it is refused
+    water: LegWater  # that legs of it keep to
+    spent_s: float  # counted work that it took
 
     @property
     def place(self) -> Array | None:

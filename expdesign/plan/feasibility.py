@@ -36,15 +36,10 @@ LEG_S = 40.0  # work budget of one leg [s]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """Where a run has room.
+    """Where a run has room."""
 
-    Attributes:
-        pose: (3,) a start pose with room for the run, or None where none was found.
-        impossible: whether there surely is none.
-    """
-
-    pose: Array | None = None
-    impossible: bool = False
+    pose: Array | None = None  # (3,) a start pose with room for the run, or None where none was found
+    impossible: bool = False  # whether there surely is none
 
 
 def place_of(space: RunSpace, index: int) -> Fit:

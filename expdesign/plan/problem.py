@@ -17,28 +17,22 @@ from expdesign.vessel import NUMPY, Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanProblem:
-    """A trial to be planned.
+    """A trial to be planned."""
 
-    Attributes:
-        vessel, area, environment, settings: who, where, in what weather, with which settings.
-        primitives: of the dictionary, in the design's order.
-        design: gives the number of runs of each.
-        start, goal: (3,) poses; the ship ends at rest through the water.
-        seed: of everything drawn.
-        expected: whether plans are compared by their expected time, go-arounds included, where the ship has a rule.
-        under_way: how the ship moves at the start; None where it is at rest through the water there.
-    """
-
+    # vessel, area, environment, settings: who, where, in what weather, with which settings
     vessel: Vessel
     area: SeaArea
     environment: Environment
     settings: PlanSettings
-    primitives: tuple[Primitive, ...]
-    design: DurationDesign
+    primitives: tuple[Primitive, ...]  # of the dictionary, in the design's order
+    design: DurationDesign  # gives the number of runs of each
+    # start, goal: (3,) poses; the ship ends at rest through the water
     start: Array
     goal: Array
-    seed: int = 0
+    seed: int = 0  # of everything drawn
+    # whether plans are compared by their expected time, go-arounds included, where the ship has a rule
     expected: bool = False
+    # how the ship moves at the start; None where it is at rest through the water there
     under_way: UnderWay | None = None
 
     def __post_init__(self) -> None:

@@ -39,19 +39,12 @@ CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is st
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegAhead:
-    """A leg found ahead.
+    """A leg found ahead."""
 
-    Attributes:
-        task: as it was expected.
-        commands: (k, m), or None where there is no leg.
-        source: what found its path.
-        spent_s: work that it took.
-    """
-
-    task: LegTask
-    commands: Array | None
-    source: str
-    spent_s: float
+    task: LegTask  # as it was expected
+    commands: Array | None  # (k, m), or None where there is no leg
+    source: str  # what found its path
+    spent_s: float  # work that it took
 
     def fitted(self, task: LegTask, water: LegWater) -> Array | None:
         """The commands for the task as it has become, azimuths shifted by whole turns; None where they miss its end."""
@@ -244,24 +237,17 @@ class _Failures:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Voyage:
-    """Legs and runs sailed one after the other.
+    """Legs and runs sailed one after the other."""
 
-    Attributes:
-        problem, water, stated, budget: as `sail_all` takes them.
-        planner: finds legs.
-        known: legs found so far; grows.
-        placed: where runs sailed so far were placed; grows.
-        line: what has been sailed; grows.
-    """
-
+    # problem, water, stated, budget: as `sail_all` takes them
     problem: PlanProblem
     water: LegWater
     stated: LegWater
-    planner: LocalPlanner
+    planner: LocalPlanner  # finds legs
     budget: WorkBudget
-    known: KnownLegs
-    placed: list[Placement] = field(default_factory=list)
-    line: Timeline = field(init=False)
+    known: KnownLegs  # legs found so far; grows
+    placed: list[Placement] = field(default_factory=list)  # where runs sailed so far were placed; grows
+    line: Timeline = field(init=False)  # what has been sailed; grows
 
     def __post_init__(self) -> None:
         problem = self.problem

@@ -164,31 +164,21 @@ def _budget(problem: PlanProblem) -> WorkBudget:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Draft:
-    """A trial as sailed by the planner, before verification, risk and bound.
+    """A trial as sailed by the planner, before verification, risk and bound."""
 
-    Attributes:
-        area: part of the chart that it is planned in.
-        water, room: what legs and runs keep to, as stated and as planned with.
-        spent_s: counted work.
-        sailed: commands, motion and legs.
-        direct_s: time of the shortest path from start to goal at transit speed [s].
-        transit_mps: that speed [m/s].
-        made_good_m: (legs,) by how much each run or leg shortens the way to the goal.
-        late_s: (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s];
-            zero where it is not known.
-        known: legs found for it, which a like trial need not seek again.
-    """
-
-    area: SeaArea
+    area: SeaArea  # part of the chart that it is planned in
+    # water, room: what legs and runs keep to, as stated and as planned with
     water: LegWater
     room: PlanRoom
-    spent_s: float
-    sailed: SailedTrial
-    direct_s: float
-    transit_mps: float
-    made_good_m: Array
+    spent_s: float  # counted work
+    sailed: SailedTrial  # commands, motion and legs
+    direct_s: float  # time of the shortest path from start to goal at transit speed [s]
+    transit_mps: float  # that speed [m/s]
+    made_good_m: Array  # (legs,) by how much each run or leg shortens the way to the goal
+    # (legs,) by how much longer than planned drawn trials take on each, on average, go-arounds included [s]; zero where
+    # it is not known
     late_s: Array
-    known: KnownLegs
+    known: KnownLegs  # legs found for it, which a like trial need not seek again
 
     def __post_init__(self) -> None:
         seal(self, made_good_m="legs", late_s="legs")

@@ -24,17 +24,11 @@ class SailedStretch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
-    """The trial so far.
+    """The trial so far."""
 
-    Attributes:
-        begin: (6,) state before the first stretch.
-        begin_inputs: (m,) commands standing then.
-        stretches: in time order; the only part that grows.
-    """
-
-    begin: Array
-    begin_inputs: Array
-    stretches: list[SailedStretch] = field(default_factory=list)
+    begin: Array  # (6,) state before the first stretch
+    begin_inputs: Array  # (m,) commands standing then
+    stretches: list[SailedStretch] = field(default_factory=list)  # in time order; the only part that grows
 
     @property
     def state(self) -> Array:

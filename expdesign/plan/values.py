@@ -18,47 +18,36 @@ PathsName = Literal["ompl", "visibility"]
 
 @dataclass(frozen=True, kw_only=True)
 class PlanSettings:
-    """Settings of the plan.
+    """Settings of the plan."""
 
-    Attributes:
-        clearance_m: least distance from the hull to anything forbidden [m].
-        confidence: share of drawn trials that must stay in allowed water from start to goal, between 0 and 1.
-        aborted_most: share of drawn trials that may be aborted in a plan that counts as verified.
-        time_budget_s: for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs
-            cost more [s]. Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a
-            search that is stuck ends after five times the budget. A plan whose drawn trials leave the water is made
-            anew once, and a second time if the work counted so far suggests that this ends within twice the budget.
-        transit_speed_mps: speed of repositioning legs, or None for nine tenths of what the actuators allow.
-        turning_radius_m: of repositioning legs, or None for what the vessel model allows.
-        planner: name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`.
-        lattice_spacing_m: distance between the cells of the lattice planner, or None for one that suits the ship.
-        draft: whether one placing of the runs and the check of the nominal track are enough; no key of a file.
-        paths: what finds the paths of legs that bend, of ships that turn on the spot: OMPL, or the visibility graph.
-    """
-
-    clearance_m: float = 20.0
+    clearance_m: float = 20.0  # least distance from the hull to anything forbidden [m]
+    # share of drawn trials that must stay in allowed water from start to goal, between 0 and 1
     confidence: float = 0.95
-    aborted_most: float = 0.1
+    aborted_most: float = 0.1  # share of drawn trials that may be aborted in a plan that counts as verified
+    # for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs cost more [s].
+    # Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a search that is stuck
+    # ends after five times the budget. A plan whose drawn trials leave the water is made anew once, and a second time
+    # if the work counted so far suggests that this ends within twice the budget.
     time_budget_s: float = 60.0
+    # speed of repositioning legs, or None for nine tenths of what the actuators allow
     transit_speed_mps: float | None = None
-    turning_radius_m: float | None = None
+    turning_radius_m: float | None = None  # of repositioning legs, or None for what the vessel model allows
+    # name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`
     planner: PlannerName = "beam"
+    # distance between the cells of the lattice planner, or None for one that suits the ship
     lattice_spacing_m: float | None = None
+    # whether one placing of the runs and the check of the nominal track are enough; no key of a file
     draft: bool = False
+    # what finds the paths of legs that bend, of ships that turn on the spot: OMPL, or the visibility graph
     paths: PathsName = "ompl"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UnderWay:
-    """The motion with which a plan begins.
+    """The motion with which a plan begins."""
 
-    Attributes:
-        velocity: (3,) surge and sway over ground m/s, yaw rate rad/s.
-        inputs: (m,) commands standing, which the actuators deliver.
-    """
-
-    velocity: Array
-    inputs: Array
+    velocity: Array  # (3,) surge and sway over ground m/s, yaw rate rad/s
+    inputs: Array  # (m,) commands standing, which the actuators deliver
 
     def __post_init__(self) -> None:
         seal(self, velocity="3", inputs="m")
@@ -66,20 +55,13 @@ class UnderWay:
 
 @dataclass(frozen=True, kw_only=True)
 class Leg:
-    """One stretch of the plan; sample indices point into the plan's commands and trajectory.
+    """One stretch of the plan; sample indices point into the plan's commands and trajectory."""
 
-    Attributes:
-        kind: "primitive" or "reposition".
-        name: of the primitive, or what the repositioning leads to.
-        first: index of its first command; the trajectory sample of the same index is its start state.
-        last: index of the trajectory sample at its end, which is the next leg's first.
-        path: where the path of a repositioning leg comes from, as `expdesign.plan.legs.LegPath`; "" where unknown.
-    """
-
-    kind: str
-    name: str
-    first: int
-    last: int
+    kind: str  # "primitive" or "reposition"
+    name: str  # of the primitive, or what the repositioning leads to
+    first: int  # index of its first command; the trajectory sample of the same index is its start state
+    last: int  # index of the trajectory sample at its end, which is the next leg's first
+    # where the path of a repositioning leg comes from, as `expdesign.plan.legs.LegPath`; "" where unknown
     path: str = ""
 
 
@@ -89,19 +71,13 @@ class LatticeProof:
 
     Costs are seconds of repositioning by the rule of the lattice. The bound says nothing of plans whose runs begin at
     other places or headings.
-
-    Attributes:
-        spacing_m: between cells.
-        headings: of a cell.
-        cost_s: of the plan found for the whole trial.
-        lower_bound_s: no plan on the lattice costs less.
-        refused: places of it that legs or runs could not be sailed at, so that the rest was placed anew from there.
     """
 
-    spacing_m: float
-    headings: int
-    cost_s: float
-    lower_bound_s: float
+    spacing_m: float  # between cells
+    headings: int  # of a cell
+    cost_s: float  # of the plan found for the whole trial
+    lower_bound_s: float  # no plan on the lattice costs less
+    # places of it that legs or runs could not be sailed at, so that the rest was placed anew from there
     refused: int = 0
 
     @property
@@ -112,22 +88,15 @@ class LatticeProof:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedTrial:
-    """A trial as planned: commands, the motion they give, and the legs in it.
+    """A trial as planned: commands, the motion they give, and the legs in it."""
 
-    Attributes:
-        commands: (k, m) actuator commands from start to goal.
-        trajectory: k + 1 samples.
-        legs: in time order, without gaps.
-        lattice: proof of the lattice planner, or None for other planners.
-        standing: (m,) commands before the first, which the actuators deliver as the trial begins; None for zeros.
-        placements: of the runs, where the search put them; they begin there up to what a leg may miss its end by.
-    """
-
-    commands: Commands
-    trajectory: Trajectory
-    legs: tuple[Leg, ...]
-    lattice: LatticeProof | None = None
+    commands: Commands  # (k, m) actuator commands from start to goal
+    trajectory: Trajectory  # k + 1 samples
+    legs: tuple[Leg, ...]  # in time order, without gaps
+    lattice: LatticeProof | None = None  # proof of the lattice planner, or None for other planners
+    # (m,) commands before the first, which the actuators deliver as the trial begins; None for zeros
     standing: Array | None = None
+    # of the runs, where the search put them; they begin there up to what a leg may miss its end by
     placements: tuple[Placement, ...] = ()
 
     @property
@@ -152,22 +121,14 @@ class SailedTrial:
 
 @dataclass(frozen=True, kw_only=True)
 class Verification:
-    """What the independent check of a plan found.
+    """What the independent check of a plan found."""
 
-    Attributes:
-        clearance_min_m: least distance from the hull to forbidden water over the whole track [m].
-        clearance_time_s: when [s].
-        reproduction_error_m: largest distance between the track and the re-simulated commands [m].
-        limit_excess: largest violation of an actuator limit or rate, relative to its range.
-        problems: one sentence for each failed check; empty when the plan passes.
-        heel_max_rad: largest roll angle of the re-simulated commands, in still water; None without [roll].
-    """
-
-    clearance_min_m: float
-    clearance_time_s: float
-    reproduction_error_m: float
-    limit_excess: float
-    problems: tuple[str, ...]
+    clearance_min_m: float  # least distance from the hull to forbidden water over the whole track [m]
+    clearance_time_s: float  # when [s]
+    reproduction_error_m: float  # largest distance between the track and the re-simulated commands [m]
+    limit_excess: float  # largest violation of an actuator limit or rate, relative to its range
+    problems: tuple[str, ...]  # one sentence for each failed check; empty when the plan passes
+    # largest roll angle of the re-simulated commands, in still water; None without [roll]
     heel_max_rad: float | None = None
 
     @property
@@ -178,22 +139,18 @@ class Verification:
 
 @dataclass(frozen=True, kw_only=True)
 class LegOutcome:
-    """What drawn trials did on one leg.
+    """What drawn trials did on one leg."""
 
-    Attributes:
-        left, aborted: shares of all trials in which the hull left allowed water here, or which were aborted here,
-            before the run that follows.
-        go_arounds: mean number of go-arounds for the run that follows, over the ships that sailed the leg.
-        median_s, most_s: median and 95th percentile of the time it took [s].
-        position_m, speed_mps: distance from the planned start, and difference from the planned velocity over ground,
-            within which a run begins.
-    """
-
+    # left, aborted: shares of all trials in which the hull left allowed water here, or which were aborted here, before
+    # the run that follows
     left: float
     aborted: float
-    go_arounds: float
+    go_arounds: float  # mean number of go-arounds for the run that follows, over the ships that sailed the leg
+    # median_s, most_s: median and 95th percentile of the time it took [s]
     median_s: float
     most_s: float
+    # position_m, speed_mps: distance from the planned start, and difference from the planned velocity over ground,
+    # within which a run begins
     position_m: float
     speed_mps: float
 
@@ -203,33 +160,23 @@ class RiskEstimate:
     """Monte Carlo estimate of a plan's risk: whole trials of drawn ships in drawn weather.
 
     They are sailed by the procedure of `plan.monte_carlo.procedure`.
-
-    Attributes:
-        trials: how many.
-        left: share in which the hull left allowed water, on a run or on a leg.
-        left_most: the share is below this with 95 % confidence (Clopper and Pearson 1934).
-        aborted: share aborted in allowed water because a run could not be begun within tolerance.
-        aborted_most: the share that may be.
-        reasons: one sentence for each leg on which trials were aborted, most first.
-        extra_median_s, extra_most_s: median and 95th percentile of the time beyond the plan's, over the trials that
-            reached the goal [s]; nan when none did.
-        go_arounds: largest number of go-arounds for one run.
-        heading_rad, yaw_rate_radps: tolerances within which runs begin, besides those of each leg.
-        legs: what happened on each.
     """
 
-    trials: int
-    left: float
-    left_most: float
-    aborted: float
-    reasons: tuple[str, ...]
+    trials: int  # how many
+    left: float  # share in which the hull left allowed water, on a run or on a leg
+    left_most: float  # the share is below this with 95 % confidence (Clopper and Pearson 1934)
+    aborted: float  # share aborted in allowed water because a run could not be begun within tolerance
+    reasons: tuple[str, ...]  # one sentence for each leg on which trials were aborted, most first
+    # extra_median_s, extra_most_s: median and 95th percentile of the time beyond the plan's, over the trials that
+    # reached the goal [s]; nan when none did
     extra_median_s: float
     extra_most_s: float
-    go_arounds: int
+    go_arounds: int  # largest number of go-arounds for one run
+    # heading_rad, yaw_rate_radps: tolerances within which runs begin, besides those of each leg
     heading_rad: float
     yaw_rate_radps: float
-    legs: tuple[LegOutcome, ...]
-    aborted_most: float = PlanSettings.aborted_most
+    legs: tuple[LegOutcome, ...]  # what happened on each
+    aborted_most: float = PlanSettings.aborted_most  # the share that may be
 
     @property
     def error(self) -> float:
@@ -253,58 +200,40 @@ class RiskEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class DayLength:
-    """Everything between start and goal [s].
+    """Everything between start and goal [s]."""
 
-    Attributes:
-        planned_s: by the plan.
-        median_s, most_s: median and 95th percentile of the drawn trials that reached the goal; nan without any.
-    """
-
-    planned_s: float
+    planned_s: float  # by the plan
+    # median_s, most_s: median and 95th percentile of the drawn trials that reached the goal; nan without any
     median_s: float
     most_s: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
-    """One continuous trial from start to goal.
+    """One continuous trial from start to goal."""
 
-    Attributes:
-        area: the sea area, its frame included.
-        commands: (k, m) actuator commands from start to goal.
-        trajectory: k + 1 samples.
-        legs: in time order, without gaps.
-        reposition_bound_s: no plan with these runs, and legs no faster through water than transit speed, repositions in
-            less time [s]; proved except for the quantities that `expdesign.plan.bounds.repositioning` estimates; 0 of a
-            draft.
-        leave_water_probability: chance that the hull leaves allowed water in the trial as it is sailed, by
-            `risk`, or None if not computed.
-        leave_water_by_leg: the same for each leg, or () if not computed.
-        design_efficiency_realised: efficiency of the whole trajectory's information, by the design's criterion, against
-            the optimal design's in the time asked for; None where the track alone does not determine it.
-        verification: what the independent check found.
-        design_efficiency_placed: as realised, of the runs alone, with the headings in wind and the entries they got.
-        risk: what drawn trials of the plan came to; None if not computed.
-        lattice: proof of the lattice planner, or None for other planners.
-        standing: (m,) commands before the first, which the actuators deliver as the plan begins; None for a plan that
-            begins at rest with all of them zero.
-        draft: whether no trials were drawn as only a draft was asked for, which nobody may sail.
-    """
-
-    area: SeaArea
-    commands: Commands
-    trajectory: Trajectory
-    legs: tuple[Leg, ...]
+    area: SeaArea  # the sea area, its frame included
+    commands: Commands  # (k, m) actuator commands from start to goal
+    trajectory: Trajectory  # k + 1 samples
+    legs: tuple[Leg, ...]  # in time order, without gaps
+    # no plan with these runs, and legs no faster through water than transit speed, repositions in less time [s]; proved
+    # except for the quantities that `expdesign.plan.bounds.repositioning` estimates; 0 of a draft
     reposition_bound_s: float
+    # chance that the hull leaves allowed water in the trial as it is sailed, by `risk`, or None if not computed
     leave_water_probability: float | None
+    # efficiency of the whole trajectory's information, by the design's criterion, against the optimal design's in the
+    # time asked for; None where the track alone does not determine it
     design_efficiency_realised: float | None
-    verification: Verification
-    leave_water_by_leg: tuple[float | None, ...] = ()
+    verification: Verification  # what the independent check found
+    leave_water_by_leg: tuple[float | None, ...] = ()  # the same for each leg, or () if not computed
+    # as realised, of the runs alone, with the headings in wind and the entries they got
     design_efficiency_placed: float | None = None
-    risk: RiskEstimate | None = None
-    lattice: LatticeProof | None = None
+    risk: RiskEstimate | None = None  # what drawn trials of the plan came to; None if not computed
+    lattice: LatticeProof | None = None  # proof of the lattice planner, or None for other planners
+    # (m,) commands before the first, which the actuators deliver as the plan begins; None for a plan that begins at
+    # rest with all of them zero
     standing: Array | None = None
-    draft: bool = False
+    draft: bool = False  # whether no trials were drawn as only a draft was asked for, which nobody may sail
 
     @property
     def verified(self) -> bool:
@@ -363,15 +292,10 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placement:
-    """Where one run starts.
+    """Where one run starts."""
 
-    Attributes:
-        primitive: name.
-        pose: (3,) start pose in the n-frame.
-    """
-
-    primitive: str
-    pose: Array
+    primitive: str  # name
+    pose: Array  # (3,) start pose in the n-frame
 
     def __post_init__(self) -> None:
         seal(self, pose="3")
@@ -379,14 +303,8 @@ class Placement:
 
 @dataclass(frozen=True, kw_only=True)
 class Placements:
-    """What a search for places finds.
+    """What a search for places finds."""
 
-    Attributes:
-        runs: where each begins, in the order in which they are to be done.
-        work_s: work counted for the search, if it counts any [s].
-        lattice: proof of the lattice planner.
-    """
-
-    runs: tuple[Placement, ...]
-    work_s: float = 0.0
-    lattice: LatticeProof | None = None
+    runs: tuple[Placement, ...]  # where each begins, in the order in which they are to be done
+    work_s: float = 0.0  # work counted for the search, if it counts any [s]
+    lattice: LatticeProof | None = None  # proof of the lattice planner

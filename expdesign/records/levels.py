@@ -19,16 +19,11 @@ NUMBER = "step"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Levels:
-    """Rows of commands.
+    """Rows of commands."""
 
-    Attributes:
-        values: (k, m) in the order of the inputs asked for, in SI units.
-        time_s: (k,) of the rows [s], None for a list without times.
-        numbers: of the step that each row is, None where its cell is empty; None for a list without such a column.
-    """
-
-    values: Array
-    time_s: Array | None = None
+    values: Array  # (k, m) in the order of the inputs asked for, in SI units
+    time_s: Array | None = None  # (k,) of the rows [s], None for a list without times
+    # of the step that each row is, None where its cell is empty; None for a list without such a column
     numbers: tuple[int | None, ...] | None = None
 
     def __post_init__(self) -> None:

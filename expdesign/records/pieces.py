@@ -38,19 +38,12 @@ OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "dep
 
 @dataclass(frozen=True)
 class Taken:
-    """How far a source has been read.
+    """How far a source has been read."""
 
-    Attributes:
-        source: its name.
-        begins: digest of its header and first row, by which it is known again.
-        rows: rows after the header.
-        last_s: time of the last of them, in the clock of the source [s].
-    """
-
-    source: str
-    begins: str
-    rows: int
-    last_s: float
+    source: str  # its name
+    begins: str  # digest of its header and first row, by which it is known again
+    rows: int  # rows after the header
+    last_s: float  # time of the last of them, in the clock of the source [s]
 
     def continues(self, other: Taken) -> bool:
         """Whether this is the same source, read further.
@@ -65,34 +58,20 @@ class Taken:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Piece:
-    """Consecutive rows of a source.
+    """Consecutive rows of a source."""
 
-    Attributes:
-        text: header and these rows, less columns that some of them lack.
-        source: where they come from.
-        header: line of names.
-        lines: of the rows kept.
-        time_s: (k,) their times [s].
-        first_row: row of the source that the piece begins in.
-        left_out: rows that lack a number.
-        pending: lines after the last whole stretch, which the next piece begins with.
-        taken: rows of the source that were read, those of `pending` included.
-        again: lines left over from earlier data that are still to come; until there are none, this is no state to go
-            on from.
-        skipped: rows at the beginning of the source that are among those taken before.
-    """
-
-    text: str
-    source: Path
-    header: str
-    lines: tuple[str, ...]
-    time_s: Array
-    first_row: int
-    left_out: int
-    pending: tuple[str, ...]
-    taken: Taken
+    text: str  # header and these rows, less columns that some of them lack
+    source: Path  # where they come from
+    header: str  # line of names
+    lines: tuple[str, ...]  # of the rows kept
+    time_s: Array  # (k,) their times [s]
+    first_row: int  # row of the source that the piece begins in
+    left_out: int  # rows that lack a number
+    pending: tuple[str, ...]  # lines after the last whole stretch, which the next piece begins with
+    taken: Taken  # rows of the source that were read, those of `pending` included
+    # lines left over from earlier data that are still to come; until there are none, this is no state to go on from
     again: int
-    skipped: int
+    skipped: int  # rows at the beginning of the source that are among those taken before
 
     def problem(self, error: FileError) -> FileError:
         """An error about the text as a file, told as an error of the source."""

@@ -42,17 +42,11 @@ NODES = np.arange(4.0)
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What one sensor read.
+    """What one sensor read."""
 
-    Attributes:
-        first: time of the first reading [samples of the batch].
-        interval: time between readings [samples].
-        values: (m, c).
-    """
-
-    first: float
-    interval: float
-    values: Array
+    first: float  # time of the first reading [samples of the batch]
+    interval: float  # time between readings [samples]
+    values: Array  # (m, c)
 
     @property
     def times(self) -> Array:
@@ -142,17 +136,11 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """A batch with what is stated of the sensors that measured it.
+    """A batch with what is stated of the sensors that measured it."""
 
-    Attributes:
-        batch: as measured.
-        sensors: as stated.
-        smoothed: whether velocities from the pose are smoothed, rather than central differences.
-    """
-
-    batch: Batch
-    sensors: Sensors
-    smoothed: bool
+    batch: Batch  # as measured
+    sensors: Sensors  # as stated
+    smoothed: bool  # whether velocities from the pose are smoothed, rather than central differences
 
     @property
     def grid(self) -> Array:

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        shortest_batch: samples that a batch must keep.
-    """
-
-    shortest_batch: int = 4
+    shortest_batch: int = 4  # samples that a batch must keep
 
 
 TUNING = Tuning()

@@ -25,32 +25,20 @@ TIMES = ("delay_s", "lag_s", "rate")
 
 @dataclass(frozen=True, kw_only=True)
 class UncertainTime:
-    """A dead time, lag or slew rate of an actuator signal that is not known exactly.
+    """A dead time, lag or slew rate of an actuator signal that is not known exactly."""
 
-    Attributes:
-        column: of the signal, among the inputs.
-        quantity: one of `TIMES`.
-    """
-
-    column: int
-    quantity: str
+    column: int  # of the signal, among the inputs
+    quantity: str  # one of `TIMES`
 
 
 @dataclass(frozen=True, kw_only=True)
 class Division:
-    """Which commands act in which parts of a sample.
+    """Which commands act in which parts of a sample."""
 
-    Attributes:
-        begins: shares of the sample at which equal parts begin.
-        arriving: columns of the signals whose arrivals divide it, in the order of `places`.
-        places: of these arrivals among all begins of parts.
-        lateness: whole samples of each signal's dead time.
-    """
-
-    begins: tuple[float, ...]
-    arriving: tuple[int, ...]
-    places: tuple[int, ...]
-    lateness: tuple[int, ...]
+    begins: tuple[float, ...]  # shares of the sample at which equal parts begin
+    arriving: tuple[int, ...]  # columns of the signals whose arrivals divide it, in the order of `places`
+    places: tuple[int, ...]  # of these arrivals among all begins of parts
+    lateness: tuple[int, ...]  # whole samples of each signal's dead time
 
     def shares(self, responses: Sequence[Response], sample_time_s: float) -> Array:
         """(s,) shares of the sample that its parts take; responses may differ a little from the original ones."""

@@ -29,23 +29,14 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Alone:
-    """Estimates from one primitive alone.
+    """Estimates from one primitive alone."""
 
-    Attributes:
-        primitive: the manoeuvre.
-        runs: whole runs of it in every trial.
-        parameters: p names.
-        nominal: (p,) parameters of the ship that was simulated.
-        estimates: (n, p) of the trials that give one.
-        failed: trials without an estimate.
-    """
-
-    primitive: Primitive
-    runs: int
-    parameters: tuple[str, ...]
-    nominal: Array
-    estimates: Array
-    failed: int
+    primitive: Primitive  # the manoeuvre
+    runs: int  # whole runs of it in every trial
+    parameters: tuple[str, ...]  # p names
+    nominal: Array  # (p,) parameters of the ship that was simulated
+    estimates: Array  # (n, p) of the trials that give one
+    failed: int  # trials without an estimate
 
     def __post_init__(self) -> None:
         seal(self, nominal="p", estimates="n p")

@@ -47,30 +47,19 @@ Simulate = Callable[[Array], Array]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pieces:
-    """Recorded pieces as sums, and how models are simulated on them.
+    """Recorded pieces as sums, and how models are simulated on them."""
 
-    Attributes:
-        labels: of each piece.
-        H: (m, p, p) sums of Z Phi^T.
-        h: (m, p) sums of Z y.
-        Z, F: (m, p, n) sums of instruments and of regressors.
-        y: (m, n) sums of what is explained.
-        rows: (m,) number of rows.
-        motion: (m, n) mean square of the measured motion.
-        mean: "none", or "complete" for means taken off over all data of a subset.
-        simulate: errors of a model.
-    """
-
-    labels: tuple[str, ...]
-    H: Array
-    h: Array
+    labels: tuple[str, ...]  # of each piece
+    H: Array  # (m, p, p) sums of Z Phi^T
+    h: Array  # (m, p) sums of Z y
+    # Z, F: (m, p, n) sums of instruments and of regressors
     Z: Array
     F: Array
-    y: Array
-    rows: Array
-    motion: Array
-    mean: str
-    simulate: Simulate
+    y: Array  # (m, n) sums of what is explained
+    rows: Array  # (m,) number of rows
+    motion: Array  # (m, n) mean square of the measured motion
+    mean: str  # "none", or "complete" for means taken off over all data of a subset
+    simulate: Simulate  # errors of a model
 
     def __post_init__(self) -> None:
         seal(self, H="m p p", h="m p", Z="m p n", F="m p n", y="m n", rows="m", motion="m n")
@@ -163,20 +152,15 @@ def recorded_pieces(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drawn:
-    """A design, drawn many times from the pieces.
+    """A design, drawn many times from the pieces."""
 
-    Attributes:
-        design: its name.
-        subsets: pieces of each draw.
-        rmse: (d, n) root mean square simulation error of each draw on the pieces that it does not use, every label
-            counting alike; inf where the model diverges, nan where there is no estimate.
-        degenerate: (d,) 1 where there is no estimate, the model diverges, or its error in some output is larger than
-            the motion itself; else 0.
-    """
-
-    design: str
-    subsets: tuple[Subset, ...]
+    design: str  # its name
+    subsets: tuple[Subset, ...]  # pieces of each draw
+    # (d, n) root mean square simulation error of each draw on the pieces that it does not use, every label counting
+    # alike; inf where the model diverges, nan where there is no estimate
     rmse: Array
+    # (d,) 1 where there is no estimate, the model diverges, or its error in some output is larger than the motion
+    # itself; else 0
     degenerate: Array
 
     def __post_init__(self) -> None:

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        chunk_trials: trials in one chunk; each chunk has its own random stream.
-        single_trials: the same of random runs, simulated trial by trial: processes share smaller chunks more evenly.
-    """
-
-    chunk_trials: int = 20
+    chunk_trials: int = 20  # trials in one chunk; each chunk has its own random stream
+    # the same of random runs, simulated trial by trial: processes share smaller chunks more evenly
     single_trials: int = 5
 
 

@@ -47,37 +47,24 @@ GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rehearsal:
-    """The designs and ships of a validation.
+    """The designs and ships of a validation."""
 
-    Attributes:
-        truth: the simulated ship, with its sensors.
-        nominal: the ship of the design, with the same actuators; it simulates the instruments.
-        primitives: the dictionary.
-        designs: name -> whole runs of each primitive; None for random runs.
-        total_s: informative time of a random design [s].
-        environment: weather; its mean is drawn for each trial with its standard deviation.
-        parameters: names of the estimated parameters; the others are fixed at the nominal model's values.
-        method, mean_subtraction: of the estimator.
-        excitation: of the design; unless "free", estimates are from equation-wise samples.
-        integrator: of the true ship: "rk4", and parameters of the continuous motion are estimated, as by `expdesign
-            estimate`; or "euler", the map that defines discrete parameters, and those of the map are.
-        trials: number for each design.
-        seed: of all random numbers.
-    """
-
-    truth: Vessel
-    nominal: Vessel
-    primitives: tuple[Primitive, ...]
-    designs: Mapping[str, tuple[int, ...] | None]
-    total_s: float
-    environment: Environment
-    parameters: tuple[str, ...]
+    truth: Vessel  # the simulated ship, with its sensors
+    nominal: Vessel  # the ship of the design, with the same actuators; it simulates the instruments
+    primitives: tuple[Primitive, ...]  # the dictionary
+    designs: Mapping[str, tuple[int, ...] | None]  # name -> whole runs of each primitive; None for random runs
+    total_s: float  # informative time of a random design [s]
+    environment: Environment  # weather; its mean is drawn for each trial with its standard deviation
+    parameters: tuple[str, ...]  # names of the estimated parameters; the others are fixed at the nominal model's values
+    # method, mean_subtraction: of the estimator
     method: str = "iv"
     mean_subtraction: str = "complete"
-    excitation: str = FREE
+    excitation: str = FREE  # of the design; unless "free", estimates are from equation-wise samples
+    # of the true ship: "rk4", and parameters of the continuous motion are estimated, as by `expdesign estimate`; or
+    # "euler", the map that defines discrete parameters, and those of the map are
     integrator: str = "rk4"
-    trials: int = 100
-    seed: int = 0
+    trials: int = 100  # number for each design
+    seed: int = 0  # of all random numbers
 
     def __post_init__(self) -> None:
         if self.truth.model.inputs != self.nominal.model.inputs:
@@ -96,26 +83,17 @@ class Rehearsal:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Validated:
-    """The result of one design.
+    """The result of one design."""
 
-    Attributes:
-        design: its name.
-        parameters: names of the estimated parameters.
-        truth: (p,) values of the true ship; nan for parameters that its model does not have.
-        estimates, stated: (n, p) estimates and their stated standard deviations.
-        forecast: (p,) standard deviations predicted with the nominal model, nan for random designs.
-        theory: (p,) standard deviations predicted with the true ship; nan for random designs.
-        failed: number of trials without an estimate.
-    """
-
-    design: str
-    parameters: tuple[str, ...]
-    truth: Array
+    design: str  # its name
+    parameters: tuple[str, ...]  # names of the estimated parameters
+    truth: Array  # (p,) values of the true ship; nan for parameters that its model does not have
+    # estimates, stated: (n, p) estimates and their stated standard deviations
     estimates: Array
     stated: Array
-    forecast: Array
-    theory: Array
-    failed: int
+    forecast: Array  # (p,) standard deviations predicted with the nominal model, nan for random designs
+    theory: Array  # (p,) standard deviations predicted with the true ship; nan for random designs
+    failed: int  # number of trials without an estimate
 
     def __post_init__(self) -> None:
         seal(self, truth="p", estimates="n p", stated="n p", forecast="p", theory="p")

@@ -42,21 +42,13 @@ METHODS = ("iv", "ls")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollProblem:
-    """What is sought, from what.
+    """What is sought, from what."""
 
-    Attributes:
-        body: what is known of the ship.
-        cases: prepared, of one sample time.
-        free: names of the parameters that are estimated; others keep their start values.
-        start: (9,) where the search begins.
-        scale: (9,) a typical size of each parameter, positive.
-    """
-
-    body: Body
-    cases: tuple[Case, ...]
-    free: tuple[str, ...]
-    start: Array
-    scale: Array
+    body: Body  # what is known of the ship
+    cases: tuple[Case, ...]  # prepared, of one sample time
+    free: tuple[str, ...]  # names of the parameters that are estimated; others keep their start values
+    start: Array  # (9,) where the search begins
+    scale: Array  # (9,) a typical size of each parameter, positive
 
     def __post_init__(self) -> None:
         seal(self, start="9", scale="9")
@@ -128,37 +120,25 @@ def build_problem(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollEstimate:
-    """The estimate.
+    """The estimate."""
 
-    Attributes:
-        problem: that it answers.
-        method: "iv" or "ls".
-        theta: (9,) parameters.
-        covariance: (p, p) of the free ones, for the held ones as they are.
-        held: free parameters that kept their start values because the equations leave directions open.
-        sensed: (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters.
-        rounds: (r, 9) parameters after each round of spectra.
-        settled: whether the last round changed little.
-        strength: of the instruments: their information about the least certain combination of parameters over what
-            noise alone would give; nan for least squares.
-        surprise: least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over.
-        unanswered: chance that a rudder without feedback correlates with the roll moment as much as this one, 0 to 1;
-            nan for least squares and a ship that does not stay upright.
-        freedom: degrees of freedom of the noise's power, of the case with the fewest, at each frequency.
-    """
-
-    problem: RollProblem
-    method: str
-    theta: Array
-    covariance: Array
-    held: tuple[str, ...]
-    sensed: Array
-    rounds: Array
-    settled: bool
+    problem: RollProblem  # that it answers
+    method: str  # "iv" or "ls"
+    theta: Array  # (9,) parameters
+    covariance: Array  # (p, p) of the free ones, for the held ones as they are
+    held: tuple[str, ...]  # free parameters that kept their start values because the equations leave directions open
+    sensed: Array  # (q, p) change of the weighted residuals, in their own standard deviations, by the free parameters
+    rounds: Array  # (r, 9) parameters after each round of spectra
+    settled: bool  # whether the last round changed little
+    # of the instruments: their information about the least certain combination of parameters over what noise alone
+    # would give; nan for least squares
     strength: float
+    # least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over
     surprise: float
+    # chance that a rudder without feedback correlates with the roll moment as much as this one, 0 to 1; nan for least
+    # squares and a ship that does not stay upright
     unanswered: float
-    freedom: float
+    freedom: float  # degrees of freedom of the noise's power, of the case with the fewest, at each frequency
 
     def __post_init__(self) -> None:
         seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9")

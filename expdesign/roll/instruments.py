@@ -64,15 +64,10 @@ BlackBox = tuple[Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """A part of a run and the instruments there.
+    """A part of a run and the instruments there."""
 
-    Attributes:
-        part: samples of the run.
-        columns: (k, q) instruments of the whole run, by black boxes that were not fitted to this part.
-    """
-
-    part: slice
-    columns: Array
+    part: slice  # samples of the run
+    columns: Array  # (k, q) instruments of the whole run, by black boxes that were not fitted to this part
 
 
 def folds(runs: Sequence[Run]) -> list[list[Fold]]:
@@ -157,21 +152,15 @@ def _stitched(parts: Sequence[tuple[slice, Array]], first: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations.
+    """A case's equations after projection on the instruments: residual = top - slope c, in standard deviations."""
 
-    Attributes:
-        rows: of each run.
-        basis: (n, q) of each run, whose sum of products with the noise has unit covariance.
-        top, slope: sums of its products with y and X, (q,) and (q, 5).
-        noise: that whitened the rows.
-        hidden: (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares.
-    """
-
-    rows: tuple[Rows, ...]
-    basis: tuple[Array, ...]
+    rows: tuple[Rows, ...]  # of each run
+    basis: tuple[Array, ...]  # (n, q) of each run, whose sum of products with the noise has unit covariance
+    # top, slope: sums of its products with y and X, (q,) and (q, 5)
     top: Array
     slope: Array
-    noise: NoiseModel
+    noise: NoiseModel  # that whitened the rows
+    # (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares
     hidden: tuple[Array, ...]
 
 

@@ -77,15 +77,10 @@ def froude_scaled(values: Array, scale: float) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Coefficients:
-    """Coefficients with derivatives by the parameters.
+    """Coefficients with derivatives by the parameters."""
 
-    Attributes:
-        values: (5,).
-        jacobian: (5, 9).
-    """
-
-    values: Array
-    jacobian: Array
+    values: Array  # (5,)
+    jacobian: Array  # (5, 9)
 
     def __post_init__(self) -> None:
         seal(self, values="c", jacobian="c 9")

@@ -31,16 +31,12 @@ SMALL_SHARE = 0.01  # of a direction's largest relative change, below which a pa
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Direction:
-    """A combination of parameters.
+    """A combination of parameters."""
 
-    Attributes:
-        change: parameter -> change in its own unit, scaled so that the one that changes most by its size changes by a
-            tenth; those that hardly change are left out.
-        size: singular value; for what data show, the relative standard deviation along it is 1 / size.
-    """
-
+    # parameter -> change in its own unit, scaled so that the one that changes most by its size changes by a tenth;
+    # those that hardly change are left out
     change: dict[str, float]
-    size: float
+    size: float  # singular value; for what data show, the relative standard deviation along it is 1 / size
 
     def __str__(self) -> str:
         return ", ".join(f"{name} {value:+.3g} {UNITS[name]}" for name, value in self.change.items())
@@ -48,41 +44,27 @@ class Direction:
 
 @dataclass(frozen=True, kw_only=True)
 class Cure:
-    """Something more that could be known, measured or loaded.
+    """Something more that could be known, measured or loaded."""
 
-    Attributes:
-        what: in words.
-        smallest: singular value of the relative sensitivity with it.
-        rank: of the parameters with it.
-    """
-
-    what: str
-    smallest: float
-    rank: int
+    what: str  # in words
+    smallest: float  # singular value of the relative sensitivity with it
+    rank: int  # of the parameters with it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NullSpace:
-    """The report.
+    """The report."""
 
-    Attributes:
-        free: parameters.
-        singular_values: (p,) of the relative sensitivity, falling.
-        rank: how many of them are not rounding.
-        open: directions that the equations leave open, along which the parameters in `RollEstimate.held` were held.
-        undetermined: parameters that an open direction moves by more than their standard deviation while the one that
-            it moves most changes by a few times its size.
-        faint: directions that these data show too faintly.
-        cures: the best first; none where nothing is open or faint.
-    """
-
-    free: tuple[str, ...]
-    singular_values: Array
-    rank: int
+    free: tuple[str, ...]  # parameters
+    singular_values: Array  # (p,) of the relative sensitivity, falling
+    rank: int  # how many of them are not rounding
+    # directions that the equations leave open, along which the parameters in `RollEstimate.held` were held
     open: tuple[Direction, ...]
+    # parameters that an open direction moves by more than their standard deviation while the one that it moves most
+    # changes by a few times its size
     undetermined: tuple[str, ...]
-    faint: tuple[Direction, ...]
-    cures: tuple[Cure, ...]
+    faint: tuple[Direction, ...]  # directions that these data show too faintly
+    cures: tuple[Cure, ...]  # the best first; none where nothing is open or faint
 
     def __post_init__(self) -> None:
         seal(self, singular_values="p")

@@ -128,45 +128,30 @@ CAUSES = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollChange:
-    """One explanation of the difference.
+    """One explanation of the difference."""
 
-    Attributes:
-        causes: of `CAUSES`.
-        sizes, stds: of each, in the parameter's unit; of the load the moment of its mass about the rotation axis, down
-            [kg m], that was added.
-        left: sum of squares that is left over.
-        p_value: chance of more than that where the explanation is right.
-        pendulum: of the file with the explanation; None where no load on board has what is found.
-        righting_nm: with it [N m/rad].
-        load: change of mass [kg] and its height above the body origin [m]; None without the load among the causes.
-    """
-
-    causes: tuple[str, ...]
+    causes: tuple[str, ...]  # of `CAUSES`
+    # sizes, stds: of each, in the parameter's unit; of the load the moment of its mass about the rotation axis, down
+    # [kg m], that was added
     sizes: tuple[float, ...]
     stds: tuple[float, ...]
-    left: float
-    p_value: float
-    pendulum: RollPendulum | None
-    righting_nm: float
+    left: float  # sum of squares that is left over
+    p_value: float  # chance of more than that where the explanation is right
+    pendulum: RollPendulum | None  # of the file with the explanation; None where no load on board has what is found
+    righting_nm: float  # with it [N m/rad]
+    # change of mass [kg] and its height above the body origin [m]; None without the load among the causes
     load: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollJudgement:
-    """What one record tells of the roll of a file.
+    """What one record tells of the roll of a file."""
 
-    Attributes:
-        pendulum: of the file.
-        estimate: of the five parameters that one record determines, K_vd and z_f as in the file.
-        p_value: chance of as large a difference where nothing changed.
-        alarm_p: chance below which a change is certain.
-        changes: explanations with as few causes as explain it, the best first; none where nothing changed for certain.
-    """
-
-    pendulum: RollPendulum
-    estimate: RollEstimate
-    p_value: float
-    alarm_p: float
+    pendulum: RollPendulum  # of the file
+    estimate: RollEstimate  # of the five parameters that one record determines, K_vd and z_f as in the file
+    p_value: float  # chance of as large a difference where nothing changed
+    alarm_p: float  # chance below which a change is certain
+    # explanations with as few causes as explain it, the best first; none where nothing changed for certain
     changes: tuple[RollChange, ...]
 
     @property

@@ -38,15 +38,10 @@ def difference(signals: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rows:
-    """The equation y = X theta + noise of one run, whitened, without its mean and its first samples.
+    """The equation y = X theta + noise of one run, whitened, without its mean and its first samples."""
 
-    Attributes:
-        y: (n,) roll rate.
-        X: (n, 5) regressors.
-    """
-
-    y: Array
-    X: Array
+    y: Array  # (n,) roll rate
+    X: Array  # (n, 5) regressors
 
     def __post_init__(self) -> None:
         seal(self, y="n", X="n 5")
@@ -112,17 +107,11 @@ def regressors(signals: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum:
-    """Spectral density of residuals at the frequencies j / n of a real transform of length n, j = 0 to n / 2.
+    """Spectral density of residuals at the frequencies j / n of a real transform of length n, j = 0 to n / 2."""
 
-    Attributes:
-        density: (f,) two-sided; its mean over all n frequencies is the variance.
-        length: n, even.
-        freedom: degrees of freedom of the estimate at one frequency; infinite for a density that is given.
-    """
-
-    density: Array
-    length: int
-    freedom: float
+    density: Array  # (f,) two-sided; its mean over all n frequencies is the variance
+    length: int  # n, even
+    freedom: float  # degrees of freedom of the estimate at one frequency; infinite for a density that is given
 
     def __post_init__(self) -> None:
         seal(self, density="f")
@@ -201,15 +190,10 @@ def _transform_length(residuals: Sequence[Array]) -> int:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NoiseModel:
-    """Residuals e = (C / D) n with white n, in powers of the delay; its inverse whitens.
+    """Residuals e = (C / D) n with white n, in powers of the delay; its inverse whitens."""
 
-    Attributes:
-        past: (o + 1,) D, 1 first.
-        moving: (o + 1,) C, 1 first.
-    """
-
-    past: Array
-    moving: Array
+    past: Array  # (o + 1,) D, 1 first
+    moving: Array  # (o + 1,) C, 1 first
 
     def __post_init__(self) -> None:
         seal(self, past="a", moving="c")

@@ -32,20 +32,15 @@ LEFT_OUT_SAMPLES = 50  # at the beginning of a run, where lags reach before it
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One uninterrupted record.
+    """One uninterrupted record."""
 
-    Attributes:
-        step_s: time between samples [s].
-        signals: (k, 4) roll rate [rad/s], positive to starboard; reading of the accelerometer to port, gravity in it
-            [m/s2]; yaw rate [rad/s], positive to starboard; rudder, of any sign and unit.
-        planned: (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself.
-        unwarped: share of half the sample rate, below which the bilinear map of the equation is made exact.
-    """
-
-    step_s: float
+    step_s: float  # time between samples [s]
+    # (k, 4) roll rate [rad/s], positive to starboard; reading of the accelerometer to port, gravity in it [m/s2]; yaw
+    # rate [rad/s], positive to starboard; rudder, of any sign and unit
     signals: Array
+    # (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself
     planned: Array | None = None
-    unwarped: float = 0.0
+    unwarped: float = 0.0  # share of half the sample rate, below which the bilinear map of the equation is made exact
 
     def __post_init__(self) -> None:
         seal(self, signals="k 4", **({} if self.planned is None else {"planned": "k"}))
@@ -58,17 +53,11 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """Runs at one load.
+    """Runs at one load."""
 
-    Attributes:
-        name: for reports.
-        load: on board; None for the unknown one.
-        runs: at least one, all with one time between samples.
-    """
-
-    name: str
-    load: Load | None
-    runs: tuple[Run, ...]
+    name: str  # for reports
+    load: Load | None  # on board; None for the unknown one
+    runs: tuple[Run, ...]  # at least one, all with one time between samples
 
 
 # Low-pass filter and thinning out of runs, which must pass the roll mode.
@@ -76,23 +65,14 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LowPass:
-    """The filter and what it does.
+    """The filter and what it does."""
 
-    Attributes:
-        taps: (n,) symmetric, n odd; a single one where nothing is filtered.
-        every: samples out of which one is kept.
-        roll_hz: frequency of roll, roughly.
-        passed: gain at that frequency.
-        bandwidth_hz: at which the gain is 1 / sqrt 2; half the sample rate where it is never as low.
-        step_s: between the samples that are kept [s].
-    """
-
-    taps: Array
-    every: int
-    roll_hz: float
-    passed: float
-    bandwidth_hz: float
-    step_s: float
+    taps: Array  # (n,) symmetric, n odd; a single one where nothing is filtered
+    every: int  # samples out of which one is kept
+    roll_hz: float  # frequency of roll, roughly
+    passed: float  # gain at that frequency
+    bandwidth_hz: float  # at which the gain is 1 / sqrt 2; half the sample rate where it is never as low
+    step_s: float  # between the samples that are kept [s]
 
     def __post_init__(self) -> None:
         seal(self, taps="n")

@@ -18,19 +18,12 @@ FILES = {"min_length": "at least", "max_length": "at most"}
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """One key of a file.
+    """One key of a file."""
 
-    Attributes:
-        name: dotted; entries of a list of tables are marked as in "no_go[].name".
-        meaning: its description, with unit.
-        default: as in a file; "required"; or "optional", for one that has no value where it is not given.
-        allowed: its allowed values.
-    """
-
-    name: str
-    meaning: str
-    default: str
-    allowed: str
+    name: str  # dotted; entries of a list of tables are marked as in "no_go[].name"
+    meaning: str  # its description, with unit
+    default: str  # as in a file; "required"; or "optional", for one that has no value where it is not given
+    allowed: str  # its allowed values
 
 
 def keys_of(model: type[Table], prefix: str = "") -> tuple[Key, ...]:

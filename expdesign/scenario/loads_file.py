@@ -57,19 +57,14 @@ class LoadsFile(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadCases:
-    """What a file of load cases says.
+    """What a file of load cases says."""
 
-    Attributes:
-        body: of the ship.
-        loads: of each data file; None for the unknown one.
-        beam_m, period_s: of the ship.
-        known, start: parameters by name.
-    """
-
-    body: Body
-    loads: tuple[Load | None, ...]
+    body: Body  # of the ship
+    loads: tuple[Load | None, ...]  # of each data file; None for the unknown one
+    # beam_m, period_s: of the ship
     beam_m: float
     period_s: float
+    # known, start: parameters by name
     known: Mapping[str, float]
     start: Mapping[str, float]
 

@@ -242,17 +242,11 @@ def _check_position(place: PoseTable, entry: Entry) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Berth:
-    """A place for the ship as somebody states it.
+    """A place for the ship as somebody states it."""
 
-    Attributes:
-        pose: (3,) in the area's frame [north m, east m, heading rad].
-        stated: (2,) the position in the order stated: latitude and longitude, or north and east.
-        degrees: whether it is latitude and longitude.
-    """
-
-    pose: Array
-    stated: Array
-    degrees: bool
+    pose: Array  # (3,) in the area's frame [north m, east m, heading rad]
+    stated: Array  # (2,) the position in the order stated: latitude and longitude, or north and east
+    degrees: bool  # whether it is latitude and longitude
 
     def swapped(self, area: SeaArea) -> shapely.Point:
         """Where it would be with its two numbers swapped (east_m, north_m)."""

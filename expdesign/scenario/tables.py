@@ -32,13 +32,9 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class Table(BaseModel):
-    """Base of all file tables.
+    """Base of all file tables."""
 
-    Attributes:
-        topic: of `expdesign explain`, for whole files.
-    """
-
-    topic: ClassVar[str] = ""
+    topic: ClassVar[str] = ""  # of `expdesign explain`, for whole files
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -53,15 +49,10 @@ T = TypeVar("T", bound=Table)
 
 @dataclass(frozen=True)
 class Entry:
-    """A place in a file, for messages.
+    """A place in a file, for messages."""
 
-    Attributes:
-        path: the file.
-        key: dotted key, "" for the whole file.
-    """
-
-    path: Path
-    key: str = ""
+    path: Path  # the file
+    key: str = ""  # dotted key, "" for the whole file
 
     def at(self, key: str) -> Entry:
         """A key inside this table."""

@@ -19,106 +19,73 @@ from expdesign.vessel import Vessel, column_name
 
 @dataclass(frozen=True, kw_only=True)
 class BudgetSettings:
-    """A limited resource.
+    """A limited resource."""
 
-    Attributes:
-        name: for reports.
-        limit: amount available for the whole informative time.
-        cost_per_s: use per second by primitive; where empty, the mean over the run of the sum of |n|^3 of all
-            propellers and thrusters [rps3], which grows like shaft power.
-    """
-
-    name: str
-    limit: float
+    name: str  # for reports
+    limit: float  # amount available for the whole informative time
+    # use per second by primitive; where empty, the mean over the run of the sum of |n|^3 of all propellers and
+    # thrusters [rps3], which grows like shaft power
     cost_per_s: Mapping[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """Settings of the durations.
+    """Settings of the durations."""
 
-    Attributes:
-        total_s: total informative time of all primitives [s].
-        criterion: name of a design criterion: "D", "D_s", "A", "E", "V" or "T".
-        mean_subtraction: "none", "batch" or "complete".
-        fixed_parameters: parameters held at the vessel file's values and not estimated.
-        interest: parameters of interest in D_s, A and E; empty for all.
-        relative_to: unit of parameter errors in A and E: their "nominal" size or their prior standard deviation,
-            "parameter_std".
-        parameter_units: unit of error of single parameters, instead of that.
-        outcomes: predicted outcomes in V, keys of `indices.OUTCOMES`.
-        outcome_units: unit of error of an outcome; its nominal size where not given.
-        outcome_speed_mps: approach speed of the predicted trials, or None for the nominal one.
-        predictor: "model" for the model's terms; with nuisance regressors, too, "augmented", "wind", "no-current" or
-            "no-wind".
-        excitation: which samples count in each equation: "free", "rewarded" or "required".
-        robust: "nominal", "average" or "worst".
-        prior_samples: models drawn from the prior.
-        prior: prior information, "none" or "parameter_std".
-        prior_data: files of earlier trials, whose information is added to the prior.
-        least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`.
-        reveal: causes that a diagnosis of the trial must reveal; tell_apart: pairs that it must tell apart.
-        reveal_sizes: of causes, in the unit of their effects, instead of those that matter.
-        grow: settings of the dictionary growth, or None for no growth.
-        accuracy: what the shortest day must reach, or None for the most information in total_s of runs.
-    """
-
-    total_s: float
-    criterion: str = "D"
-    mean_subtraction: str = "complete"
-    fixed_parameters: tuple[str, ...] = ()
-    interest: tuple[str, ...] = ()
+    total_s: float  # total informative time of all primitives [s]
+    criterion: str = "D"  # name of a design criterion: "D", "D_s", "A", "E", "V" or "T"
+    mean_subtraction: str = "complete"  # "none", "batch" or "complete"
+    fixed_parameters: tuple[str, ...] = ()  # parameters held at the vessel file's values and not estimated
+    interest: tuple[str, ...] = ()  # parameters of interest in D_s, A and E; empty for all
+    # unit of parameter errors in A and E: their "nominal" size or their prior standard deviation, "parameter_std"
     relative_to: str = "nominal"
+    # unit of error of single parameters, instead of that
     parameter_units: Mapping[str, float] = field(default_factory=dict)
-    outcomes: tuple[str, ...] = ()
+    outcomes: tuple[str, ...] = ()  # predicted outcomes in V, keys of `indices.OUTCOMES`
+    # unit of error of an outcome; its nominal size where not given
     outcome_units: Mapping[str, float] = field(default_factory=dict)
-    outcome_speed_mps: float | None = None
+    outcome_speed_mps: float | None = None  # approach speed of the predicted trials, or None for the nominal one
+    # "model" for the model's terms; with nuisance regressors, too, "augmented", "wind", "no-current" or "no-wind"
     predictor: str = "model"
-    excitation: str = "free"
-    robust: str = "nominal"
-    prior_samples: int = 0
-    prior: str = "none"
-    prior_data: tuple[Path, ...] = ()
+    excitation: str = "free"  # which samples count in each equation: "free", "rewarded" or "required"
+    robust: str = "nominal"  # "nominal", "average" or "worst"
+    prior_samples: int = 0  # models drawn from the prior
+    prior: str = "none"  # prior information, "none" or "parameter_std"
+    prior_data: tuple[Path, ...] = ()  # files of earlier trials, whose information is added to the prior
+    # least_s, most_s, required, excluded, budgets, balance: see `durations.Constraints`
     least_s: Mapping[str, float] = field(default_factory=dict)
     most_s: Mapping[str, float] = field(default_factory=dict)
     required: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
     budgets: tuple[BudgetSettings, ...] = ()
     balance: float = 0.0
+    # causes that a diagnosis of the trial must reveal; tell_apart: pairs that it must tell apart
     reveal: tuple[str, ...] = ()
     tell_apart: tuple[tuple[str, str], ...] = ()
+    # of causes, in the unit of their effects, instead of those that matter
     reveal_sizes: Mapping[str, float] = field(default_factory=dict)
-    grow: GrowSettings | None = None
+    grow: GrowSettings | None = None  # settings of the dictionary growth, or None for no growth
+    # what the shortest day must reach, or None for the most information in total_s of runs
     accuracy: AccuracySettings | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
-    """A scenario file and the files that it names, as values.
+    """A scenario file and the files that it names, as values."""
 
-    Attributes:
-        name: of the scenario; also the default folder of its results.
-        path: the scenario file.
-        vessel: with its nominal model.
-        dictionary: specifications of the primitives, not yet simulated.
-        area: allowed water.
-        design, plan: settings.
-        start, goal: (3,) poses in the area's frame [north m, east m, heading rad]; the ship ends at rest.
-        environment: forecast.
-        under_way: how the ship moves at the start; None where it is at rest through the water.
-    """
-
-    name: str
-    path: Path
-    vessel: Vessel
-    dictionary: tuple[PrimitiveSpec, ...]
-    area: SeaArea
+    name: str  # of the scenario; also the default folder of its results
+    path: Path  # the scenario file
+    vessel: Vessel  # with its nominal model
+    dictionary: tuple[PrimitiveSpec, ...]  # specifications of the primitives, not yet simulated
+    area: SeaArea  # allowed water
+    # design, plan: settings
     design: DesignSettings
     plan: PlanSettings
+    # start, goal: (3,) poses in the area's frame [north m, east m, heading rad]; the ship ends at rest
     start: Array
     goal: Array
-    environment: Environment
-    under_way: UnderWay | None = None
+    environment: Environment  # forecast
+    under_way: UnderWay | None = None  # how the ship moves at the start; None where it is at rest through the water
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")

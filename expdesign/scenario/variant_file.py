@@ -17,15 +17,10 @@ FILE_KEYS = {"scenario": ("vessel", "dictionary", "area"), "design": ("prior_dat
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Variant:
-    """A changed scenario and its changes.
+    """A changed scenario and its changes."""
 
-    Attributes:
-        scenario: complete.
-        changes: one line for each entry that differs, e.g. "design.total_s = 1800 instead of 3600".
-    """
-
-    scenario: Scenario
-    changes: tuple[str, ...]
+    scenario: Scenario  # complete
+    changes: tuple[str, ...]  # one line for each entry that differs, e.g. "design.total_s = 1800 instead of 3600".
 
 
 def load_variant(base: Path | str, variant: Path | str) -> Variant:

@@ -45,21 +45,13 @@ NORMAL_95 = 1.959963984540054
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limits:
-    """Largest standard deviations of parameters and of outcomes.
+    """Largest standard deviations of parameters and of outcomes."""
 
-    Attributes:
-        names: of the k limited parameters and outcomes.
-        slopes: (k, p) of each by the parameters.
-        std: (k,) largest standard deviation of each.
-        prior: (p, p) information known before, in the parameters' units.
-        outcomes: how many of them, at the end, are outcomes.
-    """
-
-    names: tuple[str, ...]
-    slopes: Array
-    std: Array
-    prior: Array
-    outcomes: int = 0
+    names: tuple[str, ...]  # of the k limited parameters and outcomes
+    slopes: Array  # (k, p) of each by the parameters
+    std: Array  # (k,) largest standard deviation of each
+    prior: Array  # (p, p) information known before, in the parameters' units
+    outcomes: int = 0  # how many of them, at the end, are outcomes
 
     def __post_init__(self) -> None:
         seal(self, slopes="k p", std="k", prior="p p")
@@ -134,28 +126,19 @@ class Accuracy:
 
     They may also be (d + 2, d + 2), about a steady current that is unknown too: what they tell of the ship counts, see
     `information.unknown_current`, which is concave as well.
-
-    Attributes:
-        collected: the criterion, of information per sample of `samples`; None where it is not asked for.
-        level: value of the criterion to be reached.
-        samples: of the time that the level is reached in.
-        prior: (d, d) information known before.
-        variance: (p,) largest variance of each parameter in units of its equation's noise variance; inf without limit.
-        parameters: names.
-        outcomes: names of outcomes with a largest standard deviation.
-        gradients: (o, d) of each by the parameters, in units of that standard deviation and of the noise.
-        limits: by which tracks are judged; None where they are judged by `margin`.
     """
 
-    collected: Collected | None
-    level: float
-    samples: float
-    prior: Array
+    collected: Collected | None  # the criterion, of information per sample of `samples`; None where it is not asked for
+    level: float  # value of the criterion to be reached
+    samples: float  # of the time that the level is reached in
+    prior: Array  # (d, d) information known before
+    # (p,) largest variance of each parameter in units of its equation's noise variance; inf without limit
     variance: Array
-    parameters: tuple[str, ...]
-    outcomes: tuple[str, ...] = ()
+    parameters: tuple[str, ...]  # names
+    outcomes: tuple[str, ...] = ()  # names of outcomes with a largest standard deviation
+    # (o, d) of each by the parameters, in units of that standard deviation and of the noise
     gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    limits: Limits | None = None
+    limits: Limits | None = None  # by which tracks are judged; None where they are judged by `margin`
 
     def __post_init__(self) -> None:
         if not self.outcomes:

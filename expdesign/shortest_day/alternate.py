@@ -127,17 +127,14 @@ def check_way_fits(problem: PlanProblem, day_s: float) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Search:
-    """What all rounds share.
+    """What all rounds share."""
 
-    Attributes:
-        problem, accuracy, added: as of `shortest_day`.
-        placeless: runs found to have no place in the water, to be unstable for drawn ships, or to be reached by no leg
-            in the time budget; grows.
-    """
-
+    # problem, accuracy, added: as of `shortest_day`
     problem: PlanProblem
     accuracy: Accuracy
     added: tuple[str, ...]
+    # runs found to have no place in the water, to be unstable for drawn ships, or to be reached by no leg in the time
+    # budget; grows
     placeless: set[str] = field(default_factory=set)
 
     @property

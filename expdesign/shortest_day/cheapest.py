@@ -103,32 +103,20 @@ def _multisets(places: NDArray[np.int64], sizes: Sequence[int], count: int) -> A
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Whole runs and what they cost.
+    """Whole runs and what they cost."""
 
-    Attributes:
-        repeats: (q,) whole runs, one at least.
-        cost_s: of them, less what they save.
-        bound_s: no runs, whole or not, reach the accuracy for less.
-        tangents: on the margin, see `Relaxed`.
-    """
-
-    repeats: tuple[int, ...]
-    cost_s: float
-    bound_s: float
-    tangents: tuple[Tangent, ...] = field(default=(), repr=False, compare=False)
+    repeats: tuple[int, ...]  # (q,) whole runs, one at least
+    cost_s: float  # of them, less what they save
+    bound_s: float  # no runs, whole or not, reach the accuracy for less
+    tangents: tuple[Tangent, ...] = field(default=(), repr=False, compare=False)  # on the margin, see `Relaxed`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tangent:
-    """A linear bound on the margin of an accuracy: f(M) <= <slope, M> + offset, for all runs, costs and levels.
+    """A linear bound on the margin of an accuracy: f(M) <= <slope, M> + offset, for all runs, costs and levels."""
 
-    Attributes:
-        slope: (d, d).
-        offset: of the margin.
-    """
-
-    slope: Array
-    offset: float
+    slope: Array  # (d, d)
+    offset: float  # of the margin
 
     def __post_init__(self) -> None:
         seal(self, slope="d d")
@@ -136,21 +124,13 @@ class Tangent:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Relaxed:
-    """The continuous problem's solution.
+    """The continuous problem's solution."""
 
-    Attributes:
-        runs: (q,) not whole.
-        bound_s: no runs, whole or not, cost less.
-        worth: (d, d) what information is worth at the margin: trace(G M) seconds.
-        worth_of_saved: of a second of transit saved, from 0 to 1.
-        tangents: on the margin, with which a like problem is soon solved.
-    """
-
-    runs: Array
-    bound_s: float
-    worth: Array
-    worth_of_saved: float
-    tangents: tuple[Tangent, ...] = ()
+    runs: Array  # (q,) not whole
+    bound_s: float  # no runs, whole or not, cost less
+    worth: Array  # (d, d) what information is worth at the margin: trace(G M) seconds
+    worth_of_saved: float  # of a second of transit saved, from 0 to 1
+    tangents: tuple[Tangent, ...] = ()  # on the margin, with which a like problem is soon solved
 
 
 def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0, tangents: Sequence[Tangent] = ()) -> Choice:

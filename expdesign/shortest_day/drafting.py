@@ -30,15 +30,10 @@ FORESEEN = 0.1  # shortfall of the margin that is expected of a day without a ru
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drafting:
-    """Drafts days.
+    """Drafts days."""
 
-    Attributes:
-        problem: gives the dictionary, the limits on runs and the water; the runs of its design are not used.
-        accuracy: to be reached by the whole track, legs included.
-    """
-
-    problem: PlanProblem
-    accuracy: Accuracy
+    problem: PlanProblem  # gives the dictionary, the limits on runs and the water; the runs of its design are not used
+    accuracy: Accuracy  # to be reached by the whole track, legs included
 
     def drafted(self, repeats: Sequence[int], days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
         """The day with these runs; the water and the transitions of the day before are not worked out again.

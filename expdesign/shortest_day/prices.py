@@ -80,22 +80,14 @@ def courses_of(track: Trajectory) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Offer:
-    """Runs to choose from.
+    """Runs to choose from."""
 
-    Attributes:
-        matrices: (q, d, d) information of one whole run, summed over its samples.
-        cost_s: (q,) of one whole run.
-        saved_s: (q,) time of transit that its way made good saves.
-        way_s: most that all runs save together.
-        known: (d, d) information without runs.
-        fewest, most: (q,) limits on runs.
-    """
-
-    matrices: Array
-    cost_s: Array
-    saved_s: Array
-    way_s: float
-    known: Array
+    matrices: Array  # (q, d, d) information of one whole run, summed over its samples
+    cost_s: Array  # (q,) of one whole run
+    saved_s: Array  # (q,) time of transit that its way made good saves
+    way_s: float  # most that all runs save together
+    known: Array  # (d, d) information without runs
+    # fewest, most: (q,) limits on runs
     fewest: Array
     most: Array
 
@@ -113,25 +105,15 @@ class Offer:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prices:
-    """Costs and information at the margin.
+    """Costs and information at the margin."""
 
-    Attributes:
-        cost_s: (q,) of one more whole run, its leg included.
-        saved_s: (q,) time at transit speed of its way made good.
-        way_s: time at transit speed of the way from start to goal.
-        runs: (q, d, d) information of one more whole run.
-        leg: (d, d) information of the leg that leads to it.
-        goal: (d, d) information of the leg to the goal.
-        level: margin of the accuracy that runs and legs must reach by these estimates.
-    """
-
-    cost_s: Array
-    saved_s: Array
-    way_s: float
-    runs: Array
-    leg: Array
-    goal: Array
-    level: float = 0.0
+    cost_s: Array  # (q,) of one more whole run, its leg included
+    saved_s: Array  # (q,) time at transit speed of its way made good
+    way_s: float  # time at transit speed of the way from start to goal
+    runs: Array  # (q, d, d) information of one more whole run
+    leg: Array  # (d, d) information of the leg that leads to it
+    goal: Array  # (d, d) information of the leg to the goal
+    level: float = 0.0  # margin of the accuracy that runs and legs must reach by these estimates
 
     def __post_init__(self) -> None:
         seal(self, cost_s="q", saved_s="q", runs="q d d", leg="d d", goal="d d")
@@ -139,21 +121,14 @@ class Prices:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedDay:
-    """A day as drafted.
+    """A day as drafted."""
 
-    Attributes:
-        repeats: (q,) runs.
-        draft: the day.
-        information: (legs, d, d) of each leg of its track, or (legs, d + 2, d + 2) where the forecast leaves a steady
-            current unknown.
-        margin: of the accuracy, by the whole track.
-        covariance: (p, p) of estimates from the whole track; None where it does not determine every parameter.
-    """
-
-    repeats: tuple[int, ...]
-    draft: Draft
+    repeats: tuple[int, ...]  # (q,) runs
+    draft: Draft  # the day
+    # (legs, d, d) of each leg of its track, or (legs, d + 2, d + 2) where the forecast leaves a steady current unknown
     information: Array
-    margin: float
+    margin: float  # of the accuracy, by the whole track
+    # (p, p) of estimates from the whole track; None where it does not determine every parameter
     covariance: Array | None = None
 
     @property

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Rounds and tolerances.
+    """Rounds and tolerances."""
 
-    Attributes:
-        rounds: most days that are planned in search of the shortest.
-        choice_gap: relative gap at which the choice of runs ends.
-    """
-
-    rounds: int = 5
-    choice_gap: float = 1e-3
+    rounds: int = 5  # most days that are planned in search of the shortest
+    choice_gap: float = 1e-3  # relative gap at which the choice of runs ends
 
 
 TUNING = Tuning()

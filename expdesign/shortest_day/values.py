@@ -16,62 +16,42 @@ DRAFT_POOL, DRAFT_SEARCHES = 8, 1  # candidates of every family, and searches, o
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracySettings:
-    """The accuracy asked for.
+    """The accuracy asked for."""
 
-    Attributes:
-        as_durations: by the design's criterion, as accurate as the optimal durations are in `total_s`.
-        std: largest standard deviation of parameters, in their units.
-        relative_std: the same, as a share of the nominal value.
-        outcomes_95: half-widths of the 95 % intervals of predicted outcomes of standard trials, by `indices.OUTCOMES`.
-        outcome_speed_mps: approach speed of these trials, or None for the nominal model's.
-        most_s: longest day [s], or None for no limit.
-        grow: whether manoeuvres are added that shorten the day, or tell more in it.
-        starts: independent searches, from other candidates of manoeuvres; the shortest day of all is taken.
-        day_s: length of the day [s] in which as much is to be told as can be, or None where an accuracy is asked for.
-    """
-
-    as_durations: bool = False
-    std: Mapping[str, float] = field(default_factory=dict)
-    relative_std: Mapping[str, float] = field(default_factory=dict)
+    as_durations: bool = False  # by the design's criterion, as accurate as the optimal durations are in `total_s`
+    std: Mapping[str, float] = field(default_factory=dict)  # largest standard deviation of parameters, in their units
+    relative_std: Mapping[str, float] = field(default_factory=dict)  # the same, as a share of the nominal value
+    # half-widths of the 95 % intervals of predicted outcomes of standard trials, by `indices.OUTCOMES`
     outcomes_95: Mapping[str, float] = field(default_factory=dict)
-    outcome_speed_mps: float | None = None
-    most_s: float | None = None
-    grow: bool = True
-    starts: int = 1
+    outcome_speed_mps: float | None = None  # approach speed of these trials, or None for the nominal model's
+    most_s: float | None = None  # longest day [s], or None for no limit
+    grow: bool = True  # whether manoeuvres are added that shorten the day, or tell more in it
+    starts: int = 1  # independent searches, from other candidates of manoeuvres; the shortest day of all is taken
+    # length of the day [s] in which as much is to be told as can be, or None where an accuracy is asked for
     day_s: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DayTried:
-    """A day that was planned in search of the shortest.
+    """A day that was planned in search of the shortest."""
 
-    Attributes:
-        runs: how often each primitive is run.
-        day_s, informative_s: all of it, and its runs, as planned [s].
-        expected_s: all of it with the expected time of go-arounds [s].
-        information: of the whole track as a share of what is needed: time would have to be 1 / information as long.
-        told: expected standard deviations of parameters from the whole track, and half-widths of the 95 % intervals of
-            the outcomes asked for.
-    """
-
-    runs: Mapping[str, int]
+    runs: Mapping[str, int]  # how often each primitive is run
+    # day_s, informative_s: all of it, and its runs, as planned [s]
     day_s: float
     informative_s: float
-    expected_s: float
-    information: float
+    expected_s: float  # all of it with the expected time of go-arounds [s]
+    information: float  # of the whole track as a share of what is needed: time would have to be 1 / information as long
+    # expected standard deviations of parameters from the whole track, and half-widths of the 95 % intervals of the
+    # outcomes asked for
     told: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
 class DayParts:
-    """Where the time of a planned day goes [s].
+    """Where the time of a planned day goes [s]."""
 
-    Attributes:
-        way_s: the shortest way to the goal at transit speed.
-        runs_s, legs_s: runs, and the legs between them, beyond what the way that they make good takes.
-    """
-
-    way_s: float
+    way_s: float  # the shortest way to the goal at transit speed
+    # runs_s, legs_s: runs, and the legs between them, beyond what the way that they make good takes
     runs_s: float
     legs_s: float
 
@@ -83,22 +63,15 @@ class DayBound:
     Class: velocities through water within limits, delivered inputs within those of the actuators, any heading, the
     nominal model; motions need not obey it but in how fast they gain and lose speed on the way, so the class is wider
     than what the ship can do.
-
-    Attributes:
-        information_s: least time in which a motion of the class tells what is needed; proved, 0 where nothing is.
-        searched_s: the same if the search found the samples that tell most; an estimate, never less.
-        way_s: least time from start to goal in safe water, up to the largest speed of the class, and stopping there.
-        required_s: time of the runs that the limits on durations require.
-        velocities: (3, 2) limits of u, v and r through water [m/s, rad/s].
-        speed_mps: largest speed through water, in any direction.
     """
 
-    information_s: float
-    searched_s: float
+    information_s: float  # least time in which a motion of the class tells what is needed; proved, 0 where nothing is
+    searched_s: float  # the same if the search found the samples that tell most; an estimate, never less
+    # least time from start to goal in safe water, up to the largest speed of the class, and stopping there
     way_s: float
-    required_s: float
-    velocities: Array
-    speed_mps: float
+    required_s: float  # time of the runs that the limits on durations require
+    velocities: Array  # (3, 2) limits of u, v and r through water [m/s, rad/s]
+    speed_mps: float  # largest speed through water, in any direction
 
     def __post_init__(self) -> None:
         seal(self, velocities="3 2")
@@ -111,31 +84,22 @@ class DayBound:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShortestDay:
-    """The shortest day found.
+    """The shortest day found."""
 
-    Attributes:
-        plan: the day.
-        design: its runs; fractions and certificate are those of the accuracy's reference.
-        tried: days planned, in order.
-        cost_s, cost_bound_s: cost of the cheapest runs found at the prices learnt, and what no choice of the same
-            dictionary costs less than at these prices and with this information of legs [s].
-        information: of the plan's track, as a share of what is needed.
-        parts: where its time goes.
-        curve: (k, 2) day [s] and information, as a share of what is needed, of the cheapest choices of runs, whole or
-            not, by the prices learnt and beside them as the plan: an estimate of what other accuracies would take.
-        bound: on every day of a class that holds this one; None where it was not computed.
-        most_s: length of the day asked for, which tells most in it; None where an accuracy was asked for.
-    """
-
-    plan: Plan
-    design: DurationDesign
-    tried: tuple[DayTried, ...]
+    plan: Plan  # the day
+    design: DurationDesign  # its runs; fractions and certificate are those of the accuracy's reference
+    tried: tuple[DayTried, ...]  # days planned, in order
+    # cost_s, cost_bound_s: cost of the cheapest runs found at the prices learnt, and what no choice of the same
+    # dictionary costs less than at these prices and with this information of legs [s]
     cost_s: float
     cost_bound_s: float
-    information: float
-    parts: DayParts
+    information: float  # of the plan's track, as a share of what is needed
+    parts: DayParts  # where its time goes
+    # (k, 2) day [s] and information, as a share of what is needed, of the cheapest choices of runs, whole or not, by
+    # the prices learnt and beside them as the plan: an estimate of what other accuracies would take
     curve: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    bound: DayBound | None = None
+    bound: DayBound | None = None  # on every day of a class that holds this one; None where it was not computed
+    # length of the day asked for, which tells most in it; None where an accuracy was asked for
     most_s: float | None = None
 
     def __post_init__(self) -> None:

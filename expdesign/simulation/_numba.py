@@ -20,15 +20,12 @@ BINARY = (0, 1, 2)
 
 @dataclass(frozen=True)
 class Kernels:
-    """Compiled functions.
+    """Compiled functions."""
 
-    Attributes:
-        execute: (codes, memory) -> a function that does all operations on the rows of memory once.
-        normal: (generator, spread (8,), sea (k, 4, n), noise (k, 8, n)) fills the sea with standard normal numbers and
-            the noise with spread times such, sample by sample, in NumPy's order.
-    """
-
+    # (codes, memory) -> a function that does all operations on the rows of memory once
     execute: Callable[[Any, Any], Callable[[], None]]
+    # (generator, spread (8,), sea (k, 4, n), noise (k, 8, n)) fills the sea with standard normal numbers and the noise
+    # with spread times such, sample by sample, in NumPy's order
     normal: Callable[[Any, Any, Any, Any], None]
 
 

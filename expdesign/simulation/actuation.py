@@ -40,17 +40,12 @@ class SampleMap:
 
         mean over step i  = means[i] @ (x, c_early, c_late) + offset
         x one sample on   = end @ (x, c_early, c_late)
-
-    Attributes:
-        means: (substeps, 3).
-        end: (3,).
-        lateness: whole samples of the dead time.
-        deadband, offset: as in `Response`.
     """
 
-    means: Array
-    end: Array
-    lateness: int
+    means: Array  # (substeps, 3)
+    end: Array  # (3,)
+    lateness: int  # whole samples of the dead time
+    # deadband, offset: as in `Response`
     deadband: float
     offset: float
 
@@ -164,15 +159,10 @@ def positions(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slewed:
-    """Positions of actuators that move at their slew rates.
+    """Positions of actuators that move at their slew rates."""
 
-    Attributes:
-        means: (k, m, ...) over each sample; the commands themselves where these keep to the rates.
-        ends: (k, m, ...) at the end of each sample.
-    """
-
-    means: Array
-    ends: Array
+    means: Array  # (k, m, ...) over each sample; the commands themselves where these keep to the rates
+    ends: Array  # (k, m, ...) at the end of each sample
 
 
 def _slewed(command: Array, previous: Array, faster: Sequence[int], reach: float) -> tuple[Array, Array]:
@@ -328,22 +318,15 @@ def _signals(through: SampleMap, command: Array, before: Any) -> tuple[Array, Ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ActuatorState:
-    """Actuators of n ships at the start of a sample: `deliver` for commands that are not known beforehand.
+    """Actuators of n ships at the start of a sample: `deliver` for commands that are not known beforehand."""
 
-    Attributes:
-        maps: (m) map of each signal over a sample; None where it follows at once.
-        substeps: integrator steps per sample.
-        values: (m, n) delivered values, less the misalignment.
-        past: for each signal (lateness + 1, n) positions outside the dead band that do not act yet, oldest first.
-        reach: (m, 1) farthest that each signal moves in a sample.
-        commands, positions: (m, n) last command of each signal, and how far it came.
-    """
-
-    maps: tuple[SampleMap | None, ...]
-    substeps: int
-    values: Array
+    maps: tuple[SampleMap | None, ...]  # (m) map of each signal over a sample; None where it follows at once
+    substeps: int  # integrator steps per sample
+    values: Array  # (m, n) delivered values, less the misalignment
+    # for each signal (lateness + 1, n) positions outside the dead band that do not act yet, oldest first
     past: tuple[Array, ...]
-    reach: Array
+    reach: Array  # (m, 1) farthest that each signal moves in a sample
+    # commands, positions: (m, n) last command of each signal, and how far it came
     commands: Array
     positions: Array
 

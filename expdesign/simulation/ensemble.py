@@ -34,25 +34,18 @@ STRETCH = 32
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ensemble:
-    """Simulated and measured trials.
+    """Simulated and measured trials."""
 
-    Attributes:
-        sample_time_s: time between samples [s].
-        input_names: actuator signals.
-        inputs: (k, n, m) commands; n is 1 when all runs share them.
-        pose, velocity: (k, n, 3) true n-frame pose and b-frame velocity over ground. Runs that diverge end in nan.
-        measured_pose, measured_velocity: (k, n, 3) with sensor noise.
-        measured_wind: (k, n, 2) relative wind (u_q, v_q) with sensor noise.
-    """
-
-    sample_time_s: float
-    input_names: tuple[str, ...]
-    inputs: Array
+    sample_time_s: float  # time between samples [s]
+    input_names: tuple[str, ...]  # actuator signals
+    inputs: Array  # (k, n, m) commands; n is 1 when all runs share them
+    # pose, velocity: (k, n, 3) true n-frame pose and b-frame velocity over ground. Runs that diverge end in nan.
     pose: Array
     velocity: Array
+    # measured_pose, measured_velocity: (k, n, 3) with sensor noise
     measured_pose: Array
     measured_velocity: Array
-    measured_wind: Array
+    measured_wind: Array  # (k, n, 2) relative wind (u_q, v_q) with sensor noise
 
     def __post_init__(self) -> None:
         for name in ("inputs", "pose", "velocity", "measured_pose", "measured_velocity", "measured_wind"):

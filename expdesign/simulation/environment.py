@@ -25,12 +25,9 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WeatherSeries:
-    """Current and wind at every sample, held until the next.
+    """Current and wind at every sample, held until the next."""
 
-    Attributes:
-        current_to, wind_to: (k, 2) velocity to north/east [m/s].
-    """
-
+    # current_to, wind_to: (k, 2) velocity to north/east [m/s]
     current_to: Array
     wind_to: Array
 

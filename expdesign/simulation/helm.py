@@ -32,13 +32,9 @@ STEADY = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class Helm:
-    """How a helm angle and an engine order become actuator commands.
+    """How a helm angle and an engine order become actuator commands."""
 
-    Attributes:
-        vessel: the one that is steered.
-    """
-
-    vessel: Vessel
+    vessel: Vessel  # the one that is steered
 
     def __post_init__(self) -> None:
         kinds = {actuator.kind for actuator in self.vessel.actuators}
@@ -155,21 +151,13 @@ class Helm:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Approach:
-    """A steady run straight ahead in calm water.
+    """A steady run straight ahead in calm water."""
 
-    Attributes:
-        helm: how the vessel is steered.
-        drive: engine order that holds the speed.
-        angle_rad: helm that holds the course; 0 for a symmetric vessel.
-        starboard: +1 or -1: sign of a change of helm that turns the vessel to starboard, 0 where nothing does.
-        velocity: (3,) u, v, r through water, r = 0.
-    """
-
-    helm: Helm
-    drive: float
-    angle_rad: float
-    starboard: int
-    velocity: Array
+    helm: Helm  # how the vessel is steered
+    drive: float  # engine order that holds the speed
+    angle_rad: float  # helm that holds the course; 0 for a symmetric vessel
+    starboard: int  # +1 or -1: sign of a change of helm that turns the vessel to starboard, 0 where nothing does
+    velocity: Array  # (3,) u, v, r through water, r = 0
 
     def __post_init__(self) -> None:
         seal(self, velocity="3")

@@ -299,25 +299,15 @@ def simulate_many(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Runs:
-    """Runs to be integrated.
+    """Runs to be integrated."""
 
-    Attributes:
-        model: their structure.
-        start: (6 or 8, n) states.
-        given: (k, s or 1, m, n or 1) delivered inputs.
-        sea: (k, 4, n) current and wind.
-        parameters: (n, p).
-        sample_time_s: between samples.
-        shares: (s,) of it that integrator steps take.
-    """
-
-    model: VesselModel
-    start: Array
-    given: Array
-    sea: Array
-    parameters: Array
-    sample_time_s: float
-    shares: Array
+    model: VesselModel  # their structure
+    start: Array  # (6 or 8, n) states
+    given: Array  # (k, s or 1, m, n or 1) delivered inputs
+    sea: Array  # (k, 4, n) current and wind
+    parameters: Array  # (n, p)
+    sample_time_s: float  # between samples
+    shares: Array  # (s,) of it that integrator steps take
 
     def one_by_one(self) -> Array:
         """(k + 1, n, 6) states by compiled steps, the quicker way for few runs."""

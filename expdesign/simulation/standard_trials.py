@@ -43,19 +43,12 @@ STILL = np.zeros((1, 4))
 
 @dataclass(frozen=True, kw_only=True)
 class Conduct:
-    """How a standard trial is run.
+    """How a standard trial is run."""
 
-    Attributes:
-        speed_mps: approach speed through water, or None for `service_speed`.
-        approach_s: steady run before the first order.
-        duration_s: length of the whole trial, or None to end it where the trial is complete.
-        sample_time_s: time between commands, or None for the vessel's.
-    """
-
-    speed_mps: float | None = None
-    approach_s: float = 0.0
-    duration_s: float | None = None
-    sample_time_s: float | None = None
+    speed_mps: float | None = None  # approach speed through water, or None for `service_speed`
+    approach_s: float = 0.0  # steady run before the first order
+    duration_s: float | None = None  # length of the whole trial, or None to end it where the trial is complete
+    sample_time_s: float | None = None  # time between commands, or None for the vessel's
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,18 +62,13 @@ class Stage:
 
 @dataclass(frozen=True, kw_only=True)
 class _Orders:
-    """Where engine order and helm stand; they move towards a stage's with their largest rates.
+    """Where engine order and helm stand; they move towards a stage's with their largest rates."""
 
-    Attributes:
-        helm: turns them into commands.
-        drive, angle_rad: at the beginning of the sample.
-        step_s: time between samples.
-    """
-
-    helm: Helm
+    helm: Helm  # turns them into commands
+    # drive, angle_rad: at the beginning of the sample
     drive: float
     angle_rad: float
-    step_s: float
+    step_s: float  # time between samples
 
     def toward(self, old: Stage, new: Stage, share: float) -> tuple[list[float], _Orders]:
         """The mean command of a sample in which `new` follows `old` after a share of it, and the orders at its end."""

@@ -31,17 +31,11 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 
 @dataclass(frozen=True)
 class Entry:
-    """One value on a tape.
+    """One value on a tape."""
 
-    Attributes:
-        name: a key of `FUNCTIONS`, "constant", or the name of a given value.
-        arguments: places of the operands on the tape; none for constants and given values.
-        number: value of a constant, or place among given values of that name.
-    """
-
-    name: str
-    arguments: tuple[int, ...] = ()
-    number: float = 0.0
+    name: str  # a key of `FUNCTIONS`, "constant", or the name of a given value
+    arguments: tuple[int, ...] = ()  # places of the operands on the tape; none for constants and given values
+    number: float = 0.0  # value of a constant, or place among given values of that name
 
 
 class Tape:
@@ -142,19 +136,13 @@ SYMBOLIC = Operators(_function("absolute"), _function("sin"), _function("cos"))
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Several expressions, to be evaluated at once.
+    """Several expressions, to be evaluated at once."""
 
-    Attributes:
-        signals: (place, name) of what is read.
-        constants: place -> number.
-        operations: (place, function, places of its operands), in order.
-        results: places of the values.
-    """
-
-    signals: tuple[tuple[int, str], ...]
-    constants: Mapping[int, float]
+    signals: tuple[tuple[int, str], ...]  # (place, name) of what is read
+    constants: Mapping[int, float]  # place -> number
+    # (place, function, places of its operands), in order
     operations: tuple[tuple[int, Callable[..., Any], tuple[int, ...]], ...]
-    results: tuple[int, ...]
+    results: tuple[int, ...]  # places of the values
 
     def values(self, signals: Mapping[str, Any]) -> list[Any]:
         """Values of all expressions, for signals that are numbers or arrays; what they share is computed once."""

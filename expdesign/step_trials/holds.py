@@ -19,16 +19,11 @@ THROTTLES, RUDDERS = ("n", "tau_x"), ("rudder", "a", "tau_psi")
 
 @dataclass(frozen=True, kw_only=True)
 class Controls:
-    """Which signals are the two commands.
+    """Which signals are the two commands."""
 
-    Attributes:
-        throttle: signals whose mean drives the vessel.
-        rudder: signals whose mean turns it.
-        differential: half the difference of the first and the last throttle turns it, as with two fixed propellers.
-    """
-
-    throttle: tuple[str, ...]
-    rudder: tuple[str, ...] = ()
+    throttle: tuple[str, ...]  # signals whose mean drives the vessel
+    rudder: tuple[str, ...] = ()  # signals whose mean turns it
+    # half the difference of the first and the last throttle turns it, as with two fixed propellers
     differential: bool = False
 
     @property
@@ -70,24 +65,15 @@ def _first_kind(names: Sequence[str], kinds: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sailed:
-    """One uninterrupted record of a step trial.
+    """One uninterrupted record of a step trial."""
 
-    Attributes:
-        name: of the batch.
-        sample_time_s: time between samples [s].
-        state: (k, 2) speed over ground U [m/s] and yaw rate r [rad/s].
-        sway: (k,) [m/s], nan where it is not known.
-        commands: (k, 2) throttle and rudder, in the units of their signals.
-        inputs: (k, m) all inputs of the record.
-        heading: (k,) [rad]; when left out, the yaw rate summed up from an unknown heading.
-    """
-
-    name: str
-    sample_time_s: float
-    state: Array
-    sway: Array
-    commands: Array
-    inputs: Array
+    name: str  # of the batch
+    sample_time_s: float  # time between samples [s]
+    state: Array  # (k, 2) speed over ground U [m/s] and yaw rate r [rad/s]
+    sway: Array  # (k,) [m/s], nan where it is not known
+    commands: Array  # (k, 2) throttle and rudder, in the units of their signals
+    inputs: Array  # (k, m) all inputs of the record
+    # (k,) [rad]; when left out, the yaw rate summed up from an unknown heading
     heading: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
@@ -130,29 +116,17 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
 
 @dataclass(frozen=True, kw_only=True)
 class Hold:
-    """Commands that stand still.
+    """Commands that stand still."""
 
-    Attributes:
-        number: counted through all batches, from 1.
-        batch: index of the batch.
-        begin: sample at which the commands began to change towards these.
-        settled: sample from which on they stand.
-        end: sample after the last.
-        commands: throttle and rudder.
-        changed: what changed before it: "throttle", "rudder", "both", or "" for nothing.
-        first: of its batch.
-        change: signed change of throttle and rudder.
-    """
-
-    number: int
-    batch: int
-    begin: int
-    settled: int
-    end: int
-    commands: tuple[float, float]
-    changed: str
-    change: tuple[float, float]
-    first: bool
+    number: int  # counted through all batches, from 1
+    batch: int  # index of the batch
+    begin: int  # sample at which the commands began to change towards these
+    settled: int  # sample from which on they stand
+    end: int  # sample after the last
+    commands: tuple[float, float]  # throttle and rudder
+    changed: str  # what changed before it: "throttle", "rudder", "both", or "" for nothing
+    change: tuple[float, float]  # signed change of throttle and rudder
+    first: bool  # of its batch
 
     @property
     def channel(self) -> int | None:

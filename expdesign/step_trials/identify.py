@@ -32,28 +32,18 @@ LEAST_SAMPLES = 3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StepTrial:
-    """All that a record of steps gives.
+    """All that a record of steps gives."""
 
-    Attributes:
-        batches, holds: the record.
-        controls: which signals are throttle and rudder.
-        rudder_sign: +1, or -1 where the rudder signal is negative for turns to starboard; the model's is positive.
-        tests: of steady state, for U and r.
-        samples: one for each hold.
-        delays: dead time of throttle and rudder with standard error [s].
-        model: with two degrees of freedom.
-        found: asymmetry and hysteresis.
-    """
-
+    # batches, holds: the record
     batches: tuple[Sailed, ...]
     holds: tuple[Hold, ...]
-    controls: Controls
-    rudder_sign: int
-    tests: tuple[RatioTest, RatioTest]
-    samples: tuple[StepSample, ...]
-    delays: Delays
-    model: TwoDofModel
-    found: tuple[Comparison, ...]
+    controls: Controls  # which signals are throttle and rudder
+    rudder_sign: int  # +1, or -1 where the rudder signal is negative for turns to starboard; the model's is positive
+    tests: tuple[RatioTest, RatioTest]  # of steady state, for U and r
+    samples: tuple[StepSample, ...]  # one for each hold
+    delays: Delays  # dead time of throttle and rudder with standard error [s]
+    model: TwoDofModel  # with two degrees of freedom
+    found: tuple[Comparison, ...]  # asymmetry and hysteresis
 
     @property
     def counted(self) -> tuple[StepSample, ...]:

@@ -21,19 +21,12 @@ SUBSTEP_SHARE = 0.2  # of the shortest time constant, one step of the simulated 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TwoDofModel:
-    """Damping and inertia of speed and yaw rate.
+    """Damping and inertia of speed and yaw rate."""
 
-    Attributes:
-        damping: sigma_U and sigma_r [unit of throttle, unit of rudder].
-        inertia: m_U and m_r [unit of throttle per m/s2, unit of rudder per rad/s2].
-        delay_s: dead times of throttle and rudder [s].
-        region: where the model holds; outside, surfaces keep their value at its edge and damping grows.
-    """
-
-    damping: tuple[Surface, Surface]
-    inertia: tuple[Surface, Surface]
-    delay_s: tuple[float, float]
-    region: ValidityRegion
+    damping: tuple[Surface, Surface]  # sigma_U and sigma_r [unit of throttle, unit of rudder]
+    inertia: tuple[Surface, Surface]  # m_U and m_r [unit of throttle per m/s2, unit of rudder per rad/s2]
+    delay_s: tuple[float, float]  # dead times of throttle and rudder [s]
+    region: ValidityRegion  # where the model holds; outside, surfaces keep their value at its edge and damping grows
 
     def rates(self, state: Array, commands: Array) -> Array:
         """(2,) dU/dt [m/s2] and dr/dt [rad/s2] at a state (2,) under delayed commands (2,).

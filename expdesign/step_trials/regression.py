@@ -29,19 +29,12 @@ SMALLEST = 1e-11
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sampled:
-    """Values of a function at places.
+    """Values of a function at places."""
 
-    Attributes:
-        columns: (n, p) basis functions.
-        values: (n,).
-        weights: (n,).
-        penalised: (p,) 0 for the intercept, 1 for others.
-    """
-
-    columns: Array
-    values: Array
-    weights: Array
-    penalised: Array
+    columns: Array  # (n, p) basis functions
+    values: Array  # (n,)
+    weights: Array  # (n,)
+    penalised: Array  # (p,) 0 for the intercept, 1 for others
 
     def __post_init__(self) -> None:
         seal(self, columns="n p", values="n", weights="n", penalised="p")
@@ -55,19 +48,12 @@ class Sampled:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """A regression.
+    """A regression."""
 
-    Attributes:
-        method: "ridge" or "lasso".
-        penalty: that cross-validation chose.
-        coefficients: (p,) of the columns as given.
-        held_out: weighted root mean square error of cross-validation, unit of the values.
-    """
-
-    method: str
-    penalty: float
-    coefficients: Array
-    held_out: float
+    method: str  # "ridge" or "lasso"
+    penalty: float  # that cross-validation chose
+    coefficients: Array  # (p,) of the columns as given
+    held_out: float  # weighted root mean square error of cross-validation, unit of the values
 
 
 def best_fit(samples: Sampled) -> Fit:

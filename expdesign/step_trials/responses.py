@@ -39,45 +39,30 @@ Curve = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """A fitted response.
+    """A fitted response."""
 
-    Attributes:
-        time_constant_s: T, or T1 + T2 - T3 of a second order [s].
-        time_constant_std_s: standard error, errors of both plateaus included [s].
-        delay_s, delay_std_s: dead time [s].
-        rms: root mean square of the residuals, unit of the state.
-        independent: how many samples count as independent.
-        damping: zeta of a second order; 1 for a first order.
-        zero_s: T3, 0 for a first order [s].
-        parameters: of its curve.
-    """
-
-    time_constant_s: float
-    time_constant_std_s: float
+    time_constant_s: float  # T, or T1 + T2 - T3 of a second order [s]
+    time_constant_std_s: float  # standard error, errors of both plateaus included [s]
+    # delay_s, delay_std_s: dead time [s]
     delay_s: float
     delay_std_s: float
-    rms: float
-    independent: float
-    damping: float
-    zero_s: float
-    parameters: Array
+    rms: float  # root mean square of the residuals, unit of the state
+    independent: float  # how many samples count as independent
+    damping: float  # zeta of a second order; 1 for a first order
+    zero_s: float  # T3, 0 for a first order [s]
+    parameters: Array  # of its curve
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Transient:
-    """Data of one step from the change of command on.
+    """Data of one step from the change of command on."""
 
-    Attributes:
-        time_s: (k,) from the change of command [s].
-        values: (k,) the state.
-        before, after: the plateaus.
-        before_std, after_std: their standard errors.
-    """
-
-    time_s: Array
-    values: Array
+    time_s: Array  # (k,) from the change of command [s]
+    values: Array  # (k,) the state
+    # before, after: the plateaus
     before: float
     after: float
+    # before_std, after_std: their standard errors
     before_std: float = 0.0
     after_std: float = 0.0
 

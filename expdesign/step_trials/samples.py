@@ -36,24 +36,18 @@ PREFERRED = 10.0  # decrease of Akaike's criterion from which a second order res
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plateau:
-    """Steady state of a hold.
+    """Steady state of a hold."""
 
-    Attributes:
-        state, std: (2,) mean of U and r, and their standard errors.
-        sway, sway_std: mean v and its standard error, nan where it is not known.
-        inputs: (m,) all inputs of the record.
-        turns: whole turns over which the mean was taken, which cancel a current to first order; 0 for none.
-        duration_s: time of the mean [s].
-        course: (2,) mean cosine and sine of the heading, near zero over whole turns.
-    """
-
+    # state, std: (2,) mean of U and r, and their standard errors
     state: Array
     std: Array
+    # sway, sway_std: mean v and its standard error, nan where it is not known
     sway: float
     sway_std: float
-    inputs: Array
-    turns: int
-    duration_s: float
+    inputs: Array  # (m,) all inputs of the record
+    turns: int  # whole turns over which the mean was taken, which cancel a current to first order; 0 for none
+    duration_s: float  # time of the mean [s]
+    # (2,) mean cosine and sine of the heading, near zero over whole turns
     course: Array = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
@@ -62,47 +56,29 @@ class Plateau:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Middle:
-    """State at half of a transient.
+    """State at half of a transient."""
 
-    Attributes:
-        state: (2,) U and r.
-        sway: v, nan where it is not known.
-    """
-
-    state: Array
-    sway: float
+    state: Array  # (2,) U and r
+    sway: float  # v, nan where it is not known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StepSample:
-    """What one hold gives.
+    """What one hold gives."""
 
-    Attributes:
-        hold: its commands.
-        steady_s: time from the change of command until steady [s], None where it never was.
-        plateau: None where the hold was not steady.
-        before: plateau of the hold before.
-        transient: data of the state that the command drives.
-        response: of the state that the command drives: second order where that is preferred.
-        first_order: the same by a first order, for comparison.
-        middle: of the transient.
-        inertia, inertia_std: m in units of command per acceleration.
-        problems: why the step gives no inertia; it should be repeated.
-        remarks: on a step that counts.
-    """
-
-    hold: Hold
-    steady_s: float | None
-    plateau: Plateau | None
-    before: Plateau | None = None
-    transient: Transient | None = None
-    response: Response | None = None
-    first_order: Response | None = None
-    middle: Middle | None = None
+    hold: Hold  # its commands
+    steady_s: float | None  # time from the change of command until steady [s], None where it never was
+    plateau: Plateau | None  # None where the hold was not steady
+    before: Plateau | None = None  # plateau of the hold before
+    transient: Transient | None = None  # data of the state that the command drives
+    response: Response | None = None  # of the state that the command drives: second order where that is preferred
+    first_order: Response | None = None  # the same by a first order, for comparison
+    middle: Middle | None = None  # of the transient
+    # inertia, inertia_std: m in units of command per acceleration
     inertia: float = math.nan
     inertia_std: float = math.nan
-    problems: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()  # why the step gives no inertia; it should be repeated
+    remarks: tuple[str, ...] = ()  # on a step that counts
 
     @property
     def counts(self) -> bool:

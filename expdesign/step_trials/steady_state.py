@@ -44,22 +44,15 @@ WAITING, TRANSIENT, STEADY = "waiting", "transient", "steady"
 
 @dataclass(frozen=True, kw_only=True)
 class RatioTest:
-    """Filters and thresholds for one signal.
+    """Filters and thresholds for one signal."""
 
-    Attributes:
-        sample_time_s: of the signal [s].
-        averaged: samples that are averaged to one of the test.
-        rate: l1, per averaged sample.
-        lower, upper: R below the lower one means steady, above the upper one transient.
-        noise: variance of the averaged signal in steady state.
-    """
-
-    sample_time_s: float
-    averaged: int
-    rate: float
+    sample_time_s: float  # of the signal [s]
+    averaged: int  # samples that are averaged to one of the test
+    rate: float  # l1, per averaged sample
+    # lower, upper: R below the lower one means steady, above the upper one transient
     lower: float
     upper: float
-    noise: float
+    noise: float  # variance of the averaged signal in steady state
 
     @property
     def interval_s(self) -> float:
@@ -79,23 +72,16 @@ class RatioTest:
 
 @dataclass(frozen=True, kw_only=True)
 class Watched:
-    """State of the test for one signal.
+    """State of the test for one signal."""
 
-    Attributes:
-        mean, spread, jitter: xf, nu2 and delta2.
-        last: averaged sample before.
-        mode: one of `WAITING`, `TRANSIENT`, `STEADY`.
-        below_s: time that R has been below the lower threshold [s].
-        part: samples of an unfinished average.
-    """
-
+    # mean, spread, jitter: xf, nu2 and delta2
     mean: float
     spread: float
     jitter: float
-    last: float
-    mode: str = TRANSIENT
-    below_s: float = 0.0
-    part: tuple[float, ...] = ()
+    last: float  # averaged sample before
+    mode: str = TRANSIENT  # one of `WAITING`, `TRANSIENT`, `STEADY`
+    below_s: float = 0.0  # time that R has been below the lower threshold [s]
+    part: tuple[float, ...] = ()  # samples of an unfinished average
 
     def ratio(self, test: RatioTest) -> float:
         """R."""

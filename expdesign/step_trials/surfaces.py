@@ -33,23 +33,16 @@ NO_BEND = (0.0, 0.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
-    """A function of U [m/s] and r [rad/s].
+    """A function of U [m/s] and r [rad/s]."""
 
-    Attributes:
-        powers: of U and r in each term.
-        coefficients: (p,) of the terms, the last one of tanh(a (U - b)) where there is a bend.
-        bend: a [s/m] and b [m/s]; `NO_BEND` for none.
-        method, penalty: of the regression.
-        held_out: root mean square error of cross-validation.
-        least, most: smallest and largest value measured.
-    """
-
-    powers: tuple[tuple[int, int], ...]
-    coefficients: Array
-    bend: tuple[float, float]
+    powers: tuple[tuple[int, int], ...]  # of U and r in each term
+    coefficients: Array  # (p,) of the terms, the last one of tanh(a (U - b)) where there is a bend
+    bend: tuple[float, float]  # a [s/m] and b [m/s]; `NO_BEND` for none
+    # method, penalty: of the regression
     method: str
     penalty: float
-    held_out: float
+    held_out: float  # root mean square error of cross-validation
+    # least, most: smallest and largest value measured
     least: float
     most: float
 
@@ -126,15 +119,10 @@ def _bends(speeds: Array) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ValidityRegion:
-    """Convex hull of the steady states and transients of a trial, in U and |r|, mirrored to both sides.
+    """Convex hull of the steady states and transients of a trial, in U and |r|, mirrored to both sides."""
 
-    Attributes:
-        corners: (k, 2) of the hull, U [m/s] and r [rad/s] divided by `scale`.
-        scale: (2,) largest U and |r|.
-    """
-
-    corners: Array
-    scale: Array
+    corners: Array  # (k, 2) of the hull, U [m/s] and r [rad/s] divided by `scale`
+    scale: Array  # (2,) largest U and |r|
 
     def __post_init__(self) -> None:
         seal(self, corners="k 2", scale="2")
@@ -181,23 +169,14 @@ LOW_ORDER = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A difference in damping that a symmetric surface without memory cannot have.
+    """A difference in damping that a symmetric surface without memory cannot have."""
 
-    Attributes:
-        kind: "asymmetry" or "hysteresis".
-        command: "throttle" or "rudder".
-        difference: half of that between the two sides or branches, in the unit of the command.
-        std: its standard error.
-        p_value: of no difference.
-        samples: plateaus compared.
-    """
-
-    kind: str
-    command: str
-    difference: float
-    std: float
-    p_value: float
-    samples: int
+    kind: str  # "asymmetry" or "hysteresis"
+    command: str  # "throttle" or "rudder"
+    difference: float  # half of that between the two sides or branches, in the unit of the command
+    std: float  # its standard error
+    p_value: float  # of no difference
+    samples: int  # plateaus compared
 
 
 def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:

@@ -72,12 +72,9 @@ def response_keys(stem: str) -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """Bounds of one actuator signal.
+    """Bounds of one actuator signal."""
 
-    Attributes:
-        low, high: [unit of the signal], low < high; infinite where there is none.
-    """
-
+    # low, high: [unit of the signal], low < high; infinite where there is none
     low: float = -math.inf
     high: float = math.inf
 
@@ -93,19 +90,14 @@ class Response:
     The actuator moves towards a command at its slew rate; a position smaller in size than `deadband` counts as zero,
     others are not shortened; it acts `delay_s` later; what is delivered approaches it as a first-order lag,
     dx/dt = (c - x) / `lag_s`; a misalignment is added, x + `offset`.
-
-    Attributes:
-        rate: slew rate, the largest change per second [unit of the signal per second], infinite for none.
-        lag_s: time constant [s], 0 for none.
-        delay_s: dead time [s].
-        deadband: [unit of the signal], not negative.
-        offset: delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard.
     """
 
+    # slew rate, the largest change per second [unit of the signal per second], infinite for none
     rate: float = math.inf
-    lag_s: float = 0.0
-    delay_s: float = 0.0
-    deadband: float = 0.0
+    lag_s: float = 0.0  # time constant [s], 0 for none
+    delay_s: float = 0.0  # dead time [s]
+    deadband: float = 0.0  # [unit of the signal], not negative
+    # delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard
     offset: float = 0.0
 
     def __post_init__(self) -> None:
@@ -129,22 +121,15 @@ IDEAL = Response()
 
 @dataclass(frozen=True, kw_only=True)
 class Actuator:
-    """One actuator.
+    """One actuator."""
 
-    Attributes:
-        kind: a key of `KINDS`.
-        number: distinguishes actuators of one kind in signal names, from 1.
-        forward_m, starboard_m: place in the b-frame [m].
-        limits: one `Limit` for each signal of the kind, in order.
-        responses: one `Response` for each signal likewise; ideal ones when left out.
-    """
-
-    kind: str
-    number: int
+    kind: str  # a key of `KINDS`
+    number: int  # distinguishes actuators of one kind in signal names, from 1
+    # forward_m, starboard_m: place in the b-frame [m]
     forward_m: float = 0.0
     starboard_m: float = 0.0
-    limits: tuple[Limit, ...]
-    responses: tuple[Response, ...] = ()
+    limits: tuple[Limit, ...]  # one `Limit` for each signal of the kind, in order
+    responses: tuple[Response, ...] = ()  # one `Response` for each signal likewise; ideal ones when left out
 
     def __post_init__(self) -> None:
         if not self.responses:

@@ -18,15 +18,12 @@ class Variation:
     Its autocorrelation is std_mps**2 exp(-|lag| / correlation_s); a correlation time of zero is white noise from sample
     to sample.
 
-    Attributes:
-        std_mps: standard deviation of each component [m/s].
-        correlation_s: correlation time [s].
 
     Source: A. Gelb (ed.), Applied Optimal Estimation (1974), section 3.8 (exponentially correlated processes).
     """
 
-    std_mps: float = 0.0
-    correlation_s: float = 0.0
+    std_mps: float = 0.0  # standard deviation of each component [m/s]
+    correlation_s: float = 0.0  # correlation time [s]
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -46,24 +43,17 @@ SEA_STATES = range(10)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Environment:
-    """Forecast for a trial: its mean current and wind, and how they vary while it lasts.
+    """Forecast for a trial: its mean current and wind, and how they vary while it lasts."""
 
-    Attributes:
-        current_to: (2,) mean current, velocity to north/east [m/s].
-        current_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
-        wind_to: (2,) mean wind, velocity to north/east [m/s].
-        wind_std_mps: standard deviation with which the trial's mean of each component is known [m/s].
-        current_variation, wind_variation: what happens around the trial's mean from sample to sample.
-        sea_state: WMO code 0 (calm) to 9 (phenomenal) of table 3700, or None when not given; it is stated beside the
-            limits on trials and moves no ship here.
-    """
-
-    current_to: Array = field(default_factory=lambda: np.zeros(2))
-    wind_to: Array = field(default_factory=lambda: np.zeros(2))
-    current_std_mps: float = 0.0
-    wind_std_mps: float = 0.0
+    current_to: Array = field(default_factory=lambda: np.zeros(2))  # (2,) mean current, velocity to north/east [m/s]
+    wind_to: Array = field(default_factory=lambda: np.zeros(2))  # (2,) mean wind, velocity to north/east [m/s]
+    current_std_mps: float = 0.0  # standard deviation with which the trial's mean of each component is known [m/s]
+    wind_std_mps: float = 0.0  # standard deviation with which the trial's mean of each component is known [m/s]
+    # current_variation, wind_variation: what happens around the trial's mean from sample to sample
     current_variation: Variation = STEADY
     wind_variation: Variation = STEADY
+    # WMO code 0 (calm) to 9 (phenomenal) of table 3700, or None when not given; it is stated beside the limits on
+    # trials and moves no ship here
     sea_state: int | None = None
 
     def __post_init__(self) -> None:

@@ -41,19 +41,12 @@ Evaluate = Callable[[Signals, Operators], Any]
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.
+    """A parsed expression."""
 
-    Attributes:
-        text: as written.
-        signals: the signal names it reads, sorted.
-        evaluate: (signals, operators) -> value.
-        moduli: what stands inside each `abs`, innermost first.
-    """
-
-    text: str
-    signals: tuple[str, ...]
-    evaluate: Evaluate
-    moduli: tuple[Expression, ...] = ()
+    text: str  # as written
+    signals: tuple[str, ...]  # the signal names it reads, sorted
+    evaluate: Evaluate  # (signals, operators) -> value
+    moduli: tuple[Expression, ...] = ()  # what stands inside each `abs`, innermost first
 
 
 def parse_expression(text: str, *, signals: tuple[str, ...]) -> Expression:

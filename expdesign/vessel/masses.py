@@ -15,17 +15,11 @@ from expdesign.waves import G_MPS2 as G_MPS2
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """A mass on board beside the ship's own.
+    """A mass on board beside the ship's own."""
 
-    Attributes:
-        mass_kg: not negative.
-        z_m: of its centre, down from the body origin [m].
-        inertia_kgm2: about its own centre.
-    """
-
-    mass_kg: float
-    z_m: float
-    inertia_kgm2: float = 0.0
+    mass_kg: float  # not negative
+    z_m: float  # of its centre, down from the body origin [m]
+    inertia_kgm2: float = 0.0  # about its own centre
 
     def __post_init__(self) -> None:
         for name in ("mass_kg", "inertia_kgm2"):
@@ -41,19 +35,12 @@ NOMINAL = Load(mass_kg=0.0, z_m=0.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """What is known of the ship without load: from scales, a tilting test and a ruler.
+    """What is known of the ship without load: from scales, a tilting test and a ruler."""
 
-    Attributes:
-        mass_kg: M, positive.
-        z_g: of its centre of mass, down from the body origin [m].
-        z_s: of the accelerometer, down [m]: from the body origin, or from the rotation axis.
-        sensor_from_axis: z_s is counted from the rotation axis, which somebody has located.
-    """
-
-    mass_kg: float
-    z_g: float
-    z_s: float
-    sensor_from_axis: bool = False
+    mass_kg: float  # M, positive
+    z_g: float  # of its centre of mass, down from the body origin [m]
+    z_s: float  # of the accelerometer, down [m]: from the body origin, or from the rotation axis
+    sensor_from_axis: bool = False  # z_s is counted from the rotation axis, which somebody has located
 
     def __post_init__(self) -> None:
         if not 0 < self.mass_kg < math.inf:

@@ -43,19 +43,12 @@ from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Te
 
 @dataclass(frozen=True, kw_only=True)
 class Inertia:
-    """The matrix.
+    """The matrix."""
 
-    Attributes:
-        sway_kg: mass with added mass in sway [kg], positive.
-        yaw_kgm2: moment of inertia with added inertia in yaw, about midships [kg m2], positive.
-        sway_yaw_kgm: sway force per yaw acceleration [kg m].
-        yaw_sway_kgm: yaw moment per sway acceleration [kg m]; None where it is the same.
-    """
-
-    sway_kg: float
-    yaw_kgm2: float
-    sway_yaw_kgm: float
-    yaw_sway_kgm: float | None = None
+    sway_kg: float  # mass with added mass in sway [kg], positive
+    yaw_kgm2: float  # moment of inertia with added inertia in yaw, about midships [kg m2], positive
+    sway_yaw_kgm: float  # sway force per yaw acceleration [kg m]
+    yaw_sway_kgm: float | None = None  # yaw moment per sway acceleration [kg m]; None where it is the same
 
     def __post_init__(self) -> None:
         for name in ("sway_kg", "yaw_kgm2"):
@@ -104,32 +97,20 @@ LEAST_KEPT = 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VesselModel:
-    """Model structure with parameter values.
+    """Model structure with parameter values."""
 
-    Attributes:
-        terms: the rows of the regressor matrix, in parameter order.
-        parameters: (p,) parameter values in that order.
-        parameter_std: (p,) prior standard deviations, zero where the value counts as known.
-        parameter_correlation: of pairs of them, by their names; zero for others. Names that are no parameters are
-            ignored.
-        form: "discrete" (parameters hold the sample time) or "continuous".
-        sample_time_s: of the discrete form [s].
-        actuators: they turn commands into generalised forces.
-        roll: a mode that oscillates beside what the terms say, or None.
-        inertia: coupled inertia of sway and yaw; None where neither accelerates the other.
-        parameter_range: least and most value of parameters by name, on which the prior is conditioned: the signs of
-            damping and thrust of a vessel that is known to be stable, for example.
-    """
-
-    terms: tuple[Term, ...]
-    parameters: Array
-    parameter_std: Array
-    form: str
-    sample_time_s: float
-    actuators: tuple[Actuator, ...]
-    roll: Roll | None = None
-    inertia: Inertia | None = None
+    terms: tuple[Term, ...]  # the rows of the regressor matrix, in parameter order
+    parameters: Array  # (p,) parameter values in that order
+    parameter_std: Array  # (p,) prior standard deviations, zero where the value counts as known
+    form: str  # "discrete" (parameters hold the sample time) or "continuous"
+    sample_time_s: float  # of the discrete form [s]
+    actuators: tuple[Actuator, ...]  # they turn commands into generalised forces
+    roll: Roll | None = None  # a mode that oscillates beside what the terms say, or None
+    inertia: Inertia | None = None  # coupled inertia of sway and yaw; None where neither accelerates the other
+    # of pairs of them, by their names; zero for others. Names that are no parameters are ignored.
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    # least and most value of parameters by name, on which the prior is conditioned: the signs of damping and thrust of
+    # a vessel that is known to be stable, for example
     parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 

@@ -37,21 +37,14 @@ from expdesign.waves import Waves
 
 @dataclass(frozen=True, kw_only=True)
 class Roll:
-    """The mode.
+    """The mode."""
 
-    Attributes:
-        period_s: of the undamped oscillation [s], positive.
-        damping_ratio: zeta, not negative.
-        Y_phi: sway acceleration per unit of roll, a pure number.
-        N_phi: yaw acceleration per unit of roll [rad/m].
-        heel_rad_per_mps2: roll angle that a side acceleration of 1 m/s2 to starboard holds for long, positive to
-            starboard, negative for a ship that heels outwards; 0 where unknown, so that roll is not measured.
-    """
-
-    period_s: float
-    damping_ratio: float
-    Y_phi: float
-    N_phi: float
+    period_s: float  # of the undamped oscillation [s], positive
+    damping_ratio: float  # zeta, not negative
+    Y_phi: float  # sway acceleration per unit of roll, a pure number
+    N_phi: float  # yaw acceleration per unit of roll [rad/m]
+    # roll angle that a side acceleration of 1 m/s2 to starboard holds for long, positive to starboard, negative for a
+    # ship that heels outwards; 0 where unknown, so that roll is not measured
     heel_rad_per_mps2: float = 0.0
 
     def __post_init__(self) -> None:
@@ -104,25 +97,17 @@ NOT_ACTING_BACK = (
 
 @dataclass(frozen=True, kw_only=True)
 class RollPendulum:
-    """The pendulum, with what is known of its parameters.
+    """The pendulum, with what is known of its parameters."""
 
-    Attributes:
-        body: mass and places of the ship without load.
-        load: on board.
-        parameters: value of each of `ROLL_PARAMETERS`.
-        parameter_std: standard deviations; 0, for known, where there is none.
-        parameter_correlation: of pairs of them, by their names; 0 where there is none.
-        waves: that roll the ship in simulated trials; None for still water.
-        heel_max_rad: that plans keep to, infinite for none.
-    """
-
-    body: Body
-    load: Load = NOMINAL
-    parameters: Mapping[str, float] = field(hash=False)
+    body: Body  # mass and places of the ship without load
+    load: Load = NOMINAL  # on board
+    parameters: Mapping[str, float] = field(hash=False)  # value of each of `ROLL_PARAMETERS`
+    # standard deviations; 0, for known, where there is none
     parameter_std: Mapping[str, float] = field(default_factory=dict, hash=False)
+    # of pairs of them, by their names; 0 where there is none
     parameter_correlation: Mapping[tuple[str, str], float] = field(default_factory=dict, hash=False)
-    waves: Waves | None = None
-    heel_max_rad: float = math.inf
+    waves: Waves | None = None  # that roll the ship in simulated trials; None for still water
+    heel_max_rad: float = math.inf  # that plans keep to, infinite for none
 
     def __post_init__(self) -> None:
         if set(self.parameters) != set(ROLL_PARAMETERS):

@@ -14,18 +14,14 @@ SENSORS = ("position", "heading", "velocity", "yaw_rate", "wind")
 
 @dataclass(frozen=True, kw_only=True)
 class Mounting:
-    """Place, delay and sampling interval of a sensor.
+    """Place, delay and sampling interval of a sensor."""
 
-    Attributes:
-        forward_m, starboard_m: place in the b-frame [m]; means something to position, velocity and wind.
-        delay_s: age of its readings [s].
-        interval_s: time between new readings [s]; in between the last one is repeated, noise and all. Not above the
-            sample time, every sample is new.
-    """
-
+    # forward_m, starboard_m: place in the b-frame [m]; means something to position, velocity and wind
     forward_m: float = 0.0
     starboard_m: float = 0.0
-    delay_s: float = 0.0
+    delay_s: float = 0.0  # age of its readings [s]
+    # time between new readings [s]; in between the last one is repeated, noise and all. Not above the sample time,
+    # every sample is new.
     interval_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -54,35 +50,27 @@ CENTRAL = Mounting()
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """Errors of the measurements.
+    """Errors of the measurements."""
 
-    Attributes:
-        position_m, heading_rad, velocity_mps, yaw_rate_radps: standard deviations of white noise, not negative.
-        wind_mps: of each component of a cartesian wind sensor, or of a vane's speed.
-        wind_angle_rad: of a vane's angle.
-        roll_rad, roll_rate_radps, acceleration_mps2: of roll, its rate, and of sway and lateral acceleration.
-        heading_bias_rad: measured heading less true heading.
-        velocity_angle_rad: from the bow to the velocity sensor's own forward axis, clockwise; it measures along that.
-        velocity_scale: measured surge and sway over true ones.
-        yaw_rate_scale: measured yaw rate over true yaw rate.
-        wind_sensor: "cartesian" measures the components of the relative wind, "vane" its speed and angle.
-        position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured.
-    """
-
+    # position_m, heading_rad, velocity_mps, yaw_rate_radps: standard deviations of white noise, not negative
     position_m: float = 0.0
     heading_rad: float = 0.0
     velocity_mps: float = 0.0
     yaw_rate_radps: float = 0.0
-    wind_mps: float = 0.0
-    wind_angle_rad: float = 0.0
+    wind_mps: float = 0.0  # of each component of a cartesian wind sensor, or of a vane's speed
+    wind_angle_rad: float = 0.0  # of a vane's angle
+    # roll_rad, roll_rate_radps, acceleration_mps2: of roll, its rate, and of sway and lateral acceleration
     roll_rad: float = 0.0
     roll_rate_radps: float = 0.0
     acceleration_mps2: float = 0.0
-    heading_bias_rad: float = 0.0
+    heading_bias_rad: float = 0.0  # measured heading less true heading
+    # from the bow to the velocity sensor's own forward axis, clockwise; it measures along that
     velocity_angle_rad: float = 0.0
-    velocity_scale: float = 1.0
-    yaw_rate_scale: float = 1.0
+    velocity_scale: float = 1.0  # measured surge and sway over true ones
+    yaw_rate_scale: float = 1.0  # measured yaw rate over true yaw rate
+    # "cartesian" measures the components of the relative wind, "vane" its speed and angle
     wind_sensor: str = "cartesian"
+    # position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured
     position: Mounting = CENTRAL
     heading: Mounting = CENTRAL
     velocity: Mounting = CENTRAL

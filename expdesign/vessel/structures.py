@@ -22,17 +22,11 @@ FORCE_SIGNALS = ("tau_x", "tau_y", "tau_psi")
 
 @dataclass(frozen=True)
 class Term:
-    """One parameter and its regressor.
+    """One parameter and its regressor."""
 
-    Attributes:
-        equation: "u", "v" or "r".
-        name: parameter name, ASCII, e.g. "X_abs_u_u".
-        expression: the regressor, in the language of `expdesign.vessel.expressions`.
-    """
-
-    equation: str
-    name: str
-    expression: str
+    equation: str  # "u", "v" or "r"
+    name: str  # parameter name, ASCII, e.g. "X_abs_u_u".
+    expression: str  # the regressor, in the language of `expdesign.vessel.expressions`
 
 
 TERMS = {

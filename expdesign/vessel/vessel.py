@@ -46,28 +46,21 @@ def with_response_values(actuators: Sequence[Actuator], values: Mapping[str, flo
 
 @dataclass(frozen=True, kw_only=True)
 class Vessel:
-    """A ship: particulars, model, sensors and weather.
+    """A ship: particulars, model, sensors and weather."""
 
-    Attributes:
-        name: for reports.
-        length_m, beam_m, draught_m: particulars [m]; the origin of the b-frame is amidships.
-        sample_time_s: time between commands and between measurements [s].
-        model: structure, parameters, actuators.
-        sensors: what they add to the truth.
-        environment: weather that came with the model, e.g. from a diagnosis; calm when nothing is known.
-        pendulum: roll that the motion drives and that does not act back on it; None without [roll].
-        std: standard deviations of what actuators and sensors state, by `std_keys`; known exactly where there is none.
-    """
-
-    name: str
+    name: str  # for reports
+    # length_m, beam_m, draught_m: particulars [m]; the origin of the b-frame is amidships
     length_m: float
     beam_m: float
     draught_m: float
-    sample_time_s: float
-    model: VesselModel
-    sensors: Sensors = EXACT
+    sample_time_s: float  # time between commands and between measurements [s]
+    model: VesselModel  # structure, parameters, actuators
+    sensors: Sensors = EXACT  # what they add to the truth
+    # weather that came with the model, e.g. from a diagnosis; calm when nothing is known.
     environment: Environment = CALM
+    # roll that the motion drives and that does not act back on it; None without [roll]
     pendulum: RollPendulum | None = None
+    # standard deviations of what actuators and sensors state, by `std_keys`; known exactly where there is none
     std: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:

@@ -25,15 +25,10 @@ FRAME_HEIGHT_PX = 700
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trial:
-    """A planned and verified trial.
+    """A planned and verified trial."""
 
-    Attributes:
-        content: the values of the report.
-        route: waypoints.
-    """
-
-    content: ReportContent
-    route: Route
+    content: ReportContent  # the values of the report
+    route: Route  # waypoints
 
     @property
     def information(self) -> tuple[PrimitiveInformation, ...]:

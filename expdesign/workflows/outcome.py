@@ -15,34 +15,21 @@ from expdesign.vessel import NOT_ACTING_BACK, Vessel
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Results of a command.
+    """Results of a command."""
 
-    Attributes:
-        files: written, in the order of their contents.
-        summary: key numbers, ready for JSON; units in the names.
-        tables: the same for people where key numbers are many.
-        notes: all that the page notes and warns of, so that nobody has to open it to be warned.
-    """
-
-    files: tuple[Path, ...]
-    summary: Mapping[str, object]
-    tables: tuple[TextTable, ...] = ()
-    notes: tuple[str, ...] = ()
+    files: tuple[Path, ...]  # written, in the order of their contents
+    summary: Mapping[str, object]  # key numbers, ready for JSON; units in the names
+    tables: tuple[TextTable, ...] = ()  # the same for people where key numbers are many
+    notes: tuple[str, ...] = ()  # all that the page notes and warns of, so that nobody has to open it to be warned
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextTable:
-    """A table for a terminal.
+    """A table for a terminal."""
 
-    Attributes:
-        title: what it shows.
-        header: names of the columns.
-        rows: as many cells each.
-    """
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    title: str  # what it shows
+    header: tuple[str, ...]  # names of the columns
+    rows: tuple[tuple[str, ...], ...]  # as many cells each
 
 
 def note_on_roll(vessel: Vessel) -> dict[str, object]:

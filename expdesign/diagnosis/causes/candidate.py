@@ -12,31 +12,21 @@ from expdesign.diagnosis.model import ExtendedModel
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """One way in which a cause may act.
+    """One way in which a cause may act."""
 
-    Attributes:
-        cause: name in the catalogue.
-        free: effects to estimate, with a first guess each; zero where the effect is smooth around zero.
-        fixed: effects that say which candidate it is, e.g. the roll period.
-        finite: the effect is not smooth at zero; it is tried at the first guess as a whole.
-        positive: its size cannot be below zero, so that only a positive one counts as a sign of it.
-        grid: effect whose value is found by trying these once the candidate is singled out, as the likelihood has
-            corners in it.
-        bounds: weighted sums of effects that physics keeps from being positive.
-        above: effects that the data show only above these values.
-        below: effects that the ship can have only below these values.
-        imitates: its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first.
-    """
-
-    cause: str
+    cause: str  # name in the catalogue
+    # effects to estimate, with a first guess each; zero where the effect is smooth around zero
     free: Mapping[str, float]
+    # effects that say which candidate it is, e.g. the roll period.
     fixed: Mapping[str, float] = field(default_factory=dict)
-    finite: bool = False
-    positive: bool = False
+    finite: bool = False  # the effect is not smooth at zero; it is tried at the first guess as a whole
+    positive: bool = False  # its size cannot be below zero, so that only a positive one counts as a sign of it
+    # effect whose value is found by trying these once the candidate is singled out, as the likelihood has corners in it
     grid: tuple[str, tuple[float, ...]] | None = None
-    bounds: tuple[Mapping[str, float], ...] = ()
-    above: Mapping[str, float] = field(default_factory=dict)
-    below: Mapping[str, float] = field(default_factory=dict)
+    bounds: tuple[Mapping[str, float], ...] = ()  # weighted sums of effects that physics keeps from being positive
+    above: Mapping[str, float] = field(default_factory=dict)  # effects that the data show only above these values
+    below: Mapping[str, float] = field(default_factory=dict)  # effects that the ship can have only below these values
+    # its numbers imitate many causes; one with fewer numbers that explains nearly as much comes first
     imitates: bool = False
 
     def is_possible(self, value: Callable[[str], float]) -> bool:
@@ -69,18 +59,12 @@ Values = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
-    """An entry of the catalogue.
+    """An entry of the catalogue."""
 
-    Attributes:
-        name: in the vocabulary of diagnosis.json.
-        summary: what is wrong, in a few words.
-        candidates: for a situation; none if the data cannot show the cause.
-        explain: one or two sentences for a person, from the estimates and the model they are of.
-    """
-
-    name: str
-    summary: str
-    candidates: Callable[[Situation], tuple[Candidate, ...]]
+    name: str  # in the vocabulary of diagnosis.json
+    summary: str  # what is wrong, in a few words
+    candidates: Callable[[Situation], tuple[Candidate, ...]]  # for a situation; none if the data cannot show the cause
+    # one or two sentences for a person, from the estimates and the model they are of
     explain: Callable[[Values, ExtendedModel], str]
 
 

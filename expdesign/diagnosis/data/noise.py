@@ -24,21 +24,14 @@ NO_DIFFERENCE = 0.0, 1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Noise:
-    """Spectrum and size of the remainder: in every channel an autoregression of e_k - share e_(k - lag), e white.
+    """Spectrum and size of the remainder: in every channel an autoregression of e_k - share e_(k - lag), e white."""
 
-    Attributes:
-        filters: (4, p + 1) whitening filters of the autoregressions, the first tap one.
-        std: (4,) of the whitened remainder; infinite for channels that are not measured.
-        current_std_mps: standard deviation of the random current [m/s].
-        current_time_s: its correlation time [s].
-        differences: (share, lag) of every channel; differences of a noisy position or heading have a share of nearly
-            one, and hardly any noise at low frequencies.
-    """
-
-    filters: Array
-    std: Array
-    current_std_mps: float = 0.0
-    current_time_s: float = 300.0
+    filters: Array  # (4, p + 1) whitening filters of the autoregressions, the first tap one
+    std: Array  # (4,) of the whitened remainder; infinite for channels that are not measured
+    current_std_mps: float = 0.0  # standard deviation of the random current [m/s]
+    current_time_s: float = 300.0  # its correlation time [s]
+    # (share, lag) of every channel; differences of a noisy position or heading have a share of nearly one, and hardly
+    # any noise at low frequencies
     differences: tuple[tuple[float, int], ...] = (NO_DIFFERENCE,) * 4
 
     @property

@@ -40,49 +40,35 @@ SAME_TIME = 1e-6  # relative difference up to which sample times count as equal
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Windows:
-    """Windows of equal shape; shorter ones are padded, with nan as measurements.
+    """Windows of equal shape; shorter ones are padded, with nan as measurements."""
 
-    Attributes:
-        step_s: integrator step [s].
-        steps_per_sample: integrator steps from one compared sample to the next.
-        batch: (w,) batch number of each window.
-        batch_inputs: one (k_b rows_per_step, m) array per batch, held inputs, as many rows in every integrator step.
-        first: (w,) first integrator step of each window in its batch.
-        measured: (w, s, 4) channels u, v, r, and the rate of the measured heading where r is a measurement of its own;
-            nan where not measured.
-        heading: (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none.
-        wind: (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last measured one where a
-            sample lacks it, nan in batches without.
-        depth_m: (w, k), the last measured one where a sample lacks it, inf in batches without.
-        time_s: (w, k) time since the first batch began, batches laid end to end.
-        has_heading, has_wind, has_depth: whether these are measured.
-        derived: those of u, v, r that come from the pose.
-        names: of the batches, those of one file "NAME, batch NUMBER".
-        starts: (batches,) where each begins on the clock of `time_s`; empty where nothing depends on it.
-        rows_per_step: samples of the data in an integrator step, where several are averaged.
-        has_position: whether any batch has positions.
-        white_noise: fits take what is left for white noise. In windows too short to tell slow noise or a random current
-            from a steady force, either would take the place of any slow effect.
-    """
-
-    step_s: float
-    steps_per_sample: int
-    batch: Array
+    step_s: float  # integrator step [s]
+    steps_per_sample: int  # integrator steps from one compared sample to the next
+    batch: Array  # (w,) batch number of each window
+    # one (k_b rows_per_step, m) array per batch, held inputs, as many rows in every integrator step
     batch_inputs: tuple[Array, ...]
-    first: Array
+    first: Array  # (w,) first integrator step of each window in its batch
+    # (w, s, 4) channels u, v, r, and the rate of the measured heading where r is a measurement of its own; nan where
+    # not measured
     measured: Array
-    heading: Array
+    heading: Array  # (w, k) measured heading in the middle of integrator steps, continuous; zero where there is none
+    # (w, k, 2) likewise the wind in the b-frame from measured relative wind, the last measured one where a sample lacks
+    # it, nan in batches without
     wind: Array
-    depth_m: Array
-    time_s: Array
+    depth_m: Array  # (w, k), the last measured one where a sample lacks it, inf in batches without
+    time_s: Array  # (w, k) time since the first batch began, batches laid end to end
+    # has_heading, has_wind, has_depth: whether these are measured
     has_heading: bool
     has_wind: bool
     has_depth: bool
-    derived: tuple[str, ...]
-    names: tuple[str, ...]
-    rows_per_step: int = 1
-    has_position: bool = False
+    derived: tuple[str, ...]  # those of u, v, r that come from the pose
+    names: tuple[str, ...]  # of the batches, those of one file "NAME, batch NUMBER"
+    rows_per_step: int = 1  # samples of the data in an integrator step, where several are averaged
+    has_position: bool = False  # whether any batch has positions
+    # fits take what is left for white noise. In windows too short to tell slow noise or a random current from a steady
+    # force, either would take the place of any slow effect.
     white_noise: bool = False
+    # (batches,) where each begins on the clock of `time_s`; empty where nothing depends on it
     starts: tuple[float, ...] = ()
 
     @property

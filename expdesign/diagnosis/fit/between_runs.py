@@ -34,17 +34,12 @@ NORMAL_95 = float(scipy.stats.norm.ppf(0.975))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spread:
-    """How estimates in some directions differ between runs.
+    """How estimates in some directions differ between runs."""
 
-    Attributes:
-        ratio: (k,) of their variance over that of noise alone.
-        freedom: (k,) degrees of freedom of that ratio.
-        uneven: (k,) how much more of the variance between runs is left in an estimate than with equal runs: one where
-            they are equal, as many as there are degrees of freedom where one run tells all.
-    """
-
-    ratio: Array
-    freedom: Array
+    ratio: Array  # (k,) of their variance over that of noise alone
+    freedom: Array  # (k,) degrees of freedom of that ratio
+    # (k,) how much more of the variance between runs is left in an estimate than with equal runs: one where they are
+    # equal, as many as there are degrees of freedom where one run tells all
     uneven: Array
 
 

@@ -114,17 +114,11 @@ def cross_validate(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Effects:
-    """What stretches take from a fit, without all that it holds.
+    """What stretches take from a fit, without all that it holds."""
 
-    Attributes:
-        ship: fitted.
-        free_keys: effects without a prior.
-        sizes: (free, w) greatest sensitivity to each of them in every window.
-    """
-
-    ship: ExtendedModel
-    free_keys: tuple[str, ...]
-    sizes: Array
+    ship: ExtendedModel  # fitted
+    free_keys: tuple[str, ...]  # effects without a prior
+    sizes: Array  # (free, w) greatest sensitivity to each of them in every window
 
     @staticmethod
     def of(found: Fit) -> _Effects:
@@ -172,25 +166,17 @@ def cross_validate_ahead(found: Fit) -> HeldOut:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Folds:
-    """What is cross-validated.
+    """What is cross-validated."""
 
-    Attributes:
-        ship: the model, fitted to all units.
-        windows: that it is simulated in.
-        unit: (w,) of each of them.
-        part: (w,) what errors are summed over: units, or stretches of them.
-        fitted: the model fitted to some of the windows, by a mask (w,); None for a model that is not fitted.
-        in_stretches: windows are stretches of units.
-        near: motion of the fit in these windows, which speeds up the simulation; None where they are stretches.
-    """
-
-    ship: ExtendedModel
-    windows: Windows
-    unit: Array
-    part: Array
+    ship: ExtendedModel  # the model, fitted to all units
+    windows: Windows  # that it is simulated in
+    unit: Array  # (w,) of each of them
+    part: Array  # (w,) what errors are summed over: units, or stretches of them
+    # the model fitted to some of the windows, by a mask (w,); None for a model that is not fitted
     fitted: Callable[[Windows, NDArray[np.bool_]], ExtendedModel | None] | None
+    # motion of the fit in these windows, which speeds up the simulation; None where they are stretches
     near: LinearisedMotion | None = None
-    in_stretches: bool = False
+    in_stretches: bool = False  # windows are stretches of units
 
 
 def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:

@@ -54,43 +54,28 @@ LITTLE = 1e-6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """A model with effects fitted to all windows.
+    """A model with effects fitted to all windows."""
 
-    Attributes:
-        ship: with the fitted effects.
-        keys: the estimated effects, in order; uncertain parameters last.
-        free_count: how many of them have no prior.
-        covariance: (c, c).
-        starts: (w, n) initial states.
-        noise: of the remainder.
-        cost: weighted squared error at the end, while fitting; deviance: twice its negative log likelihood, with the
-            size of its own noise.
-        linear, sensitivities: at the end; grams: of the sensitivities, under the noise.
-        precision: (c, c) of the effects' priors.
-        step: (c,) to the optimum of the linear model within bounds.
-        gain: by how much it lowers the cost of the linear model.
-        converged: a further step would not lower the cost noticeably.
-        simulations: of all windows that the fit took.
-        freedom: degrees of freedom of the covariance, where it counts how runs differ.
-    """
-
-    ship: ExtendedModel
-    keys: tuple[str, ...]
-    free_count: int
-    covariance: Array
-    starts: Array
-    noise: Noise
+    ship: ExtendedModel  # with the fitted effects
+    keys: tuple[str, ...]  # the estimated effects, in order; uncertain parameters last
+    free_count: int  # how many of them have no prior
+    covariance: Array  # (c, c)
+    starts: Array  # (w, n) initial states
+    noise: Noise  # of the remainder
+    # weighted squared error at the end, while fitting; deviance: twice its negative log likelihood, with the size of
+    # its own noise
     cost: float
     deviance: float
+    # linear, sensitivities: at the end; grams: of the sensitivities, under the noise
     linear: LinearisedMotion
     sensitivities: Sensitivities
     grams: GramMatrices
-    precision: Array
-    step: Array
-    gain: float
-    converged: bool
-    simulations: int = 1
-    freedom: float = math.inf
+    precision: Array  # (c, c) of the effects' priors
+    step: Array  # (c,) to the optimum of the linear model within bounds
+    gain: float  # by how much it lowers the cost of the linear model
+    converged: bool  # a further step would not lower the cost noticeably
+    simulations: int = 1  # of all windows that the fit took
+    freedom: float = math.inf  # degrees of freedom of the covariance, where it counts how runs differ
 
     def selected(self, keep: NDArray[np.bool_]) -> Fit:
         """The same effects beside only some of the windows, by a mask (w,): where a fit to these begins.
@@ -122,22 +107,15 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitOptions:
-    """Options of a fit.
+    """Options of a fit."""
 
-    Attributes:
-        noise: first guess; white noise by default.
-        ar_order: of the noise's autoregressions, or None to choose it.
-        steps: Gauss-Newton steps, at most.
-        warm_start: a fit of a similar ship over the same windows; faster, with the same result.
-        fixed_weights: evaluate a step with the weights of initial states and random current at its start. The weights
-            depend on the effects, which a step of weighted least squares ignores, so a step may raise the cost with
-            updated weights. Fits that are compared with each other need updated weights.
-    """
-
-    noise: Noise | None = None
-    ar_order: int | None = None
-    steps: int = STEPS
-    warm_start: Fit | None = None
+    noise: Noise | None = None  # first guess; white noise by default
+    ar_order: int | None = None  # of the noise's autoregressions, or None to choose it
+    steps: int = STEPS  # Gauss-Newton steps, at most
+    warm_start: Fit | None = None  # a fit of a similar ship over the same windows; faster, with the same result
+    # evaluate a step with the weights of initial states and random current at its start. The weights depend on the
+    # effects, which a step of weighted least squares ignores, so a step may raise the cost with updated weights. Fits
+    # that are compared with each other need updated weights.
     fixed_weights: bool = False
 
 

@@ -60,17 +60,11 @@ NUMBERS_AT_ONCE = 200_000  # in matrices of random currents that are tried toget
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prior:
-    """Prior knowledge of the estimated effects.
+    """Prior knowledge of the estimated effects."""
 
-    Attributes:
-        precision: (c, c) of the Gaussian priors around zero change; zero for effects without a prior.
-        now: (c,) the effects that the sensitivities are taken at, less what the vessel file states of them.
-        bounds: (2, c) least and greatest steps from there.
-    """
-
-    precision: Array
-    now: Array
-    bounds: Array
+    precision: Array  # (c, c) of the Gaussian priors around zero change; zero for effects without a prior
+    now: Array  # (c,) the effects that the sensitivities are taken at, less what the vessel file states of them
+    bounds: Array  # (2, c) least and greatest steps from there
 
 
 def estimate_noise(
@@ -167,17 +161,13 @@ class _Problem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Point:
-    """A model simulated and linearised, before its errors are weighted.
-
-    Attributes:
-        grams: under the noise of the fit that it comes from, where they are known.
-    """
+    """A model simulated and linearised, before its errors are weighted."""
 
     ship: ExtendedModel
     starts: Array
     linear: LinearisedMotion
     sensitivities: Sensitivities
-    grams: GramMatrices | None = None
+    grams: GramMatrices | None = None  # under the noise of the fit that it comes from, where they are known
 
 
 def fit(

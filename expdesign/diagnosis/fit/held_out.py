@@ -49,24 +49,16 @@ BOOTSTRAP_DRAWS = 1000  # of units, for intervals
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeldOut:
-    """Errors of one model on units that it was not fitted to.
+    """Errors of one model on units that it was not fitted to."""
 
-    Attributes:
-        squared_error: (b, n) sum per unit and output; nan for units whose fold could not be fitted.
-        squared_deviation: (b, n) of the measurements from their mean, likewise.
-        unconverged: folds that kept the effects fitted to all units.
-        ahead: of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called.
-        in_stretches: whether these are such errors.
-        run: (b,) of each unit, where these are stretches of runs: those of one run share its errors.
-        models: (mask of windows, model fitted without them) of every fold; None where it could not be fitted.
-    """
-
-    squared_error: Array
-    squared_deviation: Array
-    unconverged: int = 0
+    squared_error: Array  # (b, n) sum per unit and output; nan for units whose fold could not be fitted
+    squared_deviation: Array  # (b, n) of the measurements from their mean, likewise
+    unconverged: int = 0  # folds that kept the effects fitted to all units
+    # of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called
     ahead: Callable[[], HeldOut] | None = None
-    in_stretches: bool = False
-    run: Array | None = None
+    in_stretches: bool = False  # whether these are such errors
+    run: Array | None = None  # (b,) of each unit, where these are stretches of runs: those of one run share its errors
+    # (mask of windows, model fitted without them) of every fold; None where it could not be fitted
     models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
 
     @property

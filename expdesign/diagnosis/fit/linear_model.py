@@ -45,21 +45,13 @@ LARGEST_SENSITIVITY = 1e30  # beyond it the model counts as unstable
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sensitivities:
-    """Derivatives of the simulated channels, before whitening.
+    """Derivatives of the simulated channels, before whitening."""
 
-    Attributes:
-        values: (c, w, s, 4) by the estimated effects, then by the random current at its knots, north before east.
-        starts: (3, w, s, 4) by the initial velocities of every window.
-        error: (w, s, 4) measured less simulated.
-        numbers: how many of `values` are by estimated effects.
-        spacing_s: time between knots of the random current [s].
-    """
-
-    values: Array
-    starts: Array
-    error: Array
-    numbers: int
-    spacing_s: float
+    values: Array  # (c, w, s, 4) by the estimated effects, then by the random current at its knots, north before east
+    starts: Array  # (3, w, s, 4) by the initial velocities of every window
+    error: Array  # (w, s, 4) measured less simulated
+    numbers: int  # how many of `values` are by estimated effects
+    spacing_s: float  # time between knots of the random current [s]
 
     @property
     def knot_count(self) -> int:
@@ -179,21 +171,14 @@ def _parameter_scale(ship: ExtendedModel, key: str) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GramMatrices:
-    """Inner products of whitened sensitivities, per window, initial states projected out.
+    """Inner products of whitened sensitivities, per window, initial states projected out."""
 
-    Attributes:
-        XX: (w, c, c); Xe: (w, c); ee: (w,).
-        effect_starts: (w, n, c) what windows begin with that imitates each sensitivity best.
-        error_starts: (w, n) what imitates the error best.
-        log_det: (w,) of the covariance of the noise before the windows, beside that of white noise in them.
-    """
-
-    XX: Array
+    XX: Array  # (w, c, c); Xe: (w, c); ee: (w,)
     Xe: Array
     ee: Array
-    effect_starts: Array
-    error_starts: Array
-    log_det: Array
+    effect_starts: Array  # (w, n, c) what windows begin with that imitates each sensitivity best
+    error_starts: Array  # (w, n) what imitates the error best
+    log_det: Array  # (w,) of the covariance of the noise before the windows, beside that of white noise in them
 
     def selected(self, keep: NDArray[np.bool_]) -> GramMatrices:
         """Only some of the windows, by a mask (w,)."""
@@ -270,21 +255,13 @@ def _gram(rows: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MarginalInformation:
-    """Information about the estimated effects once the random current is integrated out.
+    """Information about the estimated effects once the random current is integrated out."""
 
-    Attributes:
-        A: (c, c) information matrix.
-        s: (c,) scores.
-        each: (w, c) scores per window.
-        quadratic: e' V^-1 e.
-        log_det: of V beyond the white part.
-    """
-
-    A: Array
-    s: Array
-    each: Array
-    quadratic: float
-    log_det: float
+    A: Array  # (c, c) information matrix
+    s: Array  # (c,) scores
+    each: Array  # (w, c) scores per window
+    quadratic: float  # e' V^-1 e
+    log_det: float  # of V beyond the white part
 
 
 def window_information(grams: GramMatrices, found: Sensitivities, noise: Noise) -> tuple[Array, Array]:

@@ -82,26 +82,18 @@ not here: parameters and terms, whose signs `resisting` keeps, and times of the 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExtendedModel:
-    """A model with effects.
+    """A model with effects."""
 
-    Attributes:
-        model: driven by the recorded inputs.
-        library: terms that the model lacks, by name.
-        draught_m, length_m, beam_m: of the ship [m].
-        derived: those of u, v, r that the data derive from the pose, by its sensors.
-        max_draught_over_depth: largest draught over depth in the data, 0 where no depth is known.
-        effects: key -> value; others are zero.
-        stated: effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of.
-    """
-
-    model: VesselModel
-    library: Mapping[str, Term]
+    model: VesselModel  # driven by the recorded inputs
+    library: Mapping[str, Term]  # terms that the model lacks, by name
+    # draught_m, length_m, beam_m: of the ship [m]
     draught_m: float
     length_m: float
     beam_m: float
-    derived: tuple[str, ...] = ()
-    max_draught_over_depth: float = 0.0
-    effects: Effects = field(default_factory=dict)
+    derived: tuple[str, ...] = ()  # those of u, v, r that the data derive from the pose, by its sensors
+    max_draught_over_depth: float = 0.0  # largest draught over depth in the data, 0 where no depth is known
+    effects: Effects = field(default_factory=dict)  # key -> value; others are zero
+    # effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of
     stated: Effects = field(default_factory=dict)
     stated_std: Effects = field(default_factory=dict)
     scaled_terms: tuple[ScaledTerm, ...] = field(init=False, repr=False)

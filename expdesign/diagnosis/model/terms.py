@@ -30,20 +30,13 @@ MOST_SUMS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledTerm:
-    """One term of the extended model with its factors.
+    """One term of the extended model with its factors."""
 
-    Attributes:
-        equation: u, v or r.
-        expression: its regressor, with what inputs alone make as signals of their own (`with_input_products`).
-        factor: its parameter with all factors, as an acceleration.
-        after: change of the factor after the change point.
-        coriolis, damping, reads_air, reads_turn: its kind.
-    """
-
-    equation: str
-    expression: Expression
-    factor: float
-    after: float = 0.0
+    equation: str  # u, v or r
+    expression: Expression  # its regressor, with what inputs alone make as signals of their own (`with_input_products`)
+    factor: float  # its parameter with all factors, as an acceleration
+    after: float = 0.0  # change of the factor after the change point
+    # coriolis, damping, reads_air, reads_turn: its kind
     coriolis: bool = False
     damping: bool = False
     reads_air: bool = False

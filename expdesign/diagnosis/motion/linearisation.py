@@ -37,23 +37,14 @@ NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
-    """A simulation of all windows.
+    """A simulation of all windows."""
 
-    Attributes:
-        ship: the simulated model.
-        windows: the data it is compared with.
-        exogenous: exogenous signals.
-        states: (w, k, n) at integrator steps.
-        heading_change: (w, k) heading since the start [rad].
-        predicted: (w, s, 4) sensor outputs.
-    """
-
-    ship: ExtendedModel
-    windows: Windows
-    exogenous: ExogenousInputs
-    states: Array
-    heading_change: Array
-    predicted: Array
+    ship: ExtendedModel  # the simulated model
+    windows: Windows  # the data it is compared with
+    exogenous: ExogenousInputs  # exogenous signals
+    states: Array  # (w, k, n) at integrator steps
+    heading_change: Array  # (w, k) heading since the start [rad]
+    predicted: Array  # (w, s, 4) sensor outputs
 
     @cached_property
     def ends(self) -> Array:
@@ -79,19 +70,12 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearisedMotion:
-    """The linearised motion along a simulation.
+    """The linearised motion along a simulation."""
 
-    Attributes:
-        motion: the simulation.
-        transition: (w, k - 1, n, n) transition over each step.
-        forcing: (w, k - 1, n, n) effect of a constant acceleration over each step.
-        path_rates: (2, w, k - 1, n) rates along the path at both ends of every step, with its inputs.
-    """
-
-    motion: Motion
-    transition: Array
-    forcing: Array
-    path_rates: Array
+    motion: Motion  # the simulation
+    transition: Array  # (w, k - 1, n, n) transition over each step
+    forcing: Array  # (w, k - 1, n, n) effect of a constant acceleration over each step
+    path_rates: Array  # (2, w, k - 1, n) rates along the path at both ends of every step, with its inputs
 
     @cached_property
     def mean_rates(self) -> Array:
@@ -245,15 +229,10 @@ def linearised_like(motion: Motion, near: LinearisedMotion | None) -> Linearised
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbance:
-    """A small disturbance along a path.
+    """A small disturbance along a path."""
 
-    Attributes:
-        force: (w, k - 1, n) change of the rates per unit of the disturbance, or None.
-        sensor: (w, s, 4) direct change of the sensor outputs, or None.
-    """
-
-    force: Array | None
-    sensor: Array | None
+    force: Array | None  # (w, k - 1, n) change of the rates per unit of the disturbance, or None
+    sensor: Array | None  # (w, s, 4) direct change of the sensor outputs, or None
 
 
 def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float) -> Disturbance:

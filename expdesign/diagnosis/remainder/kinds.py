@@ -30,19 +30,13 @@ SATURATED = (0.5, 0.75)
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A kind of missing effect.
+    """A kind of missing effect."""
 
-    Attributes:
-        words: what is missing, to follow "looks like".
-        unit: of its size, or empty.
-        disturbance: per unit of its size, along a motion: that of all windows or of some of them.
-        whole: its size is one where it is what is missing.
-    """
-
-    words: str
-    unit: str
+    words: str  # what is missing, to follow "looks like"
+    unit: str  # of its size, or empty
+    # per unit of its size, along a motion: that of all windows or of some of them
     disturbance: Callable[[LinearisedMotion], Disturbance]
-    whole: bool = False
+    whole: bool = False  # its size is one where it is what is missing
 
 
 def kinds(linear: LinearisedMotion) -> tuple[Kind, ...]:

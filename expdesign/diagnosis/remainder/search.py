@@ -73,24 +73,16 @@ LEAST_REDUCTION = 0.05  # share by which the error of some output must fall on h
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Missing:
-    """Something that no cause explains and the data surely show.
+    """Something that no cause explains and the data surely show."""
 
-    Attributes:
-        words: what it looks like.
-        unit: of its size.
-        value, std: its size by the linear model of the fit.
-        chosen: how sure it is.
-        share: of the whitened squared error of held-out units that it takes away.
-        term: to add to the model; None where a vessel file cannot hold it.
-    """
-
-    words: str
-    unit: str
+    words: str  # what it looks like
+    unit: str  # of its size
+    # value, std: its size by the linear model of the fit
     value: float
     std: float
-    chosen: Chosen
-    share: float
-    term: Term | None
+    chosen: Chosen  # how sure it is
+    share: float  # of the whitened squared error of held-out units that it takes away
+    term: Term | None  # to add to the model; None where a vessel file cannot hold it
 
 
 def missing_effects(base: Fit, windows: Windows, rng: np.random.Generator) -> tuple[Missing, ...]:
@@ -269,19 +261,12 @@ UNLISTED = "unlisted_term"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Remainder:
-    """What was found beside the causes of the catalogue.
+    """What was found beside the causes of the catalogue."""
 
-    Attributes:
-        kept: the selection with the terms that were added, and without causes that these make redundant.
-        held: errors on held-out units, of the model before any cause and after every one.
-        kinds: what is missing and cannot be added, surest first.
-        instead: what explains about as much as the causes, and cannot be added.
-    """
-
-    kept: Selection
-    held: list[HeldOut]
-    kinds: tuple[Missing, ...]
-    instead: tuple[Missing, ...]
+    kept: Selection  # the selection with the terms that were added, and without causes that these make redundant
+    held: list[HeldOut]  # errors on held-out units, of the model before any cause and after every one
+    kinds: tuple[Missing, ...]  # what is missing and cannot be added, surest first
+    instead: tuple[Missing, ...]  # what explains about as much as the causes, and cannot be added
 
 
 def with_unlisted_terms(

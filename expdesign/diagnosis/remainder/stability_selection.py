@@ -35,16 +35,11 @@ MOST_LOST = 0.25  # share of it that single units may lose
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UnitInformation:
-    """Information of every unit of the data about nuisance effects and, after them, regressors.
+    """Information of every unit of the data about nuisance effects and, after them, regressors."""
 
-    Attributes:
-        A: (w, c, c); s: (w, c) scores.
-        precision: (n, n) of the priors of the nuisance effects; offset: (n,) their deviations from these.
-    """
-
-    A: Array
+    A: Array  # (w, c, c); s: (w, c) scores
     s: Array
-    precision: Array
+    precision: Array  # (n, n) of the priors of the nuisance effects; offset: (n,) their deviations from these
     offset: Array
 
     def beside_nuisance(self, keep: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -67,20 +62,13 @@ class UnitInformation:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chosen:
-    """One regressor of the sum.
+    """One regressor of the sum."""
 
-    Attributes:
-        index: of it.
-        statistic: by which it raises twice the log likelihood, beside those before it.
-        held_out: the same on units that its size was not fitted to; lost: what it lowers in single ones, summed.
-        frequency: share of half samples of the units in which it, or one that looks like it, is chosen.
-    """
-
-    index: int
-    statistic: float
-    held_out: float
+    index: int  # of it
+    statistic: float  # by which it raises twice the log likelihood, beside those before it
+    held_out: float  # the same on units that its size was not fitted to; lost: what it lowers in single ones, summed
     lost: float
-    frequency: float
+    frequency: float  # share of half samples of the units in which it, or one that looks like it, is chosen
 
 
 def stable_selection(given: UnitInformation, rng: np.random.Generator) -> tuple[Chosen, ...]:

@@ -1,4 +1,4 @@
-"""Candidates fitted together with the findings so far, their likelihood gains, and profiles of likelihoods with corners.
+"""Candidates fitted together with the findings so far, their likelihood gains, and profiles of their likelihoods.
 
 Profile likelihood of effects whose likelihood has corners or plateaus: widths of dead bands, times of changes.
 
@@ -46,25 +46,16 @@ EQUIVALENT_VALUES = 3  # this many equally likely values in a round end the sear
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedCandidate:
-    """A candidate fitted together with the findings so far.
+    """A candidate fitted together with the findings so far."""
 
-    Attributes:
-        candidate: the candidate.
-        fit: of all windows.
-        likelihood_gain: likelihood ratio statistic against the fit without it.
-        penalised_gain: the same less the price of its effects.
-        keys: its own estimated effects.
-        profiled: the effect that a grid or a profile likelihood found, with its standard error.
-        multiplicity: number of independent tests that it is among.
-    """
-
-    candidate: Candidate
-    fit: Fit
-    likelihood_gain: float
-    penalised_gain: float
-    keys: tuple[str, ...]
+    candidate: Candidate  # the candidate
+    fit: Fit  # of all windows
+    likelihood_gain: float  # likelihood ratio statistic against the fit without it
+    penalised_gain: float  # the same less the price of its effects
+    keys: tuple[str, ...]  # its own estimated effects
+    # the effect that a grid or a profile likelihood found, with its standard error
     profiled: tuple[str, float] | None = None
-    multiplicity: float = 1.0
+    multiplicity: float = 1.0  # number of independent tests that it is among
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -94,17 +85,11 @@ class FittedCandidate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rival:
-    """Another candidate that explains the data nearly as well.
+    """Another candidate that explains the data nearly as well."""
 
-    Attributes:
-        candidate: the candidate.
-        ship: with its effects fitted.
-        trails_by: penalised gain of the chosen candidate less its own.
-    """
-
-    candidate: Candidate
-    ship: ExtendedModel
-    trails_by: float
+    candidate: Candidate  # the candidate
+    ship: ExtendedModel  # with its effects fitted
+    trails_by: float  # penalised gain of the chosen candidate less its own
 
 
 def kind_of(candidate: Candidate) -> tuple[str, frozenset[str]]:

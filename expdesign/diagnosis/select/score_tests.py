@@ -119,22 +119,14 @@ TINY = 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreTest:
-    """A candidate with its test.
+    """A candidate with its test."""
 
-    Attributes:
-        candidate: the candidate.
-        statistic: chi-squared with `candidate.size` degrees of freedom if the model is correct.
-        p_value: of this candidate alone.
-        step: (size,) the linear estimate of its free effects; for finite ones the share of the first guess.
-        multiplicity: number of independent tests that all of its round are worth, for its p-value.
-        factor, freedom: of its variance, by how runs differ.
-    """
-
-    candidate: Candidate
-    statistic: float
-    p_value: float
-    step: Array
-    multiplicity: float = 1.0
+    candidate: Candidate  # the candidate
+    statistic: float  # chi-squared with `candidate.size` degrees of freedom if the model is correct
+    p_value: float  # of this candidate alone
+    step: Array  # (size,) the linear estimate of its free effects; for finite ones the share of the first guess
+    multiplicity: float = 1.0  # number of independent tests that all of its round are worth, for its p-value
+    # factor, freedom: of its variance, by how runs differ
     factor: float = 1.0
     freedom: float = math.inf
 
@@ -158,20 +150,13 @@ class ScoreTest:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Scores:
-    """Scores of all distinct disturbances, beside everything in the fit.
+    """Scores of all distinct disturbances, beside everything in the fit."""
 
-    Attributes:
-        A: (m, m) information, s: (m,) scores.
-        size: (m,) norms of the disturbances before anything is projected out of them.
-        index: per candidate, its rows.
-        spread: of the (m,) estimates, between runs.
-    """
-
-    A: Array
+    A: Array  # (m, m) information, s: (m,) scores
     s: Array
-    size: Array
-    index: tuple[Array, ...]
-    spread: Spread
+    size: Array  # (m,) norms of the disturbances before anything is projected out of them
+    index: tuple[Array, ...]  # per candidate, its rows
+    spread: Spread  # of the (m,) estimates, between runs
 
 
 def score_tests(

@@ -34,47 +34,31 @@ SHAPE = ("roll:period", "roll:damping")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Step:
-    """One step of forward selection.
+    """One step of forward selection."""
 
-    Attributes:
-        chosen: the added candidate.
-        p_value: adjusted for multiple tests.
-        alternatives: candidates of other kinds that explain the data as well, best first; before runs are counted,
-            all that explain a good share as much.
-        before: the fit without it.
-        outranked: candidates with more numbers that fit better, and simulate held-out data worse.
-        tests: all score tests of the round.
-    """
-
-    chosen: FittedCandidate
-    p_value: float
+    chosen: FittedCandidate  # the added candidate
+    p_value: float  # adjusted for multiple tests
+    # candidates of other kinds that explain the data as well, best first; before runs are counted, all that explain a
+    # good share as much
     alternatives: tuple[Rival, ...]
-    before: Fit
-    tests: tuple[ScoreTest, ...]
+    before: Fit  # the fit without it
+    tests: tuple[ScoreTest, ...]  # all score tests of the round
+    # candidates with more numbers that fit better, and simulate held-out data worse
     outranked: tuple[Candidate, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Selection:
-    """The selected causes.
+    """The selected causes."""
 
-    Attributes:
-        steps: one per cause.
-        first: the fit before any cause.
-        last: the joint fit of all causes.
-        last_tests: score tests of what is left.
-        untried: what the limit of work left out.
-        beside_stated: causes are fitted beside the parameters of the vessel file, although these are uncertain.
-        dispersion: what estimates of causes differ by between runs, beside the last fit.
-    """
-
-    steps: tuple[Step, ...]
-    first: Fit
-    last: Fit
-    last_tests: tuple[ScoreTest, ...]
-    untried: tuple[str, ...] = ()
+    steps: tuple[Step, ...]  # one per cause
+    first: Fit  # the fit before any cause
+    last: Fit  # the joint fit of all causes
+    last_tests: tuple[ScoreTest, ...]  # score tests of what is left
+    untried: tuple[str, ...] = ()  # what the limit of work left out
+    # causes are fitted beside the parameters of the vessel file, although these are uncertain
     beside_stated: bool = False
-    dispersion: Dispersion = NOISE_ALONE
+    dispersion: Dispersion = NOISE_ALONE  # what estimates of causes differ by between runs, beside the last fit
 
     def with_steps(self, steps: tuple[Step, ...]) -> Selection:
         """The selection with other steps; where these are its first ones, the next round's tests become the last."""

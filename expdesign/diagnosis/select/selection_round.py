@@ -154,18 +154,12 @@ def _shortlist(tests: tuple[ScoreTest, ...]) -> list[ScoreTest]:
 
 @dataclass(kw_only=True)
 class Work:
-    """Simulations of all data in fits of candidates, spent by the search that owns it.
+    """Simulations of all data in fits of candidates, spent by the search that owns it."""
 
-    Attributes:
-        simulations: so far.
-        untried: what was left out once the limit was reached, in order.
-        rounds_left: expected after the present one.
-        progress: of the search and of what follows, in simulations of all data without roll.
-    """
-
-    simulations: int = 0
-    untried: list[str] = field(default_factory=list)
-    rounds_left: int = TUNING.first_rounds
+    simulations: int = 0  # so far
+    untried: list[str] = field(default_factory=list)  # what was left out once the limit was reached, in order
+    rounds_left: int = TUNING.first_rounds  # expected after the present one
+    # of the search and of what follows, in simulations of all data without roll
     progress: Estimated = field(default_factory=lambda: Estimated(silent))
     _fits: tuple[Fit | None, dict[Hashable, Any]] = field(default_factory=lambda: (None, {}), repr=False)
 

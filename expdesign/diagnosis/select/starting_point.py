@@ -35,18 +35,12 @@ FROM_NOTHING = FitOptions(steps=SHORT_STEPS)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StartingPoint:
-    """Starting point of the fit of a candidate.
+    """Starting point of the fit of a candidate."""
 
-    Attributes:
-        test: of the candidate.
-        effects: first guesses.
-        keys: the candidate's own effects that the fit estimates.
-        profiled: the effect found by a grid search, with its standard error; the fit holds it.
-    """
-
-    test: ScoreTest
-    effects: dict[str, float]
-    keys: tuple[str, ...]
+    test: ScoreTest  # of the candidate
+    effects: dict[str, float]  # first guesses
+    keys: tuple[str, ...]  # the candidate's own effects that the fit estimates
+    # the effect found by a grid search, with its standard error; the fit holds it
     profiled: tuple[str, float] | None = None
 
 

@@ -217,15 +217,10 @@ STAIRCASE_SETTINGS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
-    """One level of a staircase.
+    """One level of a staircase."""
 
-    Attributes:
-        approach: straight run at the level's engine order.
-        helm_rad: counted from the approach's, positive to starboard.
-    """
-
-    approach: Approach
-    helm_rad: float
+    approach: Approach  # straight run at the level's engine order
+    helm_rad: float  # counted from the approach's, positive to starboard
 
 
 def rises(request: PrimitiveSpec) -> Array:

@@ -19,22 +19,16 @@ class Aim:
     The noise of an equation is the standard deviation of its one-step residual; M / noise^2 is information in the units
     of the parameters. D and D_s do not depend on it, because each parameter stands in one equation. A, E and V compare
     parameters of different equations and need it.
-
-    Attributes:
-        criterion: name in `CRITERIA`.
-        interest: parameters of interest, without those of disturbances; empty for all.
-        unit: (p,) unit of the error of each parameter in A and E, e.g. |theta|; empty when not stated, zero where
-            unknown.
-        noise: (p,) residual noise of each parameter's equation; empty when not stated, zero where unknown.
-        outcomes: names of the predicted outcomes.
-        gradients: (o, p) derivative of each outcome by the parameters, in the outcome's unit of error.
     """
 
-    criterion: str = "D"
-    interest: tuple[str, ...] = ()
+    criterion: str = "D"  # name in `CRITERIA`
+    interest: tuple[str, ...] = ()  # parameters of interest, without those of disturbances; empty for all
+    # (p,) unit of the error of each parameter in A and E, e.g. |theta|; empty when not stated, zero where unknown.
     unit: Array = field(default_factory=lambda: np.zeros(0))
+    # (p,) residual noise of each parameter's equation; empty when not stated, zero where unknown
     noise: Array = field(default_factory=lambda: np.zeros(0))
-    outcomes: tuple[str, ...] = ()
+    outcomes: tuple[str, ...] = ()  # names of the predicted outcomes
+    # (o, p) derivative of each outcome by the parameters, in the outcome's unit of error
     gradients: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
@@ -43,17 +37,11 @@ class Aim:
 
 @dataclass(frozen=True, kw_only=True)
 class Picked:
-    """The arguments of a criterion.
+    """The arguments of a criterion."""
 
-    Attributes:
-        aim: the criterion's settings.
-        parameters: p names.
-        dimension: d, size of the information matrix: parameters, then means.
-    """
-
-    aim: Aim
-    parameters: tuple[str, ...]
-    dimension: int
+    aim: Aim  # the criterion's settings
+    parameters: tuple[str, ...]  # p names
+    dimension: int  # d, size of the information matrix: parameters, then means
 
     def columns(self, names: tuple[str, ...]) -> Array:
         """(d, k) unit columns of named parameters.
@@ -99,17 +87,11 @@ class Picked:
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """A design criterion.
+    """A design criterion."""
 
-    Attributes:
-        name: as in scenario files.
-        title: the quantity that it minimises.
-        measure: of the information matrix; raises InputError when the aim lacks a setting.
-    """
-
-    name: str
-    title: str
-    measure: Callable[[Picked], Measure]
+    name: str  # as in scenario files
+    title: str  # the quantity that it minimises
+    measure: Callable[[Picked], Measure]  # of the information matrix; raises InputError when the aim lacks a setting
 
 
 def of_other_parameters(picked: Picked) -> Measure:

@@ -22,32 +22,20 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """A linear upper bound of a concave function: value + slope (v - w).
+    """A linear upper bound of a concave function: value + slope (v - w)."""
 
-    Attributes:
-        value: at the fractions w where it is tangent.
-        slope: (q,).
-    """
-
-    value: float
-    slope: Array
+    value: float  # at the fractions w where it is tangent
+    slope: Array  # (q,)
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """The measure of one model: of B0 + sum_q w_q B_q.
+    """The measure of one model: of B0 + sum_q w_q B_q."""
 
-    Attributes:
-        matrices: (q, d, d) B_q, whitened.
-        prior: (d, d) B0, in the same coordinates.
-        measure: in the same coordinates.
-        transformation: (d, d) T of the whitening, T B T^T.
-    """
-
-    matrices: Array
-    prior: Array
-    measure: Measure
-    transformation: Array
+    matrices: Array  # (q, d, d) B_q, whitened
+    prior: Array  # (d, d) B0, in the same coordinates
+    measure: Measure  # in the same coordinates
+    transformation: Array  # (d, d) T of the whitening, T B T^T
 
     @staticmethod
     def of(matrices: Array, prior: Array, measure: Measure, *, within: Array | None = None) -> Piece:
@@ -93,17 +81,11 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """The average, or the least, of the pieces less their levels.
+    """The average, or the least, of the pieces less their levels."""
 
-    Attributes:
-        pieces: one for each model.
-        levels: (m,) subtracted from each piece.
-        worst: the least instead of the average.
-    """
-
-    pieces: tuple[Piece, ...]
-    levels: Array
-    worst: bool = False
+    pieces: tuple[Piece, ...]  # one for each model
+    levels: Array  # (m,) subtracted from each piece
+    worst: bool = False  # the least instead of the average
 
     @property
     def degree(self) -> int:

@@ -42,17 +42,11 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LargeDesign:
-    """A D-optimal approximate design.
+    """A D-optimal approximate design."""
 
-    Attributes:
-        fractions: (q,) of the candidates, sum 1.
-        gap: upper bound on the log det of any design less that of this one.
-        dimension: d.
-    """
-
-    fractions: Array
-    gap: float
-    dimension: int
+    fractions: Array  # (q,) of the candidates, sum 1
+    gap: float  # upper bound on the log det of any design less that of this one
+    dimension: int  # d
 
     def __post_init__(self) -> None:
         seal(self, fractions="q")
@@ -105,17 +99,11 @@ def d_optimal(rows: Array, *, prior: Array | None = None, tolerance: float = 1e-
 
 @dataclass(frozen=True, eq=False)
 class _Pool:
-    """All candidates.
+    """All candidates."""
 
-    Attributes:
-        rows: (q, r, d).
-        T: (d, d) whitening: equal fractions have the information T^-1 T^-T.
-        prior: (d, d) whitened.
-    """
-
-    rows: Array
-    T: Array
-    prior: Array
+    rows: Array  # (q, r, d)
+    T: Array  # (d, d) whitening: equal fractions have the information T^-1 T^-T
+    prior: Array  # (d, d) whitened
 
     @staticmethod
     def of(rows: Array, prior: Array | None) -> _Pool:

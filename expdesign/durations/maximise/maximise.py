@@ -43,22 +43,14 @@ NO_CHOICE = "none: least times take all of the time"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """An optimum.
+    """An optimum."""
 
-    Attributes:
-        fractions: (q,).
-        certificate: of these.
-        sensitivities: (q,) of the criterion there.
-        gap: per degree, with what fractions beyond a budget owe to that.
-        method: that found it.
-        multipliers: (d, d) for each model, which the certificate may be from; () for the criterion's own gradients.
-    """
-
-    fractions: Array
-    certificate: Certificate
-    sensitivities: Array
-    gap: float
-    method: str
+    fractions: Array  # (q,)
+    certificate: Certificate  # of these
+    sensitivities: Array  # (q,) of the criterion there
+    gap: float  # per degree, with what fractions beyond a budget owe to that
+    method: str  # that found it
+    # (d, d) for each model, which the certificate may be from; () for the criterion's own gradients
     multipliers: Sequence[Array] = ()
 
 

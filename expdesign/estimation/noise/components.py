@@ -68,16 +68,11 @@ Numbers = TypeVar("Numbers", NDArray[np.float64], Turn)
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Rows in a row, with short gaps at most.
+    """Rows in a row, with short gaps at most."""
 
-    Attributes:
-        rows: of the data.
-        places: (k,) their sample numbers from the begin of the stretch.
-        turn: (t,) exp(i psi) of the heading psi at every sample, zero where one was left out; None without headings.
-    """
-
-    rows: slice
-    places: Integers
+    rows: slice  # of the data
+    places: Integers  # (k,) their sample numbers from the begin of the stretch
+    # (t,) exp(i psi) of the heading psi at every sample, zero where one was left out; None without headings
     turn: Turn | None = None
 
     @property
@@ -123,14 +118,10 @@ def spread(rows: Numbers, places: Integers) -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """All samples from the first to the last of every stretch, those left out included.
+    """All samples from the first to the last of every stretch, those left out included."""
 
-    Attributes:
-        place: (k,) where each row of the data stands.
-        batch, step: (t,) number of the stretch and sample number in it.
-    """
-
-    place: Integers
+    place: Integers  # (k,) where each row of the data stands
+    # batch, step: (t,) number of the stretch and sample number in it
     batch: Integers
     step: Integers
 
@@ -164,15 +155,10 @@ MEMORIES = 2.0 ** np.arange(1, 11)
 
 @dataclass(frozen=True)
 class Slow:
-    """A disturbance that lasts.
+    """A disturbance that lasts."""
 
-    Attributes:
-        memory: how long [samples].
-        turning: whether it keeps its side of the chart while the ship turns, not its side of the ship.
-    """
-
-    memory: float
-    turning: bool = False
+    memory: float  # how long [samples]
+    turning: bool = False  # whether it keeps its side of the chart while the ship turns, not its side of the ship
 
 
 def slow_parts(parts: Sequence[Stretch]) -> tuple[Slow, ...]:
@@ -317,32 +303,20 @@ def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """The parts of one output's noise.
+    """The parts of one output's noise."""
 
-    Attributes:
-        variances: (2 + m,) white, sensor, slow.
-        slow: the m slow parts.
-        misfit: Bartlett's statistic.
-        uncertainty: (2 + m, 2 + m) covariance of the variances; see `directions_of`.
-    """
-
-    variances: Array
-    slow: tuple[Slow, ...]
-    misfit: float
-    uncertainty: Array
+    variances: Array  # (2 + m,) white, sensor, slow
+    slow: tuple[Slow, ...]  # the m slow parts
+    misfit: float  # Bartlett's statistic
+    uncertainty: Array  # (2 + m, 2 + m) covariance of the variances; see `directions_of`
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What estimated parameters took from the noise of an output: residuals are eps - Phi sum over k of W(k) eps(k).
+    """What estimated parameters took from the noise of an output: residuals are eps - Phi sum over k of W(k) eps(k)."""
 
-    Attributes:
-        Phi: (k, p) regressors, without the mean where residuals are.
-        W: (k, p).
-    """
-
-    Phi: Array
-    W: Array
+    Phi: Array  # (k, p) regressors, without the mean where residuals are
+    W: Array  # (k, p)
 
 
 def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitted] = ()) -> list[Components]:

@@ -46,21 +46,13 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, eq=False)
 class Coupled:
-    """The noise of n outputs.
+    """The noise of n outputs."""
 
-    Attributes:
-        variances: (n, 2 + m) white force, sensor, slow forces.
-        slow: the m slow parts.
-        common: (n, n) correlation of forces.
-        misfit: (n,) Bartlett's statistics.
-        uncertainty: (n (2 + m), n (2 + m)) covariance of the variances; see `directions_of`.
-    """
-
-    variances: Array
-    slow: tuple[Slow, ...]
-    common: Array
-    misfit: Array
-    uncertainty: Array
+    variances: Array  # (n, 2 + m) white force, sensor, slow forces
+    slow: tuple[Slow, ...]  # the m slow parts
+    common: Array  # (n, n) correlation of forces
+    misfit: Array  # (n,) Bartlett's statistics
+    uncertainty: Array  # (n (2 + m), n (2 + m)) covariance of the variances; see `directions_of`
 
 
 def fit_coupled(eps: Array, A: Array, parts: Sequence[Stretch], by: Sequence[Fitted]) -> Coupled:
@@ -115,25 +107,15 @@ def coupled_covariance(W: Array, sensed: Array, found: Coupled, parts: Sequence[
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """What is compared.
+    """What is compared."""
 
-    Attributes:
-        frequency: (f,) of all stretches in a row.
-        ordinates: (n, f) periodograms.
-        shapes: (n, 2 + m, f) expected ones for unit variances, of each output's own noise.
-        count: (b,) frequencies in each bin, half for zero.
-        binned: (b, n, n) mean periodograms of and between outputs.
-        designs: (n, 2 + m, b, n, n) expected ones for unit variances.
-        sensed: (n, n, n) those of each sensor's noise with unit variance.
-    """
-
-    frequency: Array
-    ordinates: Array
-    shapes: Array
-    count: Array
-    binned: Array
-    designs: Array
-    sensed: Array
+    frequency: Array  # (f,) of all stretches in a row
+    ordinates: Array  # (n, f) periodograms
+    shapes: Array  # (n, 2 + m, f) expected ones for unit variances, of each output's own noise
+    count: Array  # (b,) frequencies in each bin, half for zero
+    binned: Array  # (b, n, n) mean periodograms of and between outputs
+    designs: Array  # (n, 2 + m, b, n, n) expected ones for unit variances
+    sensed: Array  # (n, n, n) those of each sensor's noise with unit variance
 
     @property
     def fits(self) -> bool:

@@ -159,15 +159,10 @@ def _windowed(series: Array, weights: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """How sums over samples of W eps vary, for outputs o with W (k, p_o).
+    """How sums over samples of W eps vary, for outputs o with W (k, p_o)."""
 
-    Attributes:
-        blocks: (p_o, p_o') covariances of the sums of outputs o and o'.
-        doubts: (p_o,) variance of each estimated variance.
-    """
-
-    blocks: list[list[Array]]
-    doubts: list[Array]
+    blocks: list[list[Array]]  # (p_o, p_o') covariances of the sums of outputs o and o'
+    doubts: list[Array]  # (p_o,) variance of each estimated variance
 
 
 def score_covariance(

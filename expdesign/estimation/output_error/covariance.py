@@ -100,17 +100,11 @@ def _with_known(regression: Regression, problem: Problem, values: Array) -> Regr
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """A simulation around the estimate.
+    """A simulation around the estimate."""
 
-    Attributes:
-        errors: (L, W, n) measured minus simulated; where nothing was measured, on the line between neighbours.
-        slopes: (L, W, n, q) its derivatives, without what the starts make up for.
-        steps: (L - 1, W, n, n) A, of each next state by the state.
-    """
-
-    errors: Array
-    slopes: Array
-    steps: Array
+    errors: Array  # (L, W, n) measured minus simulated; where nothing was measured, on the line between neighbours
+    slopes: Array  # (L, W, n, q) its derivatives, without what the starts make up for
+    steps: Array  # (L - 1, W, n, n) A, of each next state by the state
 
 
 def _linearised(problem: Problem, values: Array, starts: Array) -> _Linearised:
@@ -188,18 +182,13 @@ def _owners(problem: Problem, layout: Layout) -> Integers:
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Steps from every sample to the next of the same stretch, one stretch after the other.
+    """Steps from every sample to the next of the same stretch, one stretch after the other."""
 
-    Attributes:
-        there: (W, L - 1) whether a stretch lasts so long.
-        batch, step: (k,) of each row.
-        parts: where rows stand in time.
-    """
-
-    there: NDArray[np.bool_]
+    there: NDArray[np.bool_]  # (W, L - 1) whether a stretch lasts so long
+    # batch, step: (k,) of each row
     batch: Integers
     step: Integers
-    parts: list[Stretch]
+    parts: list[Stretch]  # where rows stand in time
 
     def of(self, values: Array) -> Array:
         """Rows (k, ...) from (L - 1, W, ...)."""

@@ -91,18 +91,13 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A step of Gauss and Newton.
+    """A step of Gauss and Newton."""
 
-    Attributes:
-        values, starts: changes (q,) and (W, n).
-        expected: decrease of the cost, of a linear problem.
-        metric: (q, q) second derivative of half the cost by the values, with the starts eliminated.
-    """
-
+    # values, starts: changes (q,) and (W, n)
     values: Array
     starts: Array
-    expected: float
-    metric: Array
+    expected: float  # decrease of the cost, of a linear problem
+    metric: Array  # (q, q) second derivative of half the cost by the values, with the starts eliminated
 
 
 def _point(problem: Problem, values: Array, starts: Array) -> Point:

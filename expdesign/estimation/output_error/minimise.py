@@ -208,19 +208,12 @@ def _weighed(problem: Problem, values: Array, starts: Array) -> Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """One search.
+    """One search."""
 
-    Attributes:
-        excerpt: what is compared.
-        settled: ends the search, see `minimised`.
-        steps: expected number.
-        attempts: that had no answer.
-    """
-
-    excerpt: Excerpt
-    settled: float
-    steps: int
-    attempts: int = 0
+    excerpt: Excerpt  # what is compared
+    settled: float  # ends the search, see `minimised`
+    steps: int  # expected number
+    attempts: int = 0  # that had no answer
 
     def work(self, record: Record) -> float:
         """Samples simulated in a step."""

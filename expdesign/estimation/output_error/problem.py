@@ -21,55 +21,34 @@ MOST_FIRST_WEIGHT = 1e4  # weight of the first sample of a stretch, to that of a
 
 @dataclass(frozen=True, kw_only=True)
 class ActuatorTime:
-    """What is known beforehand of a dead time or a lag.
+    """What is known beforehand of a dead time or a lag."""
 
-    Attributes:
-        name: as in `vessel.std_keys`.
-        change_s: expected value less the one that the data are delivered with [s].
-        std_s: standard deviation [s].
-    """
-
-    name: str
-    change_s: float
-    std_s: float
+    name: str  # as in `vessel.std_keys`
+    change_s: float  # expected value less the one that the data are delivered with [s]
+    std_s: float  # standard deviation [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Begun:
-    """Where a search goes on.
+    """Where a search goes on."""
 
-    Attributes:
-        values: (p,) parameters.
-        horizon_s: with which they were found [s]; shorter ones are not searched again. None for whole runs.
-    """
-
-    values: Array
-    horizon_s: float | None
+    values: Array  # (p,) parameters
+    horizon_s: float | None  # with which they were found [s]; shorter ones are not searched again. None for whole runs.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fitting:
-    """How simulations are compared with the data.
+    """How simulations are compared with the data."""
 
-    Attributes:
-        integration: how the model is simulated.
-        horizon_s: length of a stretch [s], None for whole runs.
-        constant: whether each run has a constant acceleration of its own.
-        current: whether a steady current is estimated too, one for all runs.
-        times: dead times and lags that are estimated too.
-        sensors: whose stated noise the first velocities may differ from the measured ones by.
-        begun: where the search goes on; None to begin with least squares.
-        quick: whether the covariance may be one that takes no time.
-    """
-
-    integration: Integration
-    horizon_s: float | None = None
-    constant: bool = False
-    current: bool = False
-    times: tuple[ActuatorTime, ...] = ()
+    integration: Integration  # how the model is simulated
+    horizon_s: float | None = None  # length of a stretch [s], None for whole runs
+    constant: bool = False  # whether each run has a constant acceleration of its own
+    current: bool = False  # whether a steady current is estimated too, one for all runs
+    times: tuple[ActuatorTime, ...] = ()  # dead times and lags that are estimated too
+    # whose stated noise the first velocities may differ from the measured ones by
     sensors: Sensors = field(default_factory=Sensors)
-    begun: Begun | None = None
-    quick: bool = False
+    begun: Begun | None = None  # where the search goes on; None to begin with least squares
+    quick: bool = False  # whether the covariance may be one that takes no time
 
     @property
     def unexpected(self) -> int:
@@ -87,31 +66,18 @@ Place = tuple[int, float]
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Least squares over W stretches of L samples.
+    """Least squares over W stretches of L samples."""
 
-    Attributes:
-        compiled: the stretches, ready to be simulated.
-        measured: (L, W, n), nan where missing or filled up.
-        weights: (n,) one over the variance of each output.
-        sensed: (n,) variance of the sensors' noise, in units of the cost.
-        batch: (W,) number of the run.
-        first: (W,) sample of the run at which each stretch begins.
-        constant: whether constants are estimated.
-        expected: (p,) values known beforehand; of parameters and a current, which count as unknown, zero.
-        precision: (p,) what the cost adds for squared differences from these; of those zero.
-        spread: (p,) standard deviations of these; of those zero.
-    """
-
-    compiled: Compiled
-    measured: Array
-    weights: Array
-    sensed: Array
-    batch: Integers
-    first: Integers
-    constant: bool
-    expected: Array
-    precision: Array
-    spread: Array
+    compiled: Compiled  # the stretches, ready to be simulated
+    measured: Array  # (L, W, n), nan where missing or filled up
+    weights: Array  # (n,) one over the variance of each output
+    sensed: Array  # (n,) variance of the sensors' noise, in units of the cost
+    batch: Integers  # (W,) number of the run
+    first: Integers  # (W,) sample of the run at which each stretch begins
+    constant: bool  # whether constants are estimated
+    expected: Array  # (p,) values known beforehand; of parameters and a current, which count as unknown, zero
+    precision: Array  # (p,) what the cost adds for squared differences from these; of those zero
+    spread: Array  # (p,) standard deviations of these; of those zero
 
     @property
     def parameters(self) -> int:
@@ -172,18 +138,12 @@ def sample_time(record: Record) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Excerpt:
-    """What of the data is compared.
+    """What of the data is compared."""
 
-    Attributes:
-        samples: of a stretch, as they are compared.
-        every: compares every so manieth sample, with the mean inputs until the next.
-        most: samples in all, or some more; the stretches between are left out.
-        without: stretches that are left out too, by number of the run and first compared sample.
-    """
-
-    samples: int
-    every: int = 1
-    most: float = np.inf
+    samples: int  # of a stretch, as they are compared
+    every: int = 1  # compares every so manieth sample, with the mean inputs until the next
+    most: float = np.inf  # samples in all, or some more; the stretches between are left out
+    # stretches that are left out too, by number of the run and first compared sample
     without: frozenset[tuple[int, int]] = frozenset()
 
     @property

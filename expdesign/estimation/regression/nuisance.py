@@ -80,38 +80,23 @@ SQUARES = {
 
 @dataclass(frozen=True)
 class Share:
-    """What one term adds to a nuisance parameter: the term's parameter times a factor times a moment.
+    """What one term adds to a nuisance parameter: the term's parameter times a factor times a moment."""
 
-    Attributes:
-        parameter: of the term.
-        moment: one of `NORTH`, `EAST`, `DIFFERENCE`, `PRODUCT`.
-        factor: the number.
-        air: whether the moment is the wind's, not the current's.
-    """
-
-    parameter: str
-    moment: str
-    factor: float
-    air: bool
+    parameter: str  # of the term
+    moment: str  # one of `NORTH`, `EAST`, `DIFFERENCE`, `PRODUCT`
+    factor: float  # the number
+    air: bool  # whether the moment is the wind's, not the current's
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """One nuisance regressor: a polynomial of signals times a function of heading.
+    """One nuisance regressor: a polynomial of signals times a function of heading."""
 
-    Attributes:
-        equation: "u", "v" or "r".
-        factor: what multiplies the function of heading.
-        heading: one of "cos psi", "sin psi", "cos^2 psi", "sin 2psi", or "" for none.
-        algebra: gives values to the symbols in the factor.
-        shares: what its parameter is the sum of; () where it has no heading.
-    """
-
-    equation: str
-    factor: Polynomial
-    heading: str
-    algebra: Algebra
-    shares: tuple[Share, ...] = ()
+    equation: str  # "u", "v" or "r"
+    factor: Polynomial  # what multiplies the function of heading
+    heading: str  # one of "cos psi", "sin psi", "cos^2 psi", "sin 2psi", or "" for none
+    algebra: Algebra  # gives values to the symbols in the factor
+    shares: tuple[Share, ...] = ()  # what its parameter is the sum of; () where it has no heading
 
     @property
     def name(self) -> str:
@@ -239,15 +224,10 @@ STEP_MPS = 1e-4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Guess:
-    """What regressors are linearised around.
+    """What regressors are linearised around."""
 
-    Attributes:
-        to_mps: (2,) current to north and east [m/s].
-        parameters: (all,) of the model.
-    """
-
-    to_mps: Array
-    parameters: Array
+    to_mps: Array  # (2,) current to north and east [m/s]
+    parameters: Array  # (all,) of the model
 
     def __post_init__(self) -> None:
         seal(self, to_mps="2", parameters="p")

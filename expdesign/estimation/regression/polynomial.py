@@ -115,15 +115,11 @@ def symbol(name: str) -> Polynomial:
 
 @dataclass(frozen=True)
 class Algebra:
-    """Operators on polynomials, remembering the symbols they introduce.
+    """Operators on polynomials, remembering the symbols they introduce."""
 
-    Attributes:
-        functions: symbol -> its value for a table of signals; "sign(...)" symbols among them.
-        signs: "sign(...)" symbol -> the polynomial whose sign it is.
-    """
-
+    # symbol -> its value for a table of signals; "sign(...)" symbols among them
     functions: dict[str, Callable[[SignalTable], Any]] = field(default_factory=dict)
-    signs: dict[str, Polynomial] = field(default_factory=dict)
+    signs: dict[str, Polynomial] = field(default_factory=dict)  # "sign(...)" symbol -> the polynomial whose sign it is
 
     @property
     def operators(self) -> Operators:

@@ -62,19 +62,12 @@ from expdesign.vessel.structures import MOTION_SIGNALS
 
 @dataclass(frozen=True)
 class Predictor:
-    """Signals that the regressors are made from.
+    """Signals that the regressors are made from."""
 
-    Attributes:
-        name: as users type it.
-        wind: whether measured wind is used.
-        unknown: disturbances that nuisance regressors are added for, of `CURRENT` and `WIND`.
-        steady: whether a steady current itself is estimated with the parameters.
-    """
-
-    name: str
-    wind: bool
-    unknown: tuple[str, ...]
-    steady: bool = False
+    name: str  # as users type it
+    wind: bool  # whether measured wind is used
+    unknown: tuple[str, ...]  # disturbances that nuisance regressors are added for, of `CURRENT` and `WIND`
+    steady: bool = False  # whether a steady current itself is estimated with the parameters
 
     @property
     def nuisance(self) -> bool:
@@ -104,31 +97,21 @@ QUADRATURES = ("euler", "trapezoid")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Layout:
-    """The columns of the regression.
+    """The columns of the regression."""
 
-    Attributes:
-        model: driven by the recorded inputs; its parameters give the values of those held.
-        predictor: which signals are used.
-        parameters: names estimated.
-        fixed: names held at the model's values.
-        merged: names left out because no wind is used: their effect is in other terms' parameters, or nowhere.
-        partners: those of merged names whose effect is in another term's parameter, and the name of that.
-        nuisance: further regressors.
-        notes: one sentence for each thing that a reader of the estimate must know.
-        quadrature: one of `QUADRATURES`.
-        guess: what the columns of a steady current are linearised around; their parameters are what it lacks. None
-            where no current is estimated.
-    """
-
-    model: VesselModel
-    predictor: Predictor
-    parameters: tuple[str, ...]
-    fixed: tuple[str, ...]
+    model: VesselModel  # driven by the recorded inputs; its parameters give the values of those held
+    predictor: Predictor  # which signals are used
+    parameters: tuple[str, ...]  # names estimated
+    fixed: tuple[str, ...]  # names held at the model's values
+    # names left out because no wind is used: their effect is in other terms' parameters, or nowhere
     merged: tuple[str, ...]
+    # those of merged names whose effect is in another term's parameter, and the name of that
     partners: Mapping[str, str]
-    nuisance: tuple[Nuisance, ...]
-    notes: tuple[str, ...] = field(default=())
-    quadrature: str = "euler"
+    nuisance: tuple[Nuisance, ...]  # further regressors
+    notes: tuple[str, ...] = field(default=())  # one sentence for each thing that a reader of the estimate must know
+    quadrature: str = "euler"  # one of `QUADRATURES`
+    # what the columns of a steady current are linearised around; their parameters are what it lacks. None where no
+    # current is estimated.
     guess: Guess | None = None
 
     @property
@@ -338,17 +321,11 @@ def mean_between_readings(rows: Array, interpolated: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rows:
-    """Where the rows of a regression come from.
+    """Where the rows of a regression come from."""
 
-    Attributes:
-        regression: of all batches.
-        used: per batch, the samples k - 1 whose regressors are used.
-        left_out: number of rows left out because numbers are missing.
-    """
-
-    regression: Regression
-    used: tuple[Integers, ...]
-    left_out: int
+    regression: Regression  # of all batches
+    used: tuple[Integers, ...]  # per batch, the samples k - 1 whose regressors are used
+    left_out: int  # number of rows left out because numbers are missing
 
 
 def build_regression(layout: Layout, record: Record) -> Rows:

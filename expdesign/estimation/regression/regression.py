@@ -30,28 +30,20 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Regression:
-    """Data of a linear regression.
+    """Data of a linear regression."""
 
-    Attributes:
-        parameters: names of the p columns.
-        Phi: (k, n, p) regressors.
-        y: (k, n) what they explain.
-        batch: (k,) number of the batch of each row, rising; all zeros when left out.
-        step: (k,) sample number within the batch, so that lags skip rows left out; counted when left out.
-        outputs: names of the n outputs, "y1", "y2" ... when left out.
-        heading: (k,) of the ship [rad], by which the covariance knows disturbances that keep their side of the chart
-            while the ship turns; None where it is not known.
-        strata: (k, n) groups of rows for each output, from whose instruments the mean is subtracted separately, counted
-            from 1; 0 for rows that it does not use. None for one group of all.
-    """
-
-    parameters: tuple[str, ...]
-    Phi: Array
-    y: Array
-    batch: Integers | None = None
+    parameters: tuple[str, ...]  # names of the p columns
+    Phi: Array  # (k, n, p) regressors
+    y: Array  # (k, n) what they explain
+    batch: Integers | None = None  # (k,) number of the batch of each row, rising; all zeros when left out
+    # (k,) sample number within the batch, so that lags skip rows left out; counted when left out
     step: Integers | None = None
-    outputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()  # names of the n outputs, "y1", "y2" ... when left out.
+    # (k,) of the ship [rad], by which the covariance knows disturbances that keep their side of the chart while the
+    # ship turns; None where it is not known
     heading: Array | None = None
+    # (k, n) groups of rows for each output, from whose instruments the mean is subtracted separately, counted from 1; 0
+    # for rows that it does not use. None for one group of all.
     strata: Integers | None = None
 
     def __post_init__(self) -> None:

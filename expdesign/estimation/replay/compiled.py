@@ -28,34 +28,23 @@ Simulate = Callable[[Array, Array, Array], Array]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretches:
-    """W stretches of data of L samples each, simulated side by side; the shorter ones are filled up and not compared.
+    """W stretches of data of L samples each, simulated side by side; shorter ones are filled up and not compared."""
 
-    Attributes:
-        model: structure; gives the values of parameters not sought.
-        sought: (p,) places of the parameters to find, among the model's.
-        states: (n,) places of the velocities that have an equation, among u, v, r.
-        drive: (L, W, c) inputs as of `drive_of` with these times; two columns more, the wind's velocity in the b-frame,
-            where `windy`; two more, cosine and sine of the heading, where `flowing`.
-        windy: whether air velocities are those of that wind.
-        flowing: whether a steady current to north and east [m/s] is sought too, after the parameters.
-        sample_time_s: of all stretches.
-        integrator, substeps: how the model is integrated.
-        parts: of a sample, with inputs of their own.
-        times: (u,) names of uncertain times of actuators, whose changes [s] are sought too, last.
-        counts: (W,) samples of each stretch; L for all when left out.
-    """
-
-    model: VesselModel
-    sought: tuple[int, ...]
-    states: tuple[int, ...]
+    model: VesselModel  # structure; gives the values of parameters not sought
+    sought: tuple[int, ...]  # (p,) places of the parameters to find, among the model's
+    states: tuple[int, ...]  # (n,) places of the velocities that have an equation, among u, v, r
+    # (L, W, c) inputs as of `drive_of` with these times; two columns more, the wind's velocity in the b-frame, where
+    # `windy`; two more, cosine and sine of the heading, where `flowing`
     drive: Array
-    windy: bool
-    sample_time_s: float
+    windy: bool  # whether air velocities are those of that wind
+    sample_time_s: float  # of all stretches
+    # integrator, substeps: how the model is integrated
     integrator: str
     substeps: int
-    parts: int = 1
-    flowing: bool = False
-    times: tuple[str, ...] = ()
+    parts: int = 1  # of a sample, with inputs of their own
+    flowing: bool = False  # whether a steady current to north and east [m/s] is sought too, after the parameters
+    times: tuple[str, ...] = ()  # (u,) names of uncertain times of actuators, whose changes [s] are sought too, last
+    # (W,) samples of each stretch; L for all when left out
     counts: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
@@ -71,34 +60,23 @@ class Stretches:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slopes:
-    """Derivatives of simulated states in consecutive samples of the stretches that last so long.
+    """Derivatives of simulated states in consecutive samples of the stretches that last so long."""
 
-    Attributes:
-        samples: of the stretches.
-        active: (w,) places of those stretches.
-        by_values, by_start: (l, w, n, q) by the values, (l, w, n, n) by the start.
-        steps: (l, w, n, n) of these states by the ones a sample before; none of the first sample.
-    """
-
-    samples: slice
-    active: Integers
+    samples: slice  # of the stretches
+    active: Integers  # (w,) places of those stretches
+    # by_values, by_start: (l, w, n, q) by the values, (l, w, n, n) by the start
     by_values: Array
     by_start: Array
-    steps: Array
+    steps: Array  # (l, w, n, n) of these states by the ones a sample before; none of the first sample
 
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """Stretches made ready to be simulated with any values.
+    """Stretches made ready to be simulated with any values."""
 
-    Attributes:
-        stretches: the simulated stretches.
-        block: samples and stretches of one call of `run`, points of one call of `slopes`.
-        run, slopes: see `stretch_functions`.
-    """
-
-    stretches: Stretches
-    block: tuple[int, int, int]
+    stretches: Stretches  # the simulated stretches
+    block: tuple[int, int, int]  # samples and stretches of one call of `run`, points of one call of `slopes`
+    # run, slopes: see `stretch_functions`
     run: Called
     slopes: Called
 

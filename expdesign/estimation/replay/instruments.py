@@ -70,24 +70,15 @@ WINDS = ("lagged", "mean", "measured")
 
 @dataclass(frozen=True, eq=False)
 class InstrumentModel:
-    """Everything that stays the same while the instruments are refined.
+    """Everything that stays the same while the instruments are refined."""
 
-    Attributes:
-        layout: columns.
-        record: the data.
-        rows: which samples the regression uses.
-        replay: simulates the batches.
-        heading: one of `HEADINGS`.
-        wind: one of `WINDS`.
-        measured: per batch, the table of measured signals and the signs that its moduli have.
-    """
-
-    layout: Layout
-    record: Record
-    rows: Rows
-    replay: Replay
-    heading: str = "measured"
-    wind: str = "lagged"
+    layout: Layout  # columns
+    record: Record  # the data
+    rows: Rows  # which samples the regression uses
+    replay: Replay  # simulates the batches
+    heading: str = "measured"  # one of `HEADINGS`
+    wind: str = "lagged"  # one of `WINDS`
+    # per batch, the table of measured signals and the signs that its moduli have
     measured: tuple[tuple[Table, dict[str, float]], ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -217,17 +208,11 @@ STEERED = (AUTO, USE, LEAVE_OUT, PLANNED)
 
 @dataclass(frozen=True)
 class Steered:
-    """What became of steered samples.
+    """What became of steered samples."""
 
-    Attributes:
-        samples: marked as steered.
-        of: all samples.
-        treatment: "use", "leave-out" or "planned".
-    """
-
-    samples: int
-    of: int
-    treatment: str
+    samples: int  # marked as steered
+    of: int  # all samples
+    treatment: str  # "use", "leave-out" or "planned"
 
 
 def treatment_of(record: Record, choice: str, *, instruments: bool) -> Steered:

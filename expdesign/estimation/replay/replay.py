@@ -21,15 +21,10 @@ from expdesign.vessel import VesselModel
 
 @dataclass(frozen=True)
 class Integration:
-    """How a model is simulated between samples.
+    """How a model is simulated between samples."""
 
-    Attributes:
-        integrator: "euler", the map of the discrete parameters, or "rk4".
-        substeps: integrator steps per sample.
-    """
-
-    integrator: str = "euler"
-    substeps: int = 1
+    integrator: str = "euler"  # "euler", the map of the discrete parameters, or "rk4"
+    substeps: int = 1  # integrator steps per sample
 
     def __post_init__(self) -> None:
         if self.integrator not in INTEGRATORS:
@@ -40,18 +35,13 @@ class Integration:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A model made ready to simulate the batches of a record, with any parameters.
+    """A model made ready to simulate the batches of a record, with any parameters."""
 
-    Attributes:
-        model: driven by the recorded inputs.
-        simulators: (samples, sample time, parts of a sample) of a batch -> compiled simulation.
-        substeps: integrator steps per sample.
-        windy, flowing: whether simulations are given wind, and a current.
-    """
-
-    model: VesselModel
+    model: VesselModel  # driven by the recorded inputs
+    # (samples, sample time, parts of a sample) of a batch -> compiled simulation
     simulators: Mapping[tuple[int, float, int], Simulate]
-    substeps: int
+    substeps: int  # integrator steps per sample
+    # windy, flowing: whether simulations are given wind, and a current
     windy: bool = False
     flowing: bool = False
 

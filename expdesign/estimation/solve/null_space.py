@@ -26,17 +26,11 @@ NAMED_PARAMETERS = 4  # most parameters of a combination that a message names
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Direction:
-    """One combination of parameters.
+    """One combination of parameters."""
 
-    Attributes:
-        parameters: names, largest weight first.
-        weights: one per name, in units of each parameter's effect on the data; squares sum to about 1.
-        strength: singular value of the scaled moment matrix along it, relative to the largest of its equation.
-    """
-
-    parameters: tuple[str, ...]
-    weights: Array
-    strength: float
+    parameters: tuple[str, ...]  # names, largest weight first
+    weights: Array  # one per name, in units of each parameter's effect on the data; squares sum to about 1
+    strength: float  # singular value of the scaled moment matrix along it, relative to the largest of its equation
 
     def __post_init__(self) -> None:
         seal(self, weights="k")
@@ -51,16 +45,11 @@ class Direction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NullSpace:
-    """The report.
+    """The report."""
 
-    Attributes:
-        singular_values: (p,) of the scaled moment matrix, relative to the largest of their equation, falling.
-        unseen: combinations that the data do not show at all.
-        faint: combinations so weakly shown that they cannot be told from chance (instruments) or rounding.
-    """
-
-    singular_values: Array
-    unseen: tuple[Direction, ...]
+    singular_values: Array  # (p,) of the scaled moment matrix, relative to the largest of their equation, falling
+    unseen: tuple[Direction, ...]  # combinations that the data do not show at all
+    # combinations so weakly shown that they cannot be told from chance (instruments) or rounding
     faint: tuple[Direction, ...]
 
     def __post_init__(self) -> None:

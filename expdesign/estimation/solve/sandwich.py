@@ -54,17 +54,11 @@ WHITE_TEST_LEVEL = 0.01  # of White's test
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How uncertain an estimate is.
+    """How uncertain an estimate is."""
 
-    Attributes:
-        covariance: (p, p).
-        lags: last lag that a kernel counts.
-        warnings: one sentence each.
-    """
-
-    covariance: Array
-    lags: int
-    warnings: tuple[str, ...] = ()
+    covariance: Array  # (p, p)
+    lags: int  # last lag that a kernel counts
+    warnings: tuple[str, ...] = ()  # one sentence each
 
 
 def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[Part], residuals: Array) -> Uncertainty:
@@ -129,14 +123,10 @@ def _root(P: Array, *, inverse: bool = False) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Terms:
-    """Terms whose sum is the error of a part's estimate.
+    """Terms whose sum is the error of a part's estimate."""
 
-    Attributes:
-        when: where the rows stand.
-        zeta, n: (t, n, p) and (t, n) weights and residuals, perhaps whitened.
-    """
-
-    when: Timeline
+    when: Timeline  # where the rows stand
+    # zeta, n: (t, n, p) and (t, n) weights and residuals, perhaps whitened
     zeta: Array
     n: Array
 

@@ -56,23 +56,15 @@ STABILISING_WEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solution:
-    """Result of a regression.
+    """Result of a regression."""
 
-    Attributes:
-        values: (p,) estimate.
-        covariance: (p, p) of the estimate.
-        residuals: (k, n) one-step residuals; with zero-mean instruments without their mean. Zero in rows not chosen.
-        lags: last lag that a kernel of the covariance counts, 0 where there is none.
-        null_space: what the data cannot see.
-        warnings: one sentence each.
-    """
-
-    values: Array
-    covariance: Array
+    values: Array  # (p,) estimate
+    covariance: Array  # (p, p) of the estimate
+    # (k, n) one-step residuals; with zero-mean instruments without their mean. Zero in rows not chosen.
     residuals: Array
-    lags: int
-    null_space: NullSpace = field(repr=False)
-    warnings: tuple[str, ...] = ()
+    lags: int  # last lag that a kernel of the covariance counts, 0 where there is none
+    null_space: NullSpace = field(repr=False)  # what the data cannot see
+    warnings: tuple[str, ...] = ()  # one sentence each
 
     def __post_init__(self) -> None:
         seal(self, values="p", covariance="p p", residuals="k n")
@@ -101,19 +93,12 @@ def solve_iv(regression: Regression, instruments: Array, weighting: Weighting | 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """A regression split into parts, to be solved with one set of instruments after the other.
+    """A regression split into parts, to be solved with one set of instruments after the other."""
 
-    Attributes:
-        regression: the data.
-        weighting: how equations are formed.
-        uses: (n, p) nonzero where parameters or instruments act.
-        systems: the parts.
-    """
-
-    regression: Regression
-    weighting: Weighting
-    uses: Array
-    systems: tuple[System, ...]
+    regression: Regression  # the data
+    weighting: Weighting  # how equations are formed
+    uses: Array  # (n, p) nonzero where parameters or instruments act
+    systems: tuple[System, ...]  # the parts
 
 
 def build_equations(regression: Regression, instruments: Array, weighting: Weighting) -> Equations:
@@ -218,15 +203,10 @@ Simulate = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A stable model that unstable estimates are drawn to.
+    """A stable model that unstable estimates are drawn to."""
 
-    Attributes:
-        values: (p,) of the regression's parameters.
-        spread: (p,) how far from them parameters may well be; infinite for those without influence on stability.
-    """
-
-    values: Array
-    spread: Array
+    values: Array  # (p,) of the regression's parameters
+    spread: Array  # (p,) how far from them parameters may well be; infinite for those without influence on stability
 
     def drawn(self, values: Array, covariance: Array, weight: float) -> Array:
         """(p,) values with this covariance, combined with the prior's at a weight."""
@@ -241,17 +221,11 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """The outcome.
+    """The outcome."""
 
-    Attributes:
-        solution: from the last instruments.
-        refinements: how many times instruments were simulated from an estimate.
-        warnings: one sentence each.
-    """
-
-    solution: Solution
-    refinements: int
-    warnings: tuple[str, ...]
+    solution: Solution  # from the last instruments
+    refinements: int  # how many times instruments were simulated from an estimate
+    warnings: tuple[str, ...]  # one sentence each
 
 
 def refine_iv(

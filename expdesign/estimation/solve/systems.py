@@ -25,25 +25,15 @@ BLOCKS = ("one", "batch")
 
 @dataclass(frozen=True, kw_only=True)
 class Weighting:
-    """Options of the equations and of their covariance.
+    """Options of the equations and of their covariance."""
 
-    Attributes:
-        mean: subtracted from the instruments, one of `zero_mean.MEANS`.
-        blocks: "one" block of instruments for all batches, or one per "batch" (4.45).
-        batch_weights: one factor per batch, how much its equations count; () for all alike.
-        output_weights: one factor per output, how much its equation counts; () for all alike.
-        covariance: one of `COVARIANCES`, see `sandwich`.
-        kernel: of the "hac" and "kernel" covariance.
-        lags: their last lag, None for automatic.
-    """
-
-    mean: str = "none"
-    blocks: str = "one"
-    batch_weights: tuple[float, ...] = ()
-    output_weights: tuple[float, ...] = ()
-    covariance: str = "components"
-    kernel: str = "parzen"
-    lags: int | None = None
+    mean: str = "none"  # subtracted from the instruments, one of `zero_mean.MEANS`
+    blocks: str = "one"  # "one" block of instruments for all batches, or one per "batch" (4.45)
+    batch_weights: tuple[float, ...] = ()  # one factor per batch, how much its equations count; () for all alike
+    output_weights: tuple[float, ...] = ()  # one factor per output, how much its equation counts; () for all alike
+    covariance: str = "components"  # one of `COVARIANCES`, see `sandwich`
+    kernel: str = "parzen"  # of the "hac" and "kernel" covariance
+    lags: int | None = None  # their last lag, None for automatic
 
     def __post_init__(self) -> None:
         for what, value, known in (
@@ -59,28 +49,18 @@ class Weighting:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The part of a regression that some parameters and outputs have to themselves.
+    """The part of a regression that some parameters and outputs have to themselves."""
 
-    Attributes:
-        names: of the parameters.
-        rows: of the regression that its outputs use.
-        columns, outputs: places in the regression.
-        varying: (k, n, p) regressors without the mean that is subtracted from instruments.
-        size: (p,) norm of that; infinite where it is constant to working precision.
-        y: (k, n).
-        group: (k,) numbers of the rows that share a mean.
-        parts: rows of each batch.
-    """
-
-    names: tuple[str, ...]
-    rows: Integers | slice
+    names: tuple[str, ...]  # of the parameters
+    rows: Integers | slice  # of the regression that its outputs use
+    # columns, outputs: places in the regression
     columns: Integers
     outputs: Integers
-    varying: Array
-    size: Array
-    y: Array
-    group: Integers
-    parts: list[slice]
+    varying: Array  # (k, n, p) regressors without the mean that is subtracted from instruments
+    size: Array  # (p,) norm of that; infinite where it is constant to working precision
+    y: Array  # (k, n)
+    group: Integers  # (k,) numbers of the rows that share a mean
+    parts: list[slice]  # rows of each batch
 
     def cut(self, whole: Array) -> Array:
         """(k, n, p) rows of this part, from (all, all, all)."""
@@ -164,17 +144,11 @@ def _cut(whole: Array, outputs: Integers, columns: Integers) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A system with its instruments.
+    """A system with its instruments."""
 
-    Attributes:
-        system: the part of the regression.
-        W: (k, n, p) with theta = sum W y; nothing that can be used where its data do not see all parameters.
-        found: what its data cannot see.
-    """
-
-    system: System
-    W: Array
-    found: NullSpace
+    system: System  # the part of the regression
+    W: Array  # (k, n, p) with theta = sum W y; nothing that can be used where its data do not see all parameters
+    found: NullSpace  # what its data cannot see
 
     def solved(self, mean: str) -> tuple[Array, Array]:
         """Parameters (p,) and residuals (k, n) without the mean that instruments are without."""

@@ -106,28 +106,21 @@ BLANKS = ("Start (UTC)", "Wind, from", "Sea state; current, to", "Depth", "File"
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """A sheet: consecutive runs of one manoeuvre, as printable text and figures.
+    """A sheet: consecutive runs of one manoeuvre, as printable text and figures."""
 
-    Attributes:
-        runs: numbers of the runs.
-        approach, danger, end: (name, one text for each run) row by row.
-        orders: the rows of orders, in one or several columns.
-        heads: of the columns of orders.
-        room: (name, text) pairs.
-    """
-
-    runs: tuple[int, ...]
+    runs: tuple[int, ...]  # numbers of the runs
     name: str
     chart: str
     what: str
     purpose: str
+    # approach, danger, end: (name, one text for each run) row by row
     approach: list[tuple[str, tuple[str, ...]]]
     danger: list[tuple[str, tuple[str, ...]]]
     end: list[tuple[str, tuple[str, ...]]]
-    heads: tuple[str, ...]
-    orders: list[list[tuple[str, ...]]]
+    heads: tuple[str, ...]  # of the columns of orders
+    orders: list[list[tuple[str, ...]]]  # the rows of orders, in one or several columns
     orders_notes: list[str]
-    room: list[tuple[str, str]]
+    room: list[tuple[str, str]]  # (name, text) pairs
     record: str
 
     @property

@@ -217,22 +217,16 @@ DIRECTIONS = {"ahead": 0.0, "starboard": np.pi / 2, "port": -np.pi / 2}
 
 @dataclass(frozen=True, kw_only=True)
 class Danger:
-    """Least distances over a run.
+    """Least distances over a run."""
 
-    Attributes:
-        ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, at most
-            `Tuning.farthest_danger_m` [m].
-        nearest_m: from the hull in any direction [m].
-        nearest_sample: when.
-        room_m: (length, width) of the smallest rectangle around the swept area of the hull [m].
-    """
-
+    # ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, at most
+    # `Tuning.farthest_danger_m` [m]
     ahead_m: float
     port_m: float
     starboard_m: float
-    nearest_m: float
-    nearest_sample: int
-    room_m: tuple[float, float]
+    nearest_m: float  # from the hull in any direction [m]
+    nearest_sample: int  # when
+    room_m: tuple[float, float]  # (length, width) of the smallest rectangle around the swept area of the hull [m]
 
 
 def look_out(pose: Array, *, hull_b: Array, water: shapely.MultiPolygon) -> Danger:

@@ -24,15 +24,10 @@ UNCHANGED = "She rolls as her file says"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RollVerdict:
-    """The judgement of the roll of a vessel file.
+    """The judgement of the roll of a vessel file."""
 
-    Attributes:
-        judgement: None where roll was not judged.
-        reason: why not.
-    """
-
-    judgement: RollJudgement | None = None
-    reason: str = ""
+    judgement: RollJudgement | None = None  # None where roll was not judged
+    reason: str = ""  # why not
 
 
 def roll_sentences(roll: RollVerdict | None) -> tuple[str, ...]:

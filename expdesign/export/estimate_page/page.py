@@ -37,19 +37,12 @@ DRAWING_LOADS = 3.0  # how many figures could be drawn while the library for the
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EstimateContent:
-    """The values that the page shows.
+    """The values that the page shows."""
 
-    Attributes:
-        vessel: as it was before the estimation.
-        found: the estimates and their assessment.
-        command: the command line that reproduces the result.
-        version: of the program.
-    """
-
-    vessel: Vessel
-    found: Assessment
-    command: str
-    version: str
+    vessel: Vessel  # as it was before the estimation
+    found: Assessment  # the estimates and their assessment
+    command: str  # the command line that reproduces the result
+    version: str  # of the program
 
     @property
     def drawn(self) -> tuple[Assessed, ...]:

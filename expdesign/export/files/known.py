@@ -15,65 +15,38 @@ from expdesign.values import Array, seal
 
 @dataclass(frozen=True, kw_only=True)
 class Purchase:
-    """The manoeuvre whose runs are most informative about a parameter.
+    """The manoeuvre whose runs are most informative about a parameter."""
 
-    Attributes:
-        primitive: its name; "" where no single manoeuvre matters.
-        runs: number of its runs in the plan.
-        without: ratio of the standard deviations of the parameter without and with them; inf where it is not
-            estimable without them.
-    """
-
-    primitive: str
-    runs: int
+    primitive: str  # its name; "" where no single manoeuvre matters
+    runs: int  # number of its runs in the plan
+    # ratio of the standard deviations of the parameter without and with them; inf where it is not estimable without
+    # them
     without: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """The state of a trial in progress.
+    """The state of a trial in progress."""
 
-    Attributes:
-        data: files so far.
-        sailed_s: time in them [s].
-        total_s: informative time of the whole trial [s].
-        remaining_s: informative time left [s]; nan where it is as long as the accuracy asked for takes.
-        remaining_stated: whether the user stated it.
-        pose: (3,) of the ship at the end of the data, in the area's frame.
-        speed_mps: over ground in the last sample.
-        under_way: how the ship moves as the rest begins; None where it is assumed to be stopped.
-        model: origin of the model for the rest.
-        environment: current and wind of the rest.
-        weather: their origin.
-        notes: further remarks, one sentence each.
-        parameters: p names.
-        before: (p,) values before the trial, nan for parameters that the model did not have.
-        now: (p,) values now.
-        stated: (p,) standard deviations stated before the trial, 0 where none was.
-        so_far: (p,) of estimates from the data so far, predicted; nan where it is not estimable.
-        after: (p,) likewise from these data and the rest together.
-        purchases: (p,) most informative runs.
-    """
-
-    data: tuple[str, ...]
-    sailed_s: float
-    total_s: float
-    remaining_s: float
-    remaining_stated: bool
-    pose: Array
-    speed_mps: float
-    model: str
-    environment: Environment
-    weather: str
-    notes: tuple[str, ...]
-    parameters: tuple[str, ...]
-    before: Array
-    now: Array
-    stated: Array
-    so_far: Array
-    after: Array
-    purchases: tuple[Purchase, ...]
-    under_way: UnderWay | None = None
+    data: tuple[str, ...]  # files so far
+    sailed_s: float  # time in them [s]
+    total_s: float  # informative time of the whole trial [s]
+    remaining_s: float  # informative time left [s]; nan where it is as long as the accuracy asked for takes
+    remaining_stated: bool  # whether the user stated it
+    pose: Array  # (3,) of the ship at the end of the data, in the area's frame
+    speed_mps: float  # over ground in the last sample
+    model: str  # origin of the model for the rest
+    environment: Environment  # current and wind of the rest
+    weather: str  # their origin
+    notes: tuple[str, ...]  # further remarks, one sentence each
+    parameters: tuple[str, ...]  # p names
+    before: Array  # (p,) values before the trial, nan for parameters that the model did not have
+    now: Array  # (p,) values now
+    stated: Array  # (p,) standard deviations stated before the trial, 0 where none was
+    so_far: Array  # (p,) of estimates from the data so far, predicted; nan where it is not estimable
+    after: Array  # (p,) likewise from these data and the rest together
+    purchases: tuple[Purchase, ...]  # (p,) most informative runs
+    under_way: UnderWay | None = None  # how the ship moves as the rest begins; None where it is assumed to be stopped
 
     def __post_init__(self) -> None:
         seal(self, pose="3", before="p", now="p", stated="p", so_far="p", after="p")

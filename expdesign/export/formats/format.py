@@ -10,19 +10,12 @@ from expdesign.export.routes import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
 
 @dataclass(frozen=True, kw_only=True)
 class Format:
-    """A file format for routes.
+    """A file format for routes."""
 
-    Attributes:
-        name: as on the command line.
-        file_name: of the file it gives.
-        summary: one line for the user.
-        write: the file's content.
-    """
-
-    name: str
-    file_name: str
-    summary: str
-    write: Callable[[Route], bytes]
+    name: str  # as on the command line
+    file_name: str  # of the file it gives
+    summary: str  # one line for the user
+    write: Callable[[Route], bytes]  # the file's content
 
 
 def route_file(extension: str) -> str:

@@ -22,18 +22,12 @@ SLOWEST_MPS = 0.01
 
 @dataclass(frozen=True)
 class MissionItem:
-    """One command.
+    """One command."""
 
-    Attributes:
-        command: number of the MAV_CMD.
-        frame: number of the MAV_FRAME.
-        parameters: the first four.
-        lat_deg, lon_deg: or zeros where the command has no place.
-    """
-
-    command: int
-    frame: int
-    parameters: tuple[float, float, float, float]
+    command: int  # number of the MAV_CMD
+    frame: int  # number of the MAV_FRAME
+    parameters: tuple[float, float, float, float]  # the first four
+    # lat_deg, lon_deg: or zeros where the command has no place
     lat_deg: float = 0.0
     lon_deg: float = 0.0
 

@@ -25,18 +25,13 @@ OTHER_SPEED = 0.05
 class Held:
     """Depth and weather of the measured trials; None where it is not stated.
 
-    Attributes:
-        depth_m: of the water.
-        wind_mps: mean speed of the true wind.
-        sea_state: code of the World Meteorological Organization, 0 to 9.
-
     Raises:
         InputError: a depth that is not positive, a negative wind, a code that there is not.
     """
 
-    depth_m: float | None = None
-    wind_mps: float | None = None
-    sea_state: int | None = None
+    depth_m: float | None = None  # of the water
+    wind_mps: float | None = None  # mean speed of the true wind
+    sea_state: int | None = None  # code of the World Meteorological Organization, 0 to 9
 
     def __post_init__(self) -> None:
         if self.depth_m is not None and not 0 < self.depth_m < math.inf:
@@ -49,29 +44,17 @@ class Held:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IndicesContent:
-    """The content of the form.
+    """The content of the form."""
 
-    Attributes:
-        vessel: particulars.
-        scale: ship length by model length; 1 for a ship.
-        simulated: results of the vessel model, or None where it cannot be simulated.
-        simulated_why_not: why it cannot, or "".
-        measured: results of measured runs.
-        notes: remarks on the files, one sentence each.
-        command: the command line.
-        version: of the program.
-        held: depth and weather of the measured trials.
-    """
-
-    vessel: Vessel
-    scale: float
-    simulated: StandardResults | None
-    simulated_why_not: str
-    measured: tuple[Found, ...]
-    notes: tuple[str, ...]
-    command: str
-    version: str
-    held: Held = field(default_factory=Held)
+    vessel: Vessel  # particulars
+    scale: float  # ship length by model length; 1 for a ship
+    simulated: StandardResults | None  # results of the vessel model, or None where it cannot be simulated
+    simulated_why_not: str  # why it cannot, or ""
+    measured: tuple[Found, ...]  # results of measured runs
+    notes: tuple[str, ...]  # remarks on the files, one sentence each
+    command: str  # the command line
+    version: str  # of the program
+    held: Held = field(default_factory=Held)  # depth and weather of the measured trials
 
     @property
     def trials(self) -> tuple[tuple[str, Circle | ZigZag | Stop], ...]:

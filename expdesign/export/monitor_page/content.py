@@ -92,54 +92,35 @@ MUCH_LEFT_OUT, HALF = 0.05, 0.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moment:
-    """State of the watch after a piece of the data.
+    """State of the watch after a piece of the data."""
 
-    Attributes:
-        time_s: end of the piece [s].
-        statistic: the largest sum in the piece.
-        value, std: (m,) size of each change, had it alone happened when the watch began, and its standard error.
-    """
-
-    time_s: float
-    statistic: float
+    time_s: float  # end of the piece [s]
+    statistic: float  # the largest sum in the piece
+    # value, std: (m,) size of each change, had it alone happened when the watch began, and its standard error
     value: Array
     std: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MonitorContent:
-    """The values that page and file show.
+    """The values that page and file show."""
 
-    Attributes:
-        vessel: its name.
-        changes: watched for.
-        calibration: of the reference, which ended at `reference_s` [s].
-        state: at the end.
-        limit: threshold of the statistic.
-        false_alarm_days: average time between false alarms that it is for [d].
-        alarms: as raised, in order; each again when settled.
-        moments: of the watch.
-        left_out_rows: of the data, which lacked a number; unread_rows: in pieces that could not be read.
-        notes: on the data.
-        command, version: to reproduce it.
-        roll: of a vessel file with [roll].
-    """
-
-    vessel: str
-    changes: tuple[Change, ...]
-    calibration: Calibration
+    vessel: str  # its name
+    changes: tuple[Change, ...]  # watched for
+    calibration: Calibration  # of the reference, which ended at `reference_s` [s]
     reference_s: float
-    state: State
-    limit: float
-    false_alarm_days: float
-    alarms: tuple[Alarm, ...]
-    moments: tuple[Moment, ...]
-    left_out_rows: int
+    state: State  # at the end
+    limit: float  # threshold of the statistic
+    false_alarm_days: float  # average time between false alarms that it is for [d]
+    alarms: tuple[Alarm, ...]  # as raised, in order; each again when settled
+    moments: tuple[Moment, ...]  # of the watch
+    left_out_rows: int  # of the data, which lacked a number; unread_rows: in pieces that could not be read
     unread_rows: int
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # on the data
+    # command, version: to reproduce it
     command: str
     version: str
-    roll: RollWatch | None = None
+    roll: RollWatch | None = None  # of a vessel file with [roll]
 
     @property
     def found(self) -> tuple[Alarm, ...]:

@@ -20,50 +20,29 @@ from expdesign.vessel import Vessel
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReportContent:
-    """The values that the report shows.
+    """The values that the report shows."""
 
-    Attributes:
-        scenario: name.
-        vessel: with its nominal model.
-        environment: the forecast.
-        start, goal: (3,) poses asked for [north m, east m, heading rad].
-        criterion: of the design, e.g. "D".
-        fixed_parameters: parameters that are not estimated.
-        clearance_m: least distance from the hull to forbidden water that is required [m].
-        confidence: share of sampled truths that must stay in safe water.
-        information: of every primitive in the dictionary, in the order of the design.
-        design: the durations with their certificate.
-        plan: the trial; a plan that failed its checks is shown as such.
-        command: the command line that reproduces the result.
-        version: of the program.
-        compared: the design under every criterion.
-        route: the waypoints as exported, or None when there are none.
-        known: the state of a trial in progress, or None for a new trial.
-        growth: additions to the dictionary, or None without a search.
-        day: how the day was found to be the shortest, or None where total_s decides.
-        remarks: what the files state and the trial does not use, or takes as certain; one line each.
-    """
-
-    scenario: str
-    vessel: Vessel
-    environment: Environment
+    scenario: str  # name
+    vessel: Vessel  # with its nominal model
+    environment: Environment  # the forecast
+    # start, goal: (3,) poses asked for [north m, east m, heading rad]
     start: Array
     goal: Array
-    criterion: str
-    fixed_parameters: tuple[str, ...]
-    clearance_m: float
-    confidence: float
-    information: tuple[PrimitiveInformation, ...]
-    design: DurationDesign
-    plan: Plan
-    command: str
-    version: str
-    compared: tuple[Efficiencies, ...] = ()
-    route: Route | None = None
-    known: Known | None = None
-    growth: Growth | None = None
-    day: ShortestDay | None = None
-    remarks: tuple[str, ...] = ()
+    criterion: str  # of the design, e.g. "D".
+    fixed_parameters: tuple[str, ...]  # parameters that are not estimated
+    clearance_m: float  # least distance from the hull to forbidden water that is required [m]
+    confidence: float  # share of sampled truths that must stay in safe water
+    information: tuple[PrimitiveInformation, ...]  # of every primitive in the dictionary, in the order of the design
+    design: DurationDesign  # the durations with their certificate
+    plan: Plan  # the trial; a plan that failed its checks is shown as such
+    command: str  # the command line that reproduces the result
+    version: str  # of the program
+    compared: tuple[Efficiencies, ...] = ()  # the design under every criterion
+    route: Route | None = None  # the waypoints as exported, or None when there are none
+    known: Known | None = None  # the state of a trial in progress, or None for a new trial
+    growth: Growth | None = None  # additions to the dictionary, or None without a search
+    day: ShortestDay | None = None  # how the day was found to be the shortest, or None where total_s decides
+    remarks: tuple[str, ...] = ()  # what the files state and the trial does not use, or takes as certain; one line each
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
@@ -83,15 +62,10 @@ class ReportContent:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One run of a primitive in the plan.
+    """One run of a primitive in the plan."""
 
-    Attributes:
-        number: as on the chart, from 1.
-        leg: index of its leg, from 0, as in the files.
-    """
-
-    number: int
-    leg: int
+    number: int  # as on the chart, from 1
+    leg: int  # index of its leg, from 0, as in the files
 
 
 def primitive_runs(plan: Plan) -> tuple[Run, ...]:

@@ -109,17 +109,11 @@ def unknown_current_sentence(content: ReportContent) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Expected:
-    """Standard deviations (p,) in the order of the parameters.
+    """Standard deviations (p,) in the order of the parameters."""
 
-    Attributes:
-        before: prior, zero where none was stated.
-        runs: of estimates from the informative runs alone; nan where they cannot be estimated.
-        track: of estimates from the whole track.
-    """
-
-    before: Array
-    runs: Array
-    track: Array
+    before: Array  # prior, zero where none was stated
+    runs: Array  # of estimates from the informative runs alone; nan where they cannot be estimated
+    track: Array  # of estimates from the whole track
 
     def __post_init__(self) -> None:
         seal(self, before="p", runs="p", track="p")

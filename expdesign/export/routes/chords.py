@@ -225,17 +225,11 @@ Fits = Callable[[Stop, Stop, Sides], bool]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Passage:
-    """A track whose waypoints are to be chosen.
+    """A track whose waypoints are to be chosen."""
 
-    Attributes:
-        points: (k, 2) north, east [m].
-        legs: of the plan.
-        length_m: of the ship.
-    """
-
-    points: Array
-    legs: Sequence[Leg]
-    length_m: float
+    points: Array  # (k, 2) north, east [m]
+    legs: Sequence[Leg]  # of the plan
+    length_m: float  # of the ship
     sailed_m: Array = field(init=False)
 
     def __post_init__(self) -> None:

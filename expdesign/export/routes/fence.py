@@ -22,15 +22,10 @@ DECIMALS = 7
 
 @dataclass(frozen=True, kw_only=True)
 class Fence:
-    """One polygon to stay in and some to stay out of; rings are open, (latitude, longitude) [deg].
+    """One polygon to stay in and some to stay out of; rings are open, (latitude, longitude) [deg]."""
 
-    Attributes:
-        inside: ring, counter-clockwise as seen on a chart.
-        outside: rings of what is forbidden within it, clockwise.
-    """
-
-    inside: tuple[tuple[float, float], ...]
-    outside: tuple[tuple[tuple[float, float], ...], ...]
+    inside: tuple[tuple[float, float], ...]  # ring, counter-clockwise as seen on a chart
+    outside: tuple[tuple[tuple[float, float], ...], ...]  # rings of what is forbidden within it, clockwise
 
 
 def build_fence(

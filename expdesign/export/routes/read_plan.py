@@ -136,31 +136,21 @@ def environment_of(file: _Environment) -> Environment:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlannedTrack:
-    """Commands and the motion they give, from start to goal; verified.
+    """Commands and the motion they give, from start to goal; verified."""
 
-    Attributes:
-        scenario, vessel: names.
-        length_m, beam_m: of the vessel [m].
-        frame: relates north/east metres to latitude and longitude.
-        environment: the forecast it was planned for.
-        commands: (k, m) actuator commands.
-        trajectory: k + 1 samples.
-        legs: in time order, without gaps.
-        clearance_m: least distance from the hull to forbidden water that is required [m].
-        fence: allowed water around the track, or None when it is not known.
-    """
-
+    # scenario, vessel: names
     scenario: str
     vessel: str
+    # length_m, beam_m: of the vessel [m]
     length_m: float
     beam_m: float
-    frame: LocalFrame
-    environment: Environment
-    commands: Commands
-    trajectory: Trajectory
-    legs: tuple[Leg, ...]
-    clearance_m: float
-    fence: Fence | None = None
+    frame: LocalFrame  # relates north/east metres to latitude and longitude
+    environment: Environment  # the forecast it was planned for
+    commands: Commands  # (k, m) actuator commands
+    trajectory: Trajectory  # k + 1 samples
+    legs: tuple[Leg, ...]  # in time order, without gaps
+    clearance_m: float  # least distance from the hull to forbidden water that is required [m]
+    fence: Fence | None = None  # allowed water around the track, or None when it is not known
 
     @property
     def sample_leg(self) -> np.ndarray:

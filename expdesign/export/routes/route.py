@@ -32,19 +32,12 @@ COMPARED_POINTS = 17  # points on each leg where a route is compared with the tr
 
 @dataclass(frozen=True, kw_only=True)
 class RouteFit:
-    """Accuracy of a route.
+    """Accuracy of a route."""
 
-    Attributes:
-        cross_track_m: largest distance of the track from the leg sailed at that time, straight in the plan's frame.
-        loxodrome_m: largest deviation of a rhumb line between two waypoints from that straight line.
-        orthodrome_m: the same for a great circle (the geodesic).
-        in_water: whether every leg lies in the allowed water; None when the chart was not at hand.
-    """
-
-    cross_track_m: float
-    loxodrome_m: float
-    orthodrome_m: float
-    in_water: bool | None
+    cross_track_m: float  # largest distance of the track from the leg sailed at that time, straight in the plan's frame
+    loxodrome_m: float  # largest deviation of a rhumb line between two waypoints from that straight line
+    orthodrome_m: float  # the same for a great circle (the geodesic)
+    in_water: bool | None  # whether every leg lies in the allowed water; None when the chart was not at hand
 
     @property
     def largest_m(self) -> float:
@@ -119,37 +112,26 @@ LARGEST_XTD_M = 10 * METRES_PER_NAUTICAL_MILE
 
 @dataclass(frozen=True, kw_only=True)
 class Waypoint:
-    """A point of the route, with the chord that leads to it.
+    """A point of the route, with the chord that leads to it."""
 
-    Attributes:
-        name: unique in the route.
-        lat_deg, lon_deg: WGS84; longitude in [-180, 180).
-        north_m, east_m: the same place in the plan's frame [m].
-        time_s: arrival, from the start of the plan [s].
-        stay_s: time spent here before going on [s].
-        speed_mps: over ground along the chord to here, its length by its time [m/s]; 0 at the first waypoint.
-        leg: index of the plan's leg that the chord belongs to; of the first leg at the first waypoint.
-        leg_kind: "primitive" or "reposition".
-        leg_name: of the primitive, or what the repositioning leads to.
-        xtd_port_m, xtd_starboard_m: cross-track distances of the chord to here, within which the track stays [m]; of
-            the first chord at the first waypoint.
-        held: what is run around this waypoint while the ship stays; "" for nothing.
-    """
-
-    name: str
+    name: str  # unique in the route
+    # lat_deg, lon_deg: WGS84; longitude in [-180, 180)
     lat_deg: float
     lon_deg: float
+    # north_m, east_m: the same place in the plan's frame [m]
     north_m: float
     east_m: float
-    time_s: float
-    stay_s: float
-    speed_mps: float
-    leg: int
-    leg_kind: str
-    leg_name: str
+    time_s: float  # arrival, from the start of the plan [s]
+    stay_s: float  # time spent here before going on [s]
+    speed_mps: float  # over ground along the chord to here, its length by its time [m/s]; 0 at the first waypoint
+    leg: int  # index of the plan's leg that the chord belongs to; of the first leg at the first waypoint
+    leg_kind: str  # "primitive" or "reposition"
+    leg_name: str  # of the primitive, or what the repositioning leads to
+    # xtd_port_m, xtd_starboard_m: cross-track distances of the chord to here, within which the track stays [m]; of the
+    # first chord at the first waypoint
     xtd_port_m: float
     xtd_starboard_m: float
-    held: str = ""
+    held: str = ""  # what is run around this waypoint while the ship stays; "" for nothing
 
     def __post_init__(self) -> None:
         if not (-90 <= self.lat_deg <= 90 and -180 <= self.lon_deg < 180):
@@ -158,28 +140,18 @@ class Waypoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Route:
-    """Waypoints in time order.
+    """Waypoints in time order."""
 
-    Attributes:
-        name: stem of the file name.
-        scenario, vessel: names.
-        waypoints: two or more.
-        xtd_m: largest cross-track distance of any leg, to either side [m].
-        frame: relates north/east metres to latitude and longitude.
-        fit: deviation of the legs, as written, from the track.
-        fence: allowed water around the track, or None when the chart is not at hand.
-        departure: UTC time of the first waypoint, or None when not fixed.
-    """
-
-    name: str
+    name: str  # stem of the file name
+    # scenario, vessel: names
     scenario: str
     vessel: str
-    waypoints: tuple[Waypoint, ...]
-    xtd_m: float
-    frame: LocalFrame
-    fit: RouteFit
-    fence: Fence | None = None
-    departure: datetime | None = None
+    waypoints: tuple[Waypoint, ...]  # two or more
+    xtd_m: float  # largest cross-track distance of any leg, to either side [m]
+    frame: LocalFrame  # relates north/east metres to latitude and longitude
+    fit: RouteFit  # deviation of the legs, as written, from the track
+    fence: Fence | None = None  # allowed water around the track, or None when the chart is not at hand
+    departure: datetime | None = None  # UTC time of the first waypoint, or None when not fixed
 
     def __post_init__(self) -> None:
         if len(self.waypoints) < 2:

@@ -24,42 +24,30 @@ STATES = ("speed", "yaw rate")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Validated:
-    """A batch simulated from its first state with its commands alone.
+    """A batch simulated from its first state with its commands alone."""
 
-    Attributes:
-        name: of the batch.
-        time_s: (k,).
-        measured, simulated: (k, 2) U and r.
-        fit_percent: (2,).
-    """
-
-    name: str
-    time_s: Array
+    name: str  # of the batch
+    time_s: Array  # (k,)
+    # measured, simulated: (k, 2) U and r
     measured: Array
     simulated: Array
-    fit_percent: Array
+    fit_percent: Array  # (2,)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StepTrialContent:
-    """The values that page and files show.
+    """The values that page and files show."""
 
-    Attributes:
-        trial: what was identified.
-        listed: steps that were to be sailed; None where every step of the record was.
-        before, nominal: the vessel as its file knew it, and after the steps; None where no file was given.
-        own, tests: simulations of the data, and of data held out.
-        notes: on the data.
-        command, version: to reproduce it.
-    """
-
-    trial: StepTrial
-    listed: StepList | None
+    trial: StepTrial  # what was identified
+    listed: StepList | None  # steps that were to be sailed; None where every step of the record was
+    # before, nominal: the vessel as its file knew it, and after the steps; None where no file was given
     before: Vessel | None
     nominal: Vessel | None
+    # own, tests: simulations of the data, and of data held out
     own: tuple[Validated, ...]
     tests: tuple[Validated, ...]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # on the data
+    # command, version: to reproduce it
     command: str
     version: str
 

@@ -16,20 +16,13 @@ TO_DO_HEADER = ("step", "set", "why")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LiveContent:
-    """The values that the files show.
+    """The values that the files show."""
 
-    Attributes:
-        steps: the list.
-        state: after the last row.
-        constants_s: expected time constants of U and r [s].
-        notes: on the data.
-        command, version: to reproduce it.
-    """
-
-    steps: StepList
-    state: State
-    constants_s: tuple[float, float]
-    notes: tuple[str, ...]
+    steps: StepList  # the list
+    state: State  # after the last row
+    constants_s: tuple[float, float]  # expected time constants of U and r [s]
+    notes: tuple[str, ...]  # on the data
+    # command, version: to reproduce it
     command: str
     version: str
 

@@ -21,39 +21,23 @@ SAME_S = 3.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """One variant, or the scenario itself.
+    """One variant, or the scenario itself."""
 
-    Attributes:
-        name: of the scenario.
-        changes: differences from the scenario, one line each.
-        problem: why there is no result, or "".
-        criterion: of the design.
-        runs: whole runs by primitive, only those used.
-        informative_s: time of all runs [s].
-        gap_relative: of the certificate.
-        efficiencies: criterion -> efficiency of the whole runs against that criterion's own optimum.
-        parameters: estimated ones.
-        covariance: (p, p) expected of estimates from the runs alone.
-        plan: numbers of the planned trial, units in the names; empty when none was planned.
-        track: (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known.
-        legs_count: whether the accuracy asked for is that of the whole track, not of the runs alone.
-        remarks: what its files state and it does not use, or takes as certain; one line each.
-    """
-
-    name: str
-    changes: tuple[str, ...] = ()
-    problem: str = ""
-    criterion: str = ""
-    runs: Mapping[str, int]
-    informative_s: float = 0.0
-    gap_relative: float = 0.0
-    efficiencies: Mapping[str, float]
-    parameters: tuple[str, ...] = ()
-    covariance: Array
-    plan: Mapping[str, object]
+    name: str  # of the scenario
+    changes: tuple[str, ...] = ()  # differences from the scenario, one line each
+    problem: str = ""  # why there is no result, or ""
+    criterion: str = ""  # of the design
+    runs: Mapping[str, int]  # whole runs by primitive, only those used
+    informative_s: float = 0.0  # time of all runs [s]
+    gap_relative: float = 0.0  # of the certificate
+    efficiencies: Mapping[str, float]  # criterion -> efficiency of the whole runs against that criterion's own optimum
+    parameters: tuple[str, ...] = ()  # estimated ones
+    covariance: Array  # (p, p) expected of estimates from the runs alone
+    plan: Mapping[str, object]  # numbers of the planned trial, units in the names; empty when none was planned
+    # (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known
     track: Array | None = None
-    legs_count: bool = False
-    remarks: tuple[str, ...] = ()
+    legs_count: bool = False  # whether the accuracy asked for is that of the whole track, not of the runs alone
+    remarks: tuple[str, ...] = ()  # what its files state and it does not use, or takes as certain; one line each
 
     @property
     def std(self) -> Array:
@@ -63,36 +47,25 @@ class Case:
 
 @dataclass(frozen=True, kw_only=True)
 class Against:
-    """A variant against the first case, on the parameters that both estimate.
+    """A variant against the first case, on the parameters that both estimate."""
 
-    Attributes:
-        common: those parameters.
-        ratios: (c,) standard deviation over the first case's.
-        accuracy: ratio of information determinants to the power 1/c: 2 means half the variance.
-        same_accuracy_s: informative time in which the runs of the variant, in the same proportions, are as accurate as
-            the first case [s]; None where whole tracks are compared, because legs count in one of the two.
-        track: ratio of information, as `accuracy`, of the whole tracks, legs included; None where they are not known.
-    """
-
-    common: tuple[str, ...]
-    ratios: tuple[float, ...]
-    accuracy: float
+    common: tuple[str, ...]  # those parameters
+    ratios: tuple[float, ...]  # (c,) standard deviation over the first case's
+    accuracy: float  # ratio of information determinants to the power 1/c: 2 means half the variance
+    # informative time in which the runs of the variant, in the same proportions, are as accurate as the first case [s];
+    # None where whole tracks are compared, because legs count in one of the two
     same_accuracy_s: float | None
+    # ratio of information, as `accuracy`, of the whole tracks, legs included; None where they are not known
     track: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WhatIfContent:
-    """The values that the page shows.
+    """The values that the page shows."""
 
-    Attributes:
-        cases: the scenario first, then its variants.
-        planned: whether trials were planned.
-        command, version: to reproduce it.
-    """
-
-    cases: tuple[Case, ...]
-    planned: bool
+    cases: tuple[Case, ...]  # the scenario first, then its variants
+    planned: bool  # whether trials were planned
+    # command, version: to reproduce it
     command: str
     version: str
 

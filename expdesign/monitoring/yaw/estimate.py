@@ -18,19 +18,12 @@ LARGEST_RATE = 10.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YawEstimate:
-    """Estimates from n voyages.
+    """Estimates from n voyages."""
 
-    Attributes:
-        model: the structure.
-        parameters: (n, p) SI.
-        std: (n, p) standard errors from the residual, as if it were white; noise of the inputs is not counted.
-        fit: (n,) 100 (1 - |r - r_hat| / |r - mean r|) [%].
-    """
-
-    model: YawModel
-    parameters: Array
-    std: Array
-    fit: Array
+    model: YawModel  # the structure
+    parameters: Array  # (n, p) SI
+    std: Array  # (n, p) standard errors from the residual, as if it were white; noise of the inputs is not counted
+    fit: Array  # (n,) 100 (1 - |r - r_hat| / |r - mean r|) [%]
 
     def __post_init__(self) -> None:
         seal(self, parameters="n p", std="n p", fit="n")

@@ -28,24 +28,16 @@ INPUTS = ("sway_acceleration", "u", "v", "phi", "moment")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YawData:
-    """Measured signals of n voyages, (n, k) each.
+    """Measured signals of n voyages, (n, k) each."""
 
-    Attributes:
-        sample_time_s: time between samples [s].
-        r: yaw rate [rad/s].
-        sway_acceleration: dv/dt [m/s2].
-        u, v: surge and sway speed [m/s].
-        phi: roll [rad].
-        moment: yaw moment of the drives [Nm].
-    """
-
-    sample_time_s: float
-    r: Array
-    sway_acceleration: Array
+    sample_time_s: float  # time between samples [s]
+    r: Array  # yaw rate [rad/s]
+    sway_acceleration: Array  # dv/dt [m/s2]
+    # u, v: surge and sway speed [m/s]
     u: Array
     v: Array
-    phi: Array
-    moment: Array
+    phi: Array  # roll [rad]
+    moment: Array  # yaw moment of the drives [Nm]
 
     def __post_init__(self) -> None:
         seal(self, **dict.fromkeys(("r", *INPUTS), "n k"))
@@ -59,17 +51,11 @@ class YawData:
 
 @dataclass(frozen=True)
 class YawModel:
-    """A structure.
+    """A structure."""
 
-    Attributes:
-        name: "full", "separate" or "simplified".
-        parameters: names, the inertia first; SI.
-        damping: those that cannot be positive.
-    """
-
-    name: str
-    parameters: tuple[str, ...]
-    damping: tuple[str, ...] = ("N_rr", "N_rv")
+    name: str  # "full", "separate" or "simplified"
+    parameters: tuple[str, ...]  # names, the inertia first; SI
+    damping: tuple[str, ...] = ("N_rr", "N_rv")  # those that cannot be positive
 
     def shapes(self, data: YawData) -> Array:
         """(4, k, n, p - 1): what every parameter but the inertia multiplies, as multiples of 1, r, |r| and r|r|."""

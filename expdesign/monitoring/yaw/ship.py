@@ -29,19 +29,12 @@ YAW_CHANNEL = 2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class YawShip:
-    """A yaw model with values.
+    """A yaw model with values."""
 
-    Attributes:
-        model: the structure.
-        vessel: model of the ship, for the moment of the drives where none is measured.
-        parameters: value of each.
-        gain: share by which the moment of the drives exceeds what is taken for it.
-    """
-
-    model: YawModel
-    vessel: VesselModel
-    parameters: Mapping[str, float]
-    gain: float = 0.0
+    model: YawModel  # the structure
+    vessel: VesselModel  # model of the ship, for the moment of the drives where none is measured
+    parameters: Mapping[str, float]  # value of each
+    gain: float = 0.0  # share by which the moment of the drives exceeds what is taken for it
 
     def get(self, effect: str) -> float:
         """Value of an effect."""

@@ -46,20 +46,14 @@ LOOKUP_CHUNK = 1_000  # points looked up at a time
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoalTimes:
-    """Least times to the goal.
+    """Least times to the goal."""
 
-    Attributes:
-        graph: of the water.
-        headway: of legs.
-        nodes, seconds: (n, 2) corners, the goal last, and the least time from each.
-        next_node: (n,) on the path from each; the goal's is itself.
-    """
-
-    graph: VisibilityGraph
-    headway: Headway
+    graph: VisibilityGraph  # of the water
+    headway: Headway  # of legs
+    # nodes, seconds: (n, 2) corners, the goal last, and the least time from each
     nodes: Array
     seconds: Array
-    next_node: np.ndarray
+    next_node: np.ndarray  # (n,) on the path from each; the goal's is itself
 
     def at(self, points: Array) -> Array:
         """(k,) least time from points (k, 2), infinite where no path leads to the goal or a point is ashore."""
@@ -86,19 +80,12 @@ def goal_times(graph: VisibilityGraph, goal: Array, headway: Headway) -> GoalTim
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Saving:
-    """Branch and bound for what a run saves.
+    """Branch and bound for what a run saves."""
 
-    Attributes:
-        track: of the run.
-        times: in the grown water.
-        water: in which points half the beam from the hull's sides have to be.
-        cell_m: edge of the first cells.
-    """
-
-    track: Track
-    times: GoalTimes
-    water: shapely.Geometry
-    cell_m: float
+    track: Track  # of the run
+    times: GoalTimes  # in the grown water
+    water: shapely.Geometry  # in which points half the beam from the hull's sides have to be
+    cell_m: float  # edge of the first cells
 
     def most_s(self, chord_s: float, lookups: int) -> tuple[float, int]:
         """The most that the run saves, infinite where that takes too many lookups, and the lookups left."""

@@ -26,30 +26,19 @@ SIDES_MARGIN = 1.01  # no corner of such a polygon is farther away than its fart
 
 @dataclass(frozen=True, kw_only=True)
 class Displacement:
-    """What a run can contribute to the path at its best heading.
+    """What a run can contribute to the path at its best heading."""
 
-    Attributes:
-        chord_s: time that a leg needs from its start to its end [s].
-        path_s: the same along its path [s].
-        deviation_m: no point of the chord is farther than this from the path [m].
-    """
-
-    chord_s: float
-    path_s: float
-    deviation_m: float
+    chord_s: float  # time that a leg needs from its start to its end [s]
+    path_s: float  # the same along its path [s]
+    deviation_m: float  # no point of the chord is farther than this from the path [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Headway:
-    """The fastest leg.
+    """The fastest leg."""
 
-    Attributes:
-        speed_mps: through water.
-        current_to: (2,) of the water [m/s], slower than that.
-    """
-
-    speed_mps: float
-    current_to: Array
+    speed_mps: float  # through water
+    current_to: Array  # (2,) of the water [m/s], slower than that
 
     def __post_init__(self) -> None:
         seal(self, current_to="2")
@@ -166,18 +155,13 @@ SIDES = np.stack([np.cos(angle := np.arange(BOUNDS.sides) * 2 * np.pi / BOUNDS.s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Track:
-    """A run over ground from a reference: points that turn with the heading, and their drift, which does not.
+    """A run over ground from a reference: points that turn with the heading, and their drift, which does not."""
 
-    Attributes:
-        water: (3 Tuning.track_samples, 2) ahead and to starboard: amidships, both ends included, then points ahead and
-            astern of it that are also half the beam from the hull's sides.
-        drift: (3 Tuning.track_samples, 2) north and east.
-        hull_m: (24,) distances from the reference of the sides of a polygon that contains the track through water.
-    """
-
+    # (3 Tuning.track_samples, 2) ahead and to starboard: amidships, both ends included, then points ahead and astern of
+    # it that are also half the beam from the hull's sides
     water: Array
-    drift: Array
-    hull_m: Array
+    drift: Array  # (3 Tuning.track_samples, 2) north and east
+    hull_m: Array  # (24,) distances from the reference of the sides of a polygon that contains the track through water
 
     @property
     def reach_m(self) -> float:

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Bounds on repositioning time.
+    """Bounds on repositioning time."""
 
-    Attributes:
-        sides: of the polygon that contains a track.
-    """
-
-    sides: int = 24
+    sides: int = 24  # of the polygon that contains a track
 
 
 BOUNDS = Tuning()

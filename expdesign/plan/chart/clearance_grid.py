@@ -22,17 +22,11 @@ KEPT_GRIDS = 3  # visibility graphs, clearance grids and tables of distances tha
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClearanceField:
-    """Distance to forbidden water on a grid.
+    """Distance to forbidden water on a grid."""
 
-    Attributes:
-        origin: (2,) north, east of the first cell's centre [m].
-        cell_m: grid spacing [m].
-        clearance_m: (rows north, columns east) distance from the cell's centre to anything forbidden [m].
-    """
-
-    origin: Array
-    cell_m: float
-    clearance_m: Array
+    origin: Array  # (2,) north, east of the first cell's centre [m]
+    cell_m: float  # grid spacing [m]
+    clearance_m: Array  # (rows north, columns east) distance from the cell's centre to anything forbidden [m]
 
     def __post_init__(self) -> None:
         seal(self, origin="2", clearance_m="r c")

@@ -23,24 +23,16 @@ TABLE_CHUNK = 1000  # cells of that table processed at a time
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoalDistance:
-    """Distances and paths to the goal.
+    """Distances and paths to the goal."""
 
-    Attributes:
-        graph: of the water.
-        field: the grid of the table.
-        distance_m: (rows, columns) length of the path to the goal; where there is none, that of the nearest
-            cell with one, and the distance to it.
-        first_bend: (rows, columns) node where the path from a cell bends first.
-        nodes: (n, 2) corners, the goal last.
-        next_node: (n,) on each node's path; the goal's is itself.
-    """
-
-    graph: VisibilityGraph
-    field: ClearanceField
+    graph: VisibilityGraph  # of the water
+    field: ClearanceField  # the grid of the table
+    # (rows, columns) length of the path to the goal; where there is none, that of the nearest cell with one, and the
+    # distance to it
     distance_m: Array
-    first_bend: np.ndarray
-    nodes: Array
-    next_node: np.ndarray
+    first_bend: np.ndarray  # (rows, columns) node where the path from a cell bends first
+    nodes: Array  # (n, 2) corners, the goal last
+    next_node: np.ndarray  # (n,) on each node's path; the goal's is itself
 
     def to_goal(self, points: Array) -> Array:
         """(...,) length of the path to the goal from (..., 2) points [m]."""

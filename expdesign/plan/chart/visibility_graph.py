@@ -33,16 +33,12 @@ Corners = tuple[tuple[float, int], ...]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Roadmap:
-    """Water, and the lengths between places of it that are in sight of each other.
+    """Water, and the lengths between places of it that are in sight of each other."""
 
-    Attributes:
-        water: polygons (east, north), grown by `Tuning.slit_m`.
-        corners: (n, 2) north/east of places where paths may bend: shores' corners that stick out into the water, ...
-        lengths: (n, n) sparse distances between such places in sight of each other; not all need be there.
-    """
-
-    water: shapely.MultiPolygon
+    water: shapely.MultiPolygon  # polygons (east, north), grown by `Tuning.slit_m`
+    # (n, 2) north/east of places where paths may bend: shores' corners that stick out into the water, ..
     corners: Array
+    # (n, n) sparse distances between such places in sight of each other; not all need be there
     lengths: scipy.sparse.csr_matrix
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -110,13 +106,9 @@ class Roadmap:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VisibilityGraph(Roadmap):
-    """The roadmap of all pairs that shortest paths lead over, so its paths are the shortest of the water.
+    """The roadmap of all pairs that shortest paths lead over, so its paths are the shortest of the water."""
 
-    Attributes:
-        beside: (n, 2, 2) the corners before and after each along the shore.
-    """
-
-    beside: Array
+    beside: Array  # (n, 2, 2) the corners before and after each along the shore
 
     def least_cost(self, start: Array, end: Array, cost: Callable[[Array], Array]) -> float:
         """Least cost of a path between two points (2,), infinite where there is none.

@@ -26,16 +26,11 @@ LOSS_STEP, LOSS_STEPS = 0.01, 3000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpeedChanges:
-    """Largest rates of change of speed after commands that stood, or before commands that will.
+    """Largest rates of change of speed after commands that stood, or before commands that will."""
 
-    Attributes:
-        edges_mps: (k + 1,) speeds between bands, from 0 to that of the fastest leg.
-        until_s: (s,) ends of stages, the last infinite.
-        faster_mps2, slower_mps2: (s, k) largest rates, both positive.
-    """
-
-    edges_mps: Array
-    until_s: Array
+    edges_mps: Array  # (k + 1,) speeds between bands, from 0 to that of the fastest leg
+    until_s: Array  # (s,) ends of stages, the last infinite
+    # faster_mps2, slower_mps2: (s, k) largest rates, both positive
     faster_mps2: Array
     slower_mps2: Array
 
@@ -80,18 +75,13 @@ class SpeedChanges:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegEnd:
-    """Where a leg begins or ends.
+    """Where a leg begins or ends."""
 
-    Attributes:
-        slowest_mps, fastest_mps: through water.
-        inputs: (m,) commands before it begins, or after it has ended, nan for any; None for any at all.
-        changes: of speed, in the leg's direction of time.
-    """
-
+    # slowest_mps, fastest_mps: through water
     slowest_mps: float
     fastest_mps: float
-    inputs: Array | None
-    changes: SpeedChanges
+    inputs: Array | None  # (m,) commands before it begins, or after it has ended, nan for any; None for any at all
+    changes: SpeedChanges  # of speed, in the leg's direction of time
 
 
 def leg_end(

@@ -22,25 +22,15 @@ HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Demand:
-    """What a controller is asked for n ships at once.
+    """What a controller is asked for n ships at once."""
 
-    Attributes:
-        reference: (n, 6) desired pose and velocity over ground.
-        reference_through: (n, 3) its velocity through water in its own b-frame.
-        through: (n, 2) desired velocity through water to north and east, corrected towards the reference.
-        states: (n, 6) pose and velocity over ground.
-        moving: (n, 3) velocity through water in the b-frame.
-        unexplained: (n, 3) acceleration that the nominal model does not explain.
-        near: (n, m) commands to whose angles azimuths keep.
-    """
-
-    reference: Array
-    reference_through: Array
-    through: Array
-    states: Array
-    moving: Array
-    unexplained: Array
-    near: Array
+    reference: Array  # (n, 6) desired pose and velocity over ground
+    reference_through: Array  # (n, 3) its velocity through water in its own b-frame
+    through: Array  # (n, 2) desired velocity through water to north and east, corrected towards the reference
+    states: Array  # (n, 6) pose and velocity over ground
+    moving: Array  # (n, 3) velocity through water in the b-frame
+    unexplained: Array  # (n, 3) acceleration that the nominal model does not explain
+    near: Array  # (n, m) commands to whose angles azimuths keep
 
 
 class Controller(Protocol):
@@ -56,17 +46,11 @@ class Controller(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ForceController:
-    """Desired accelerations become forces by the inverse of the nominal model, and forces become commands.
+    """Desired accelerations become forces by the inverse of the nominal model, and forces become commands."""
 
-    Attributes:
-        vessel: with the nominal model.
-        answer_s: time constant of velocities [s].
-        turn_rate_radps: largest yaw rate.
-    """
-
-    vessel: Vessel
-    answer_s: float
-    turn_rate_radps: float
+    vessel: Vessel  # with the nominal model
+    answer_s: float  # time constant of velocities [s]
+    turn_rate_radps: float  # largest yaw rate
 
     def commands(self, demand: Demand) -> Array:
         """(n, m) desired actuator values."""
@@ -98,19 +82,12 @@ ORDERS = np.linspace(-1.0, 1.0, 9)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HelmController:
-    """Helm and engine orders for desired courses and speeds.
+    """Helm and engine orders for desired courses and speeds."""
 
-    Attributes:
-        vessel: with the nominal model.
-        approach: straight ahead at transit speed.
-        turns: steady turns from there.
-        transit_speed_mps: of legs.
-    """
-
-    vessel: Vessel
-    approach: Approach
-    turns: tuple[SteadyTurn, ...]
-    transit_speed_mps: float
+    vessel: Vessel  # with the nominal model
+    approach: Approach  # straight ahead at transit speed
+    turns: tuple[SteadyTurn, ...]  # steady turns from there
+    transit_speed_mps: float  # of legs
 
     @property
     def answer_s(self) -> float:

@@ -37,14 +37,10 @@ STEADY_OFFSET = 0.3  # shares of the approach's scales between the exact turn an
 
 @dataclass(frozen=True, kw_only=True)
 class SteadyTurn:
-    """A turn in which nothing accelerates, in calm water and air.
+    """A turn in which nothing accelerates, in calm water and air."""
 
-    Attributes:
-        helm_rad: change of helm from the approach's, positive to starboard.
-        surge_mps, sway_mps, yaw_rate_radps: motion through water.
-    """
-
-    helm_rad: float
+    helm_rad: float  # change of helm from the approach's, positive to starboard
+    # surge_mps, sway_mps, yaw_rate_radps: motion through water
     surge_mps: float
     sway_mps: float
     yaw_rate_radps: float

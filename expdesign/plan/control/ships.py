@@ -28,25 +28,15 @@ HELM_RUN_UP_HULLS = 8.0  # hull lengths of the run-up of a helm-steered ship
 
 @dataclass(frozen=True, kw_only=True)
 class Capability(ABC):
-    """Speeds and turns on repositioning legs.
+    """Speeds and turns on repositioning legs."""
 
-    Attributes:
-        top_speed_mps: largest steady surge speed within the actuators' limits.
-        transit_speed_mps: speed of repositioning legs through water.
-        turning_radius_m: of repositioning legs.
-        yaw_rate_radps: largest yaw rate used on legs under way.
-        acceleration_mps2: mean surge acceleration between rest and transit speed.
-        lateral_mps2: largest surge speed times yaw rate on legs.
-        spot_rate_radps: yaw rate of turns at little speed; 0 for ships that do not turn there.
-    """
-
-    top_speed_mps: float
-    transit_speed_mps: float
-    turning_radius_m: float
-    yaw_rate_radps: float
-    acceleration_mps2: float
-    lateral_mps2: float = LATERAL_MPS2
-    spot_rate_radps: float = 0.0
+    top_speed_mps: float  # largest steady surge speed within the actuators' limits
+    transit_speed_mps: float  # speed of repositioning legs through water
+    turning_radius_m: float  # of repositioning legs
+    yaw_rate_radps: float  # largest yaw rate used on legs under way
+    acceleration_mps2: float  # mean surge acceleration between rest and transit speed
+    lateral_mps2: float = LATERAL_MPS2  # largest surge speed times yaw rate on legs
+    spot_rate_radps: float = 0.0  # yaw rate of turns at little speed; 0 for ships that do not turn there
 
     @property
     def turn_rate_radps(self) -> float:
@@ -77,15 +67,10 @@ class Capability(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class ForceSteered(Capability):
-    """Ships that forces in every direction steer.
+    """Ships that forces in every direction steer."""
 
-    Attributes:
-        working_s: in which the slowest actuator goes from nothing to full, or turns a quarter of a circle.
-        late_s: until most of what an actuator is commanded is delivered.
-    """
-
-    working_s: float
-    late_s: float
+    working_s: float  # in which the slowest actuator goes from nothing to full, or turns a quarter of a circle
+    late_s: float  # until most of what an actuator is commanded is delivered
 
     @property
     def settle_s(self) -> float:
@@ -162,19 +147,12 @@ class DubinsShip(ForceSteered):
 
 @dataclass(frozen=True, kw_only=True)
 class HelmShip(Capability):
-    """Ships that are steered by a helm.
+    """Ships that are steered by a helm."""
 
-    Attributes:
-        approach: straight ahead at transit speed.
-        turns: steady turns with the engines at that order.
-        stopping_m: distance in which the ship stops from there with the engines full astern.
-        run_up_m: straight before each run: room to settle, and a steady approach.
-    """
-
-    approach: Approach
-    turns: tuple[SteadyTurn, ...]
-    stopping_m: float
-    run_up_m: float
+    approach: Approach  # straight ahead at transit speed
+    turns: tuple[SteadyTurn, ...]  # steady turns with the engines at that order
+    stopping_m: float  # distance in which the ship stops from there with the engines full astern
+    run_up_m: float  # straight before each run: room to settle, and a steady approach
 
     @property
     def keeps_station(self) -> bool:

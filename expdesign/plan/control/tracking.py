@@ -26,13 +26,9 @@ LEARNING = 3.0  # time constant in which an unexplained acceleration is estimate
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
-    """What is to be followed.
+    """What is to be followed."""
 
-    Attributes:
-        states: (k + 1, 6) pose and velocity over ground at every sample.
-    """
-
-    states: Array
+    states: Array  # (k + 1, 6) pose and velocity over ground at every sample
 
     def __post_init__(self) -> None:
         seal(self, states="k 6")
@@ -102,17 +98,11 @@ def lengths(vectors: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Helmsman:
-    """Deviations become commands.
+    """Deviations become commands."""
 
-    Attributes:
-        vessel: with the nominal model.
-        environment: the forecast.
-        ship: speeds.
-    """
-
-    vessel: Vessel
-    environment: Environment
-    ship: Capability
+    vessel: Vessel  # with the nominal model
+    environment: Environment  # the forecast
+    ship: Capability  # speeds
 
     @cached_property
     def controller(self) -> Controller:

@@ -263,16 +263,12 @@ class BlockMap:
     Its argument (n,) holds the state (6,), what lagging actuators deliver (c,), the earlier and the later commands that
     arrive in each sample (m block,) each, and the sample time. Dead bands are left out: commands inside them make the
     leg miss its end, which the caller finds.
-
-    Attributes:
-        value: argument -> (6 + c,).
-        jacobian: argument -> (6 + c, n).
-        hessian: argument, weights (6 + c,) -> (n, n) of the weighted sum, by one integrator step a sample.
-            IPOPT needs second derivatives for its direction only: what it finds is optimal by the exact first ones.
     """
 
-    value: ca.Function
-    jacobian: ca.Function
+    value: ca.Function  # argument -> (6 + c,)
+    jacobian: ca.Function  # argument -> (6 + c, n)
+    # argument, weights (6 + c,) -> (n, n) of the weighted sum, by one integrator step a sample. IPOPT needs second
+    # derivatives for its direction only: what it finds is optimal by the exact first ones.
     hessian: ca.Function
 
 

@@ -29,13 +29,9 @@ BEND_RADII = (1.5, 0.8, 0.4)  # lengths over which bends of agile legs' paths ar
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Line:
-    """A path with rounded bends.
+    """A path with rounded bends."""
 
-    Attributes:
-        points: (k, 2) north/east.
-    """
-
-    points: Array
+    points: Array  # (k, 2) north/east
 
     @property
     def along_m(self) -> Array:

@@ -69,15 +69,10 @@ RECOVERY_HULLS = 8.0  # time after which a recovery ends in any case, in that of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recovery:
-    """From a state until the ship goes straight.
+    """From a state until the ship goes straight."""
 
-    Attributes:
-        states: (k + 1, 6) at every sample.
-        commands: (k, m).
-    """
-
-    states: Array
-    commands: Array
+    states: Array  # (k + 1, 6) at every sample
+    commands: Array  # (k, m)
 
     def __post_init__(self) -> None:
         seal(self, states="n 6", commands="k m")
@@ -117,19 +112,12 @@ def displaced(recovery: Recovery, ship: Capability, *, sample_time_s: float, hul
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Transit:
-    """A steady part of a leg.
+    """A steady part of a leg."""
 
-    Attributes:
-        to: (i, 3) places and courses of the leg's path before it.
-        states: (k + 1, 6) at every sample.
-        commands: (k, m), all the same.
-        on: (j, 3) places and courses of the path after it; the first is where the ship then is.
-    """
-
-    to: Array
-    states: Array
-    commands: Array
-    on: Array
+    to: Array  # (i, 3) places and courses of the leg's path before it
+    states: Array  # (k + 1, 6) at every sample
+    commands: Array  # (k, m), all the same
+    on: Array  # (j, 3) places and courses of the path after it; the first is where the ship then is
 
     def __post_init__(self) -> None:
         seal(self, to="i 3", states="n 6", commands="k m", on="j 3")
@@ -256,15 +244,12 @@ def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Straights:
-    """Where the straights of a path begin and end.
+    """Where the straights of a path begin and end."""
 
-    Attributes:
-        first, last: (3,) places and courses of the leg's ends.
-        off_m, into_m: lengths of the straights.
-    """
-
+    # first, last: (3,) places and courses of the leg's ends
     first: Array
     last: Array
+    # off_m, into_m: lengths of the straights
     off_m: float
     into_m: float
 

@@ -17,53 +17,38 @@ from expdesign.vessel.hull import covering_discs
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegProblem:
-    """An optimal control problem for a leg.
+    """An optimal control problem for a leg."""
 
-    Attributes:
-        vessel: model, actuator limits and rates.
-        environment: its means act.
-        start, end: (6,) states; heading continuous along the reference.
-        start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample.
-        past: (h, m) commands given before the leg, the standing one last.
-        delivered: (m,) what the actuators deliver as the leg begins, misalignment included.
-        states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times.
-        duration_s: first guess.
-        time_scale_s: unit of time in which smoothness is weighed.
-        path: (j + 1, 3) poses that the corridor is measured from.
-        room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side.
-        circle: (3,) north, east, radius that the hull's discs keep to; the radius may be infinite.
-        hull_arm_m: points this far ahead and astern of the origin must keep to corridor and circle too.
-        top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes.
-        lateral_mps2: bound on surge speed through water times yaw rate.
-        node_s: least time between nodes; 0 for the sample time.
-        displacement_value: (2,) value of displacement to north and east [s/m] for legs that may end anywhere, if it is
-            zero with any heading; None for legs that end at `end`.
-        budget: work budget; once it is exhausted, nothing is found.
-    """
-
-    vessel: Vessel
-    environment: Environment
+    vessel: Vessel  # model, actuator limits and rates
+    environment: Environment  # its means act
+    # start, end: (6,) states; heading continuous along the reference
     start: Array
     end: Array
+    # start_inputs, end_inputs: (m,) commands standing before the leg, and as its last sample
     start_inputs: Array
     end_inputs: Array
-    past: Array
-    delivered: Array
+    past: Array  # (h, m) commands given before the leg, the standing one last
+    delivered: Array  # (m,) what the actuators deliver as the leg begins, misalignment included
+    # states, inputs: (j + 1, 6) and (j + 1, m) first guess at even times
     states: Array
     inputs: Array
-    duration_s: float
-    time_scale_s: float
-    path: Array
+    duration_s: float  # first guess
+    time_scale_s: float  # unit of time in which smoothness is weighed
+    path: Array  # (j + 1, 3) poses that the corridor is measured from
+    # room_port_m, room_starboard_m: (j + 1,) how far the origin may be from the path to either side
     room_port_m: Array
     room_starboard_m: Array
-    circle: Array
-    hull_arm_m: float
+    circle: Array  # (3,) north, east, radius that the hull's discs keep to; the radius may be infinite
+    hull_arm_m: float  # points this far ahead and astern of the origin must keep to corridor and circle too
+    # top_speed_mps, yaw_rate_radps: bounds on speed through water, in any direction, and yaw rate at the nodes
     top_speed_mps: float
     yaw_rate_radps: float
-    lateral_mps2: float
-    node_s: float = 0.0
+    lateral_mps2: float  # bound on surge speed through water times yaw rate
+    node_s: float = 0.0  # least time between nodes; 0 for the sample time
+    # (2,) value of displacement to north and east [s/m] for legs that may end anywhere, if it is zero with any heading;
+    # None for legs that end at `end`
     displacement_value: Array | None = None
-    budget: WorkBudget = field(default_factory=WorkBudget)
+    budget: WorkBudget = field(default_factory=WorkBudget)  # work budget; once it is exhausted, nothing is found
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m", states="j 6", inputs="j m")

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Legs: optimisation, paths and recovery.
+    """Legs: optimisation, paths and recovery."""
 
-    Attributes:
-        beyond_ends: largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends.
-    """
-
+    # largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends
     beyond_ends: float = 1.02
 
 

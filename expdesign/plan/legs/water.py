@@ -42,24 +42,19 @@ ROUND = 1.0 / float(np.cos(np.pi / (4 * ARC_SEGMENTS)))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegTask:
-    """A leg to be found.
+    """A leg to be found."""
 
-    Attributes:
-        start, end: (6,) states, pose in the n-frame and velocity over ground.
-        start_inputs, end_inputs: (m,) commands standing at its ends.
-        seed: of the path search.
-        before: (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only
-            lagging and late actuators remember them.
-        budget: work budget of the search.
-    """
-
+    # start, end: (6,) states, pose in the n-frame and velocity over ground
     start: Array
     end: Array
+    # start_inputs, end_inputs: (m,) commands standing at its ends
     start_inputs: Array
     end_inputs: Array
-    seed: int
+    seed: int  # of the path search
+    # (h, m) commands given before the leg, the standing one last; None when it has stood for long. Only lagging and
+    # late actuators remember them.
     before: Array | None = None
-    budget: WorkBudget = field(default_factory=WorkBudget)
+    budget: WorkBudget = field(default_factory=WorkBudget)  # work budget of the search
 
     def __post_init__(self) -> None:
         seal(self, start="6", end="6", start_inputs="m", end_inputs="m")
@@ -74,15 +69,10 @@ class LegTask:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LegPath:
-    """The path of a leg.
+    """The path of a leg."""
 
-    Attributes:
-        points: (k, 2) north/east, or (k, 3) with courses.
-        source: what found it, in words for plan.json: "straight", "visibility graph", "ompl PRMstar in R2", ...
-    """
-
-    points: Array
-    source: str
+    points: Array  # (k, 2) north/east, or (k, 3) with courses
+    source: str  # what found it, in words for plan.json: "straight", "visibility graph", "ompl PRMstar in R2", ..
 
     @property
     def length_m(self) -> float:
@@ -92,38 +82,25 @@ class LegPath:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundLeg:
-    """A leg, and what found its path.
+    """A leg, and what found its path."""
 
-    Attributes:
-        commands: (k, m); the last azimuths without angle limits may differ from the task's by whole turns.
-        source: as `LegPath`.
-    """
-
-    commands: Array
-    source: str
+    commands: Array  # (k, m); the last azimuths without angle limits may differ from the task's by whole turns
+    source: str  # as `LegPath`
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegWater:
-    """Vessel, weather and water that all legs of a plan share.
+    """Vessel, weather and water that all legs of a plan share."""
 
-    Attributes:
-        vessel, environment, ship: vessel, weather, and speeds on legs.
-        area: allowed water.
-        clearance_m: least distance of the hull from anything forbidden.
-        field: the same water on a grid.
-        corners: that paths may bend at, as `Tuning.corners` of charts.
-        paths: what finds paths that bend, as `PlanSettings.paths`.
-    """
-
+    # vessel, environment, ship: vessel, weather, and speeds on legs
     vessel: Vessel
     environment: Environment
     ship: Capability
-    area: SeaArea
-    clearance_m: float
-    field: ClearanceField
-    corners: Corners = CHART.corners
-    paths: PathsName = PlanSettings.paths
+    area: SeaArea  # allowed water
+    clearance_m: float  # least distance of the hull from anything forbidden
+    field: ClearanceField  # the same water on a grid
+    corners: Corners = CHART.corners  # that paths may bend at, as `Tuning.corners` of charts
+    paths: PathsName = PlanSettings.paths  # what finds paths that bend, as `PlanSettings.paths`
 
     @cached_property
     def safe(self) -> shapely.MultiPolygon:

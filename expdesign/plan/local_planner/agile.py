@@ -52,15 +52,10 @@ TRANSITION_TRIALS = 4  # plans whose transitions are tried before the search pro
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AgilePlanner:
-    """Legs turn on the spot and follow the shortest path; short ones between runs are tried beforehand.
+    """Legs turn on the spot and follow the shortest path; short ones between runs are tried beforehand."""
 
-    Attributes:
-        ship: speeds and turns.
-        vessel: whose actuators accelerate it.
-    """
-
-    ship: AgileShip
-    vessel: Vessel
+    ship: AgileShip  # speeds and turns
+    vessel: Vessel  # whose actuators accelerate it
 
     @cached_property
     def times(self) -> LegTimes:

@@ -20,15 +20,10 @@ PATH_HEADINGS_DEG = (0, 30, -30, 60, -60, 90, -90, 135, -135, 180)  # headings o
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Departures:
-    """Where partial plans' next legs begin to turn.
+    """Where partial plans' next legs begin to turn."""
 
-    Attributes:
-        pose: (b, 3) places, with courses for headings.
-        wait_s: (b,) time until then, and other time that legs lose.
-    """
-
-    pose: Array
-    wait_s: Array
+    pose: Array  # (b, 3) places, with courses for headings
+    wait_s: Array  # (b,) time until then, and other time that legs lose
 
 
 def arc_successors(space: SearchSpace, departures: Departures, able: np.ndarray, q: int, run_up_m: Array) -> Successors:
@@ -98,19 +93,12 @@ def on_paths(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathPoints:
-    """Points along the shortest paths of several plans to the goal.
+    """Points along the shortest paths of several plans to the goal."""
 
-    Attributes:
-        place: (b, s, 2) north, east.
-        direction_rad: (b, s) of the path there.
-        along_m: (b, s) distance along the path.
-        exists: (b, s) whether the path is that long.
-    """
-
-    place: Array
-    direction_rad: Array
-    along_m: Array
-    exists: np.ndarray
+    place: Array  # (b, s, 2) north, east
+    direction_rad: Array  # (b, s) of the path there
+    along_m: Array  # (b, s) distance along the path
+    exists: np.ndarray  # (b, s) whether the path is that long
 
     @property
     def count(self) -> int:

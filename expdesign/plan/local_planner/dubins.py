@@ -70,13 +70,9 @@ def _turn(angle: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DubinsPlanner:
-    """Legs are Dubins curves; changes of speed take the time of the mean acceleration.
+    """Legs are Dubins curves; changes of speed take the time of the mean acceleration."""
 
-    Attributes:
-        ship: speeds and turns.
-    """
-
-    ship: DubinsShip
+    ship: DubinsShip  # speeds and turns
 
     @property
     def transition_trials(self) -> int:

@@ -57,27 +57,19 @@ STOPPED_SHARE = 0.3  # of transit speed below which a ship has stopped or is abo
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HelmTimes:
-    """What the rule needs.
+    """What the rule needs."""
 
-    Attributes:
-        speed_mps, radius_m: of long legs, and of their turns.
-        run_up_m, steady_m: straight before each run, and the last of that, steady.
-        at_rest_m: of legs to a stop at least.
-        spare_m: before a run besides the distance in which speeds change.
-        answer_s: until a new engine order takes effect.
-        speeding_up: (k, 3) speed m/s, distance m and time s from rest with the engines full ahead.
-        stopping: (k, 3) the same until rest with the engines full astern, counted backwards.
-    """
-
+    # speed_mps, radius_m: of long legs, and of their turns
     speed_mps: float
     radius_m: float
+    # run_up_m, steady_m: straight before each run, and the last of that, steady
     run_up_m: float
     steady_m: float
-    at_rest_m: float
-    spare_m: float
-    answer_s: float
-    speeding_up: Array
-    stopping: Array
+    at_rest_m: float  # of legs to a stop at least
+    spare_m: float  # before a run besides the distance in which speeds change
+    answer_s: float  # until a new engine order takes effect
+    speeding_up: Array  # (k, 3) speed m/s, distance m and time s from rest with the engines full ahead
+    stopping: Array  # (k, 3) the same until rest with the engines full astern, counted backwards
 
     def __post_init__(self) -> None:
         seal(self, speeding_up="g 3", stopping="s 3")
@@ -185,15 +177,11 @@ def _table(speed: Array, step_s: float, top_mps: float) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HelmPlanner:
-    """Legs recover from the run before, turn on Dubins curves, and end with a straight run-up.
+    """Legs recover from the run before, turn on Dubins curves, and end with a straight run-up."""
 
-    Attributes:
-        ship: speeds, turns, stopping.
-        recoveries: (q, 4) displacement by which the ship recovers from each run before its first turn: ahead m, to
-            starboard m, course from the heading at the run's end rad, time s.
-    """
-
-    ship: HelmShip
+    ship: HelmShip  # speeds, turns, stopping
+    # (q, 4) displacement by which the ship recovers from each run before its first turn: ahead m, to starboard m,
+    # course from the heading at the run's end rad, time s
     recoveries: Array
 
     def __post_init__(self) -> None:

@@ -37,30 +37,19 @@ Alike = Mapping[tuple[int, float], np.ndarray]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TriedTransition:
-    """A short leg between two runs as it was optimised in open water.
+    """A short leg between two runs as it was optimised in open water."""
 
-    Attributes:
-        step: (3,) forward m, starboard m and turn rad through water.
-        seconds: its time.
-        more_s: how much longer that is than the rule for legs says, where the rule can be trusted.
-    """
-
-    step: Array
-    seconds: float
-    more_s: float
+    step: Array  # (3,) forward m, starboard m and turn rad through water
+    seconds: float  # its time
+    more_s: float  # how much longer that is than the rule for legs says, where the rule can be trusted
 
 
 @dataclass(frozen=True, kw_only=True)
 class GoAroundTime:
-    """Expected time of go-arounds before a run that follows another: the shorter the leg, the less the ship is settled.
+    """Expected time of go-arounds before a run that follows another: after a short leg the ship is less settled."""
 
-    Attributes:
-        soon_s: where there is no leg.
-        settled_s: length of leg on which it falls to 1/e.
-    """
-
-    soon_s: float
-    settled_s: float
+    soon_s: float  # where there is no leg
+    settled_s: float  # length of leg on which it falls to 1/e
 
     @staticmethod
     def of(ship: Capability, vessel: Vessel) -> GoAroundTime | None:
@@ -77,21 +66,13 @@ class GoAroundTime:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunSpace:
-    """Where runs may be placed, whatever leads to them.
+    """Where runs may be placed, whatever leads to them."""
 
-    Attributes:
-        footprints: the primitives to place.
-        frame: for messages.
-        field: clearance.
-        leg_margin_m: clearance that leg centre lines need on the grid [m].
-        current_to: (2,) mean current [m/s].
-    """
-
-    footprints: tuple[Footprint, ...]
-    frame: LocalFrame
-    field: ClearanceField
-    leg_margin_m: float
-    current_to: Array
+    footprints: tuple[Footprint, ...]  # the primitives to place
+    frame: LocalFrame  # for messages
+    field: ClearanceField  # clearance
+    leg_margin_m: float  # clearance that leg centre lines need on the grid [m]
+    current_to: Array  # (2,) mean current [m/s]
 
     def __post_init__(self) -> None:
         seal(self, current_to="2")
@@ -99,35 +80,24 @@ class RunSpace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
-    """Data of the search for places and orders.
+    """Data of the search for places and orders."""
 
-    Attributes:
-        footprints: the primitives to place.
-        frame: for messages.
-        field, goal_distance: clearance, and the shortest path to the goal from everywhere.
-        goal: (3,) pose.
-        planner: how this kind of ship gets from run to run.
-        hull_m: hull length [m].
-        leg_margin_m: clearance that leg centre lines need on the grid [m].
-        current_to: (2,) mean current [m/s].
-        tried: transitions that were tried; None where no leg was found.
-        run_up: extra straight before a run in hull lengths; grows where a leg failed.
-        go_around: expected time of go-arounds, where plans are compared by it too.
-        refused: (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again.
-    """
-
-    footprints: tuple[Footprint, ...]
-    frame: LocalFrame
+    footprints: tuple[Footprint, ...]  # the primitives to place
+    frame: LocalFrame  # for messages
+    # field, goal_distance: clearance, and the shortest path to the goal from everywhere
     field: ClearanceField
     goal_distance: GoalDistance
-    goal: Array
-    planner: LocalPlanner
-    hull_m: float
-    leg_margin_m: float
-    current_to: Array
+    goal: Array  # (3,) pose
+    planner: LocalPlanner  # how this kind of ship gets from run to run
+    hull_m: float  # hull length [m]
+    leg_margin_m: float  # clearance that leg centre lines need on the grid [m]
+    current_to: Array  # (2,) mean current [m/s]
+    # transitions that were tried; None where no leg was found
     tried: Mapping[Pair, TriedTransition | None] = dataclasses.field(default_factory=dict)
+    # extra straight before a run in hull lengths; grows where a leg failed
     run_up: Mapping[Pair, float] = dataclasses.field(default_factory=dict)
-    go_around: GoAroundTime | None = None
+    go_around: GoAroundTime | None = None  # expected time of go-arounds, where plans are compared by it too
+    # (b, 3) start poses that turned out unreachable or unsafe; none is tried near them again
     refused: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
@@ -175,21 +145,14 @@ class SearchSpace:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PartialPlans:
-    """Partial plans with equally many runs.
+    """Partial plans with equally many runs."""
 
-    Attributes:
-        pose: (b, 3) where they end; exit_mps (b,) how fast; last (b,) index of the last primitive, -1 at the start.
-        left: (b, q) runs still to do.
-        cost_s: (b,) repositioning time so far.
-        history: per plan, its (primitive index, start pose) so far.
-    """
-
-    pose: Array
+    pose: Array  # (b, 3) where they end; exit_mps (b,) how fast; last (b,) index of the last primitive, -1 at the start
     exit_mps: Array
     last: np.ndarray
-    left: np.ndarray
-    cost_s: Array
-    history: tuple[tuple[tuple[int, Array], ...], ...]
+    left: np.ndarray  # (b, q) runs still to do
+    cost_s: Array  # (b,) repositioning time so far
+    history: tuple[tuple[tuple[int, Array], ...], ...]  # per plan, its (primitive index, start pose) so far
 
     @property
     def wanted(self) -> list[int]:
@@ -210,26 +173,17 @@ class PartialPlans:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Successors:
-    """Continuations of partial plans by one leg and one run, one per row.
+    """Continuations of partial plans by one leg and one run, one per row."""
 
-    Attributes:
-        departure: (b, 3) pose from which the leg of each partial plan is checked for clearance.
-        parent: (n,) index of the partial plan.
-        primitive: (n,) index of the run to do next.
-        start, end: (n, 3) where the run begins, and where it ends.
-        leg_s: (n,) time to get to its start.
-        turn: (n,) angle of the arc that leads there, before a straight; nan for others.
-        straight: (n,) whether a straight line leads there.
-    """
-
-    departure: Array
-    parent: np.ndarray
-    primitive: np.ndarray
+    departure: Array  # (b, 3) pose from which the leg of each partial plan is checked for clearance
+    parent: np.ndarray  # (n,) index of the partial plan
+    primitive: np.ndarray  # (n,) index of the run to do next
+    # start, end: (n, 3) where the run begins, and where it ends
     start: Array
     end: Array
-    leg_s: Array
-    turn: Array
-    straight: np.ndarray
+    leg_s: Array  # (n,) time to get to its start
+    turn: Array  # (n,) angle of the arc that leads there, before a straight; nan for others
+    straight: np.ndarray  # (n,) whether a straight line leads there
 
     def __len__(self) -> int:
         return len(self.parent)
@@ -256,40 +210,28 @@ _COLUMNS = ("parent", "primitive", "start", "end", "leg_s", "turn", "straight")
 
 @dataclass(frozen=True, kw_only=True)
 class LegEnds:
-    """The runs that a leg leads from and to.
+    """The runs that a leg leads from and to."""
 
-    Attributes:
-        before, after: indices of the runs; -1 for start and goal.
-        exit_mps, entry_mps: surge speeds there.
-    """
-
+    # before, after: indices of the runs; -1 for start and goal
     before: int
     after: int
+    # exit_mps, entry_mps: surge speeds there
     exit_mps: float
     entry_mps: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TransitionTrials:
-    """How transitions are tried before the search proper.
+    """How transitions are tried before the search proper."""
 
-    Attributes:
-        water: of the plan.
-        primitives: the runs by name.
-        start: (3,) pose of the plan.
-        under_way: (3,) velocity through water with which it begins, and (m,) commands standing then.
-        made_good: whether displacement towards the goal saves time on later legs.
-        budget: work budget; transitions that are not tried within it keep the rule for leg times.
-        progress: of choosing some transitions, which counts as one of them, and trying them.
-    """
-
-    water: LegWater
-    primitives: Mapping[str, Primitive]
-    start: Array
-    under_way: tuple[Array, Array]
-    made_good: bool
+    water: LegWater  # of the plan
+    primitives: Mapping[str, Primitive]  # the runs by name
+    start: Array  # (3,) pose of the plan
+    under_way: tuple[Array, Array]  # (3,) velocity through water with which it begins, and (m,) commands standing then
+    made_good: bool  # whether displacement towards the goal saves time on later legs
+    # work budget; transitions that are not tried within it keep the rule for leg times
     budget: WorkBudget = dataclasses.field(default_factory=WorkBudget)
-    progress: Progress = silent
+    progress: Progress = silent  # of choosing some transitions, which counts as one of them, and trying them
 
 
 class LocalPlanner(Protocol):

@@ -63,21 +63,13 @@ DIRECTIONS = np.arange(12) * np.pi / 6
 
 @dataclass(frozen=True, kw_only=True)
 class LegTimes:
-    """What the rule needs.
+    """What the rule needs."""
 
-    Attributes:
-        speed_mps: of long legs.
-        push_mps2: acceleration in every direction.
-        swing_radps: mean yaw rate of turns.
-        settle_s: until actuators have got to work, at both ends together.
-        hull_m: unit of length.
-    """
-
-    speed_mps: float
-    push_mps2: float
-    swing_radps: float
-    settle_s: float
-    hull_m: float
+    speed_mps: float  # of long legs
+    push_mps2: float  # acceleration in every direction
+    swing_radps: float  # mean yaw rate of turns
+    settle_s: float  # until actuators have got to work, at both ends together
+    hull_m: float  # unit of length
 
     def step_s(self, step: Array, exit_mps: Array, entry_mps: Array) -> Array:
         """(...,) time of straight legs through open water [s].
@@ -135,15 +127,10 @@ def _least_s(distance: Array, first: Array, last: Array, a: float, top: float) -
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Transitions:
-    """Short legs between two runs in open water, through water, the heading before being zero.
+    """Short legs between two runs in open water, through water, the heading before being zero."""
 
-    Attributes:
-        step: (n, 3) forward m, starboard m, turn rad.
-        seconds: (n,) time.
-    """
-
-    step: Array
-    seconds: Array
+    step: Array  # (n, 3) forward m, starboard m, turn rad
+    seconds: Array  # (n,) time
 
 
 @lru_cache(maxsize=512)

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Local planners.
+    """Local planners."""
 
-    Attributes:
-        drift_rounds: rounds in which the time of a leg and the drift in that time are made to agree.
-    """
-
-    drift_rounds: int = 3
+    drift_rounds: int = 3  # rounds in which the time of a leg and the drift in that time are made to agree
 
 
 LOCAL = Tuning()

@@ -40,23 +40,14 @@ TRACKING, RETURNING, BEGUN, ABORTED, OUT = range(5)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Approach:
-    """How n ships reached the start of a run.
+    """How n ships reached the start of a run."""
 
-    Attributes:
-        poses: (t, n, 3) at every sample; ships that have begun or aborted stay where they are.
-        begun: (n,) within tolerance; the others that sailed aborted.
-        go_arounds: (n,) of each ship.
-        samples: (n,) that it took.
-        abort_cause: (n,) index in `ABORT_CAUSES`, for ships that aborted.
-        unexplained: (n, 3) estimate at the end of the acceleration that the nominal model does not explain.
-    """
-
-    poses: Array
-    begun: np.ndarray
-    go_arounds: np.ndarray
-    samples: np.ndarray
-    abort_cause: np.ndarray
-    unexplained: Array
+    poses: Array  # (t, n, 3) at every sample; ships that have begun or aborted stay where they are
+    begun: np.ndarray  # (n,) within tolerance; the others that sailed aborted
+    go_arounds: np.ndarray  # (n,) of each ship
+    samples: np.ndarray  # (n,) that it took
+    abort_cause: np.ndarray  # (n,) index in `ABORT_CAUSES`, for ships that aborted
+    unexplained: Array  # (n, 3) estimate at the end of the acceleration that the nominal model does not explain
 
 
 class Guidance:

@@ -44,14 +44,10 @@ ABORT_CAUSES = ("position", "heading", "speed", "yaw rate", "time", "no go-aroun
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """Within which a run may begin.
+    """Within which a run may begin."""
 
-    Attributes:
-        position_m: distance from the planned start.
-        heading_rad, speed_mps, yaw_rate_radps: differences from the planned ones; speed as a vector over ground.
-    """
-
-    position_m: float
+    position_m: float  # distance from the planned start
+    # heading_rad, speed_mps, yaw_rate_radps: differences from the planned ones; speed as a vector over ground
     heading_rad: float
     speed_mps: float
     yaw_rate_radps: float
@@ -109,15 +105,10 @@ def speed_decay_s(vessel: Vessel, speed_mps: float) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretch:
-    """A reference that leads to the start of a run, and a little past it.
+    """A reference that leads to the start of a run, and a little past it."""
 
-    Attributes:
-        states: (k + 1, 6) sample by sample.
-        arrival: row of the planned start.
-    """
-
-    states: Array
-    arrival: int
+    states: Array  # (k + 1, 6) sample by sample
+    arrival: int  # row of the planned start
 
     def __post_init__(self) -> None:
         seal(self, states="k 6")

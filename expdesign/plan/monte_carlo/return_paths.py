@@ -41,16 +41,11 @@ CURVES = 3  # Dubins curves that a go-around from such a pose consists of at mos
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReturnPaths:
-    """All shortest paths to a place.
+    """All shortest paths to a place."""
 
-    Attributes:
-        graph: of the water.
-        place: (2,).
-        nodes, distance, next_node: by `shortest_path_tree`.
-    """
-
-    graph: VisibilityGraph
-    place: Array
+    graph: VisibilityGraph  # of the water
+    place: Array  # (2,)
+    # nodes, distance, next_node: by `shortest_path_tree`
     nodes: Array
     distance: Array
     next_node: np.ndarray
@@ -191,19 +186,12 @@ class PathFollowers:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GoAroundPaths:
-    """Paths to a pose.
+    """Paths to a pose."""
 
-    Attributes:
-        goal: (3,) position and course.
-        radius_m: of the ship's turns.
-        spacing_m: between points of paths.
-        holds: whether a path (k, 2) stays in the water.
-    """
-
-    goal: Array
-    radius_m: float
-    spacing_m: float
-    holds: Callable[[Array], bool]
+    goal: Array  # (3,) position and course
+    radius_m: float  # of the ship's turns
+    spacing_m: float  # between points of paths
+    holds: Callable[[Array], bool]  # whether a path (k, 2) stays in the water
 
     def find(self, pose: Array) -> Array | None:
         """A path (k, 2) from a pose (3,), or None where none was found."""

@@ -37,15 +37,10 @@ COLLISION_SAMPLES, COLLISION_CHUNK = 250_000, 20_000
 
 @dataclass(frozen=True, kw_only=True)
 class CollisionCheck:
-    """Whether hulls stay in allowed water.
+    """Whether hulls stay in allowed water."""
 
-    Attributes:
-        area: the chart.
-        vessel: its outline.
-    """
-
-    area: SeaArea
-    vessel: Vessel
+    area: SeaArea  # the chart
+    vessel: Vessel  # its outline
 
     def exits(self, poses: Array) -> Array:
         """(n, 2) where the hull, or what it sweeps between samples, first leaves the water; nan where never.
@@ -136,26 +131,16 @@ class Trials:
     """Outcomes of n trials, leg by leg.
 
     A trial ends where the hull leaves allowed water, or aborted where a run cannot be begun.
-
-    Attributes:
-        left: (legs, n) whether the hull left allowed water on a leg.
-        aborted: (legs, n) whether the trial was aborted on a leg.
-        go_arounds: (legs, n) on a leg.
-        samples: (legs, n) that legs took.
-        used: (legs, n) largest share of a tolerance used up where a run began; nan where none did.
-        abort_cause: (legs, n) index in `ABORT_CAUSES`, for aborted trials.
-        place: (legs, n, 2) where hulls left allowed water; nan where they did not.
-        within: start tolerances of each leg.
     """
 
-    left: np.ndarray
-    aborted: np.ndarray
-    go_arounds: np.ndarray
-    samples: np.ndarray
-    used: Array
-    abort_cause: np.ndarray
-    place: Array
-    within: tuple[Tolerances, ...]
+    left: np.ndarray  # (legs, n) whether the hull left allowed water on a leg
+    aborted: np.ndarray  # (legs, n) whether the trial was aborted on a leg
+    go_arounds: np.ndarray  # (legs, n) on a leg
+    samples: np.ndarray  # (legs, n) that legs took
+    used: Array  # (legs, n) largest share of a tolerance used up where a run began; nan where none did
+    abort_cause: np.ndarray  # (legs, n) index in `ABORT_CAUSES`, for aborted trials
+    place: Array  # (legs, n, 2) where hulls left allowed water; nan where they did not
+    within: tuple[Tolerances, ...]  # start tolerances of each leg
 
     @property
     def completed(self) -> np.ndarray:

@@ -8,15 +8,10 @@ from math import radians
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Simulated trials, go-arounds and the chance constraint.
+    """Simulated trials, go-arounds and the chance constraint."""
 
-    Attributes:
-        heading_rad: tolerance of a run's start heading.
-        trials_at_once: trials sailed together, so that memory does not grow with their number.
-    """
-
-    heading_rad: float = radians(3.0)
-    trials_at_once: int = 1000
+    heading_rad: float = radians(3.0)  # tolerance of a run's start heading
+    trials_at_once: int = 1000  # trials sailed together, so that memory does not grow with their number
 
 
 MONTE_CARLO = Tuning()

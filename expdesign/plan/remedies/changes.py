@@ -53,15 +53,10 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Change:
-    """A change of one key.
+    """A change of one key."""
 
-    Attributes:
-        words: the key and its value.
-        problem: with the change; None where runs then still have no place by themselves.
-    """
-
-    words: str
-    problem: PlanProblem | None
+    words: str  # the key and its value
+    problem: PlanProblem | None  # with the change; None where runs then still have no place by themselves
 
 
 def first_that_passes(

@@ -179,24 +179,15 @@ def _radius(apart: Array, confidence: float, name: str) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Footprint:
-    """A primitive as the search places it.
+    """A primitive as the search places it."""
 
-    Attributes:
-        name: of the primitive.
-        discs: (n, 2) forward/starboard centres of the discs that cover its swept hull [m].
-        times_s: (n,) when the hull is there [s].
-        room_m: (n,) clearance that each disc centre needs [m].
-        displacement: (3,) forward m, starboard m, turn rad through water.
-        duration_s: of one run [s].
-        entry_mps, exit_mps: surge speed at its ends.
-    """
-
-    name: str
-    discs: Array
-    times_s: Array
-    room_m: Array
-    displacement: Array
-    duration_s: float
+    name: str  # of the primitive
+    discs: Array  # (n, 2) forward/starboard centres of the discs that cover its swept hull [m]
+    times_s: Array  # (n,) when the hull is there [s]
+    room_m: Array  # (n,) clearance that each disc centre needs [m]
+    displacement: Array  # (3,) forward m, starboard m, turn rad through water
+    duration_s: float  # of one run [s]
+    # entry_mps, exit_mps: surge speed at its ends
     entry_mps: float
     exit_mps: float
 

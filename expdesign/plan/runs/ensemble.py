@@ -23,14 +23,10 @@ FEW_SHIPS = 128  # up to so many are quicker one by one than by an operation on 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truths:
-    """True parameters and mean weather of n ships.
+    """True parameters and mean weather of n ships."""
 
-    Attributes:
-        parameters: (n, p) in the model's own form.
-        current_to, wind_to: (n, 2) means of their trials [m/s].
-    """
-
-    parameters: Array
+    parameters: Array  # (n, p) in the model's own form
+    # current_to, wind_to: (n, 2) means of their trials [m/s]
     current_to: Array
     wind_to: Array
 

@@ -30,15 +30,10 @@ CELL_HULLS, HEADING_RAD = 2.0, 0.4  # places of which one successor is kept: the
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OrdersAhead:
-    """Least losses by what is left and what was last.
+    """Least losses by what is left and what was last."""
 
-    Attributes:
-        base: (q,) place values that number the combinations of runs left.
-        lost_s: (combinations, q) by the last run; (q, 1) by the next one where there are too many combinations.
-    """
-
-    base: np.ndarray
-    lost_s: Array
+    base: np.ndarray  # (q,) place values that number the combinations of runs left
+    lost_s: Array  # (combinations, q) by the last run; (q, 1) by the next one where there are too many combinations
 
     def seconds(self, left: np.ndarray, last: np.ndarray) -> Array:
         """(...,) time lost from plans with runs left (..., q) after runs (...,)."""

@@ -37,19 +37,15 @@ TINY = 1e-9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LatticeProblem:
-    """Poses, what leads from one to the other, and how often each run is wanted.
+    """Poses, what leads from one to the other, and how often each run is wanted."""
 
-    Attributes:
-        moves: (n, n) sparse matrix, entry (a, b) the cost, 0 or more, of the basic move from pose a to pose b.
-        runs: one (n, n) sparse matrix for each run, entry (a, b) the cost, 0 or more, besides the run itself, of a run
-            that begins at pose a and of the way from its end to pose b.
-        counts: how often each run is wanted.
-        start, goal: poses.
-    """
-
+    # (n, n) sparse matrix, entry (a, b) the cost, 0 or more, of the basic move from pose a to pose b
     moves: scipy.sparse.csr_array
+    # one (n, n) sparse matrix for each run, entry (a, b) the cost, 0 or more, besides the run itself, of a run that
+    # begins at pose a and of the way from its end to pose b
     runs: tuple[scipy.sparse.csr_array, ...]
-    counts: Counters
+    counts: Counters  # how often each run is wanted
+    # start, goal: poses
     start: int
     goal: int
 
@@ -69,19 +65,12 @@ class LatticeProblem:
 
 @dataclass(frozen=True, kw_only=True)
 class LatticePlan:
-    """A plan with its proof.
+    """A plan with its proof."""
 
-    Attributes:
-        cost: of the plan.
-        lower_bound: no plan costs less; equal to `cost` when the plan is proved optimal.
-        expansions: states whose cost became final, in all searches.
-        steps: (pose, run that begins there or -1 for a move), from start to goal.
-    """
-
-    cost: float
-    lower_bound: float
-    expansions: int
-    steps: tuple[tuple[int, int], ...]
+    cost: float  # of the plan
+    lower_bound: float  # no plan costs less; equal to `cost` when the plan is proved optimal
+    expansions: int  # states whose cost became final, in all searches
+    steps: tuple[tuple[int, int], ...]  # (pose, run that begins there or -1 for a move), from start to goal
 
     @property
     def gap(self) -> float:

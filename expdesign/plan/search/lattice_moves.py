@@ -35,15 +35,10 @@ AHEAD = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lattice:
-    """Poses of a lattice over the water of a search space. The start and the goal come after them.
+    """Poses of a lattice over the water of a search space. The start and the goal come after them."""
 
-    Attributes:
-        space: water, runs and what the ship can do.
-        spacing_m: between cells.
-    """
-
-    space: SearchSpace
-    spacing_m: float
+    space: SearchSpace  # water, runs and what the ship can do
+    spacing_m: float  # between cells
 
     @property
     def headings(self) -> int:
@@ -129,17 +124,11 @@ NO_BENDS = np.zeros((0, 2))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Departure:
-    """Where a lattice plan begins.
+    """Where a lattice plan begins."""
 
-    Attributes:
-        pose: (3,).
-        exit_mps: surge speed there.
-        last: index of the run that ends there, or -1.
-    """
-
-    pose: Array
-    exit_mps: float = 0.0
-    last: int = -1
+    pose: Array  # (3,)
+    exit_mps: float = 0.0  # surge speed there
+    last: int = -1  # index of the run that ends there, or -1
 
 
 def build_lattice(lattice: Lattice, counts: Sequence[int], departure: Departure) -> LatticeProblem:

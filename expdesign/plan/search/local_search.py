@@ -116,34 +116,22 @@ def _lines_clear(space: SearchSpace, pose: Array, start: Array) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainEnds:
-    """Where a chain of runs begins; it ends at the space's goal.
+    """Where a chain of runs begins; it ends at the space's goal."""
 
-    Attributes:
-        start: (3,) pose before the first leg.
-        exit_mps: surge speed there.
-        last: primitive that ends there, or -1.
-    """
-
-    start: Array
-    exit_mps: float
-    last: int
+    start: Array  # (3,) pose before the first leg
+    exit_mps: float  # surge speed there
+    last: int  # primitive that ends there, or -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chain:
-    """Runs in order, where they are, and what the legs between them take.
+    """Runs in order, where they are, and what the legs between them take."""
 
-    Attributes:
-        runs: (n,) of the space's primitives.
-        poses: (n, 3) where they begin.
-        bends: n + 1 corners (k, 2) of each leg's path, both ends left out; the last leg leads to the goal.
-        legs_s: (n + 1,) time of the legs.
-    """
-
-    runs: np.ndarray
-    poses: Array
+    runs: np.ndarray  # (n,) of the space's primitives
+    poses: Array  # (n, 3) where they begin
+    # n + 1 corners (k, 2) of each leg's path, both ends left out; the last leg leads to the goal
     bends: tuple[Array, ...]
-    legs_s: Array
+    legs_s: Array  # (n + 1,) time of the legs
 
     def around(self, i: int, j: int) -> tuple[bytes, ...]:
         """All that decides whether runs i to j can be moved: from the run before them to the one after."""

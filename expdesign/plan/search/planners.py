@@ -29,13 +29,9 @@ LATTICE_STATE_S = 1e-6  # counted work for each state [s]
 
 @dataclass(frozen=True, kw_only=True)
 class LatticeSearch:
-    """Places runs on a lattice.
+    """Places runs on a lattice."""
 
-    Attributes:
-        spacing_m: between cells, or None for one that suits the ship and the size of the water.
-    """
-
-    spacing_m: float | None = None
+    spacing_m: float | None = None  # between cells, or None for one that suits the ship and the size of the water
 
     @property
     def tries_transitions(self) -> bool:

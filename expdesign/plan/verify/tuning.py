@@ -9,12 +9,9 @@ from expdesign.simulation.run import SUBSTEPS
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Constants that were chosen, not derived.
+    """Constants that were chosen, not derived."""
 
-    Attributes:
-        fine_substeps: integrator steps per sample of the re-simulation: ten times as many as in planning.
-    """
-
+    # integrator steps per sample of the re-simulation: ten times as many as in planning
     fine_substeps: int = 10 * SUBSTEPS
 
 

@@ -28,15 +28,10 @@ FIRST_ROW = 2
 
 @dataclass(frozen=True, kw_only=True)
 class Cells:
-    """A comma-separated file whose header was read.
+    """A comma-separated file whose header was read."""
 
-    Attributes:
-        path: the file.
-        header: names in row 1, on one line, without surrounding blanks.
-    """
-
-    path: Path
-    header: tuple[str, ...]
+    path: Path  # the file
+    header: tuple[str, ...]  # names in row 1, on one line, without surrounding blanks
 
     def blocks(self) -> Iterator[tuple[int, list[tuple[str, ...]]]]:
         """Row of the first cell, and the texts of each column, block by block.

@@ -26,15 +26,10 @@ Sources = dict[str, Source]
 
 @dataclass(frozen=True)
 class Inputs:
-    """The inputs a file must give.
+    """The inputs a file must give."""
 
-    Attributes:
-        columns: their columns, e.g. ("n1_rps", "rudder1_rad").
-        whose: who takes or gives them, for messages, e.g. "the vessel".
-    """
-
-    columns: tuple[str, ...]
-    whose: str
+    columns: tuple[str, ...]  # their columns, e.g. ("n1_rps", "rudder1_rad").
+    whose: str  # who takes or gives them, for messages, e.g. "the vessel".
 
 
 def choose_columns(path: Path, header: tuple[str, ...], *, inputs: Inputs | None) -> tuple[Sources, tuple[str, ...]]:

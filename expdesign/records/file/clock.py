@@ -24,17 +24,11 @@ UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"), (1 
 
 @dataclass(frozen=True, kw_only=True)
 class Clock:
-    """How a file is sampled.
+    """How a file is sampled."""
 
-    Attributes:
-        sample_time_s: mean interval inside the batches [s].
-        batches: stretches of samples, each with two or more.
-        notes: on gaps and dropped samples.
-    """
-
-    sample_time_s: float
-    batches: tuple[slice, ...]
-    notes: tuple[str, ...] = ()
+    sample_time_s: float  # mean interval inside the batches [s]
+    batches: tuple[slice, ...]  # stretches of samples, each with two or more
+    notes: tuple[str, ...] = ()  # on gaps and dropped samples
 
 
 def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the vessel") -> Clock:

@@ -42,19 +42,12 @@ REVOLUTIONS = {"rps": 1.0, "hz": 1.0, **dict.fromkeys(("rpm", "1/min"), 1.0 / 60
 
 @dataclass(frozen=True)
 class Quantity:
-    """Columns that are read.
+    """Columns that are read."""
 
-    Attributes:
-        pattern: of the part of a name before the unit.
-        units: those it may be given in, with the factor to the package's own unit, which is the first.
-        names: as the contract has them.
-        meaning: one line for the user.
-    """
-
-    pattern: str
-    units: dict[str, float]
-    names: str
-    meaning: str
+    pattern: str  # of the part of a name before the unit
+    units: dict[str, float]  # those it may be given in, with the factor to the package's own unit, which is the first
+    names: str  # as the contract has them
+    meaning: str  # one line for the user
 
 
 QUANTITIES = (
@@ -147,19 +140,12 @@ SYNONYMS = {
 
 @dataclass(frozen=True)
 class Source:
-    """Where a quantity comes from.
+    """Where a quantity comes from."""
 
-    Attributes:
-        column: index in the header.
-        header: as written in the file.
-        name: the contract's name, e.g. "u_mps".
-        factor: the file's value times this is in the contract's unit.
-    """
-
-    column: int
-    header: str
-    name: str
-    factor: float = 1.0
+    column: int  # index in the header
+    header: str  # as written in the file
+    name: str  # the contract's name, e.g. "u_mps".
+    factor: float = 1.0  # the file's value times this is in the contract's unit
 
     @property
     def exact(self) -> bool:
@@ -169,15 +155,10 @@ class Source:
 
 @dataclass(frozen=True)
 class Unitless:
-    """A known quantity whose name lacks the unit: `heading`.
+    """A known quantity whose name lacks the unit: `heading`."""
 
-    Attributes:
-        header: as written in the file.
-        names: the names that would be understood.
-    """
-
-    header: str
-    names: tuple[str, ...]
+    header: str  # as written in the file
+    names: tuple[str, ...]  # the names that would be understood
 
 
 def meaning(header: str, column: int) -> Source | Unitless | None:

@@ -23,20 +23,14 @@ COURSES, AHEAD_SHARE = 200, 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """Allowed values of a column.
+    """Allowed values of a column."""
 
-    Attributes:
-        pattern: of the contract names it is about.
-        low, high: bounds in the contract's unit.
-        expected: in words.
-        degrees: whether values outside may be degrees.
-    """
-
-    pattern: str
+    pattern: str  # of the contract names it is about
+    # low, high: bounds in the contract's unit
     low: float
     high: float
-    expected: str
-    degrees: bool = False
+    expected: str  # in words
+    degrees: bool = False  # whether values outside may be degrees
 
 
 RANGES = (

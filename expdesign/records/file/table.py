@@ -34,23 +34,14 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Table:
-    """Columns of one file.
+    """Columns of one file."""
 
-    Attributes:
-        path: the file.
-        header: names in row 1.
-        columns: contract name -> (k,) in the contract's unit.
-        sources: contract name -> where it stands in the file.
-        first_row: row of the file that sample 0 comes from.
-        notes: unusual data and their treatment.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    columns: Mapping[str, Array]
-    sources: Sources
-    first_row: int = FIRST_ROW
-    notes: tuple[str, ...] = ()
+    path: Path  # the file
+    header: tuple[str, ...]  # names in row 1
+    columns: Mapping[str, Array]  # contract name -> (k,) in the contract's unit
+    sources: Sources  # contract name -> where it stands in the file
+    first_row: int = FIRST_ROW  # row of the file that sample 0 comes from
+    notes: tuple[str, ...] = ()  # unusual data and their treatment
 
     def __len__(self) -> int:
         return len(self.columns["time_s"])

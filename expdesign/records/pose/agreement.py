@@ -46,17 +46,11 @@ RATE_UNITS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mistake:
-    """A possible mistake in the file.
+    """A possible mistake in the file."""
 
-    Attributes:
-        text: the mistake, for the message.
-        moved: (n, d) change of pose over the windows, with the mistake corrected.
-        expected: (n, d) integral of the measured velocity, with the mistake corrected.
-    """
-
-    text: str
-    moved: Array
-    expected: Array
+    text: str  # the mistake, for the message
+    moved: Array  # (n, d) change of pose over the windows, with the mistake corrected
+    expected: Array  # (n, d) integral of the measured velocity, with the mistake corrected
 
     @property
     def difference(self) -> float:

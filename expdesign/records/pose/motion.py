@@ -171,17 +171,11 @@ WORDS = {DIFFERENCE: "central differences of the pose", SMOOTHED: "the smoothed 
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """Options for velocities.
+    """Options for velocities."""
 
-    Attributes:
-        method: "auto", "measured", "difference" or "smoothed".
-        heading_std_rad: of the heading's noise, or None.
-        outputs: required velocities.
-    """
-
-    method: str
-    heading_std_rad: float | None
-    outputs: tuple[str, ...]
+    method: str  # "auto", "measured", "difference" or "smoothed"
+    heading_std_rad: float | None  # of the heading's noise, or None
+    outputs: tuple[str, ...]  # required velocities
 
 
 def velocity_origins(table: Table, request: Request) -> dict[str, str]:

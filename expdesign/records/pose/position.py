@@ -36,12 +36,9 @@ NOTED = ("heading_rad", "north_m")
 
 @dataclass(frozen=True)
 class LocalMetres:
-    """Transverse Mercator metres around an origin, scale 1 there (WGS84).
+    """Transverse Mercator metres around an origin, scale 1 there (WGS84)."""
 
-    Attributes:
-        lat_deg, lon_deg: the origin.
-    """
-
+    # lat_deg, lon_deg: the origin
     lat_deg: float
     lon_deg: float
 
@@ -153,21 +150,13 @@ def _steps(values: Array, batches: tuple[slice, ...]) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fix:
-    """A measured position and heading.
+    """A measured position and heading."""
 
-    Attributes:
-        path: the file.
-        row: of the file (header is row 1).
-        degrees: whether the position is in degrees of latitude and longitude, or in metres north and east.
-        position: (2,) latitude, longitude [deg] or north, east [m].
-        heading_rad: clockwise from north.
-    """
-
-    path: Path
-    row: int
-    degrees: bool
-    position: Array
-    heading_rad: float
+    path: Path  # the file
+    row: int  # of the file (header is row 1)
+    degrees: bool  # whether the position is in degrees of latitude and longitude, or in metres north and east
+    position: Array  # (2,) latitude, longitude [deg] or north, east [m]
+    heading_rad: float  # clockwise from north
 
     def __post_init__(self) -> None:
         seal(self, position="2")

@@ -36,51 +36,31 @@ CLEARANCES = ("VERCLR", "VERCCL", "VERCSA")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChartedObject:
-    """One charted object.
+    """One charted object."""
 
-    Attributes:
-        kind: its object class in S-57, e.g. "WRECKS".
-        geometry: any, coordinates (longitude, latitude) [deg].
-        depth_m: least depth below the sounding datum; nan where not stated or meaningless.
-        clearance_m: height below it of what crosses overhead; nan where not stated.
-        why: what keeps a trial out of a restricted area, else "".
-    """
-
-    kind: str
-    geometry: shapely.Geometry
-    depth_m: float = np.nan
-    clearance_m: float = np.nan
-    why: str = ""
+    kind: str  # its object class in S-57, e.g. "WRECKS".
+    geometry: shapely.Geometry  # any, coordinates (longitude, latitude) [deg]
+    depth_m: float = np.nan  # least depth below the sounding datum; nan where not stated or meaningless
+    clearance_m: float = np.nan  # height below it of what crosses overhead; nan where not stated
+    why: str = ""  # what keeps a trial out of a restricted area, else ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShipRules:
-    """Requirements of the ship.
+    """Requirements of the ship."""
 
-    Attributes:
-        needed_m: least charted depth, with the tide subtracted [m].
-        margin_m: least distance from charted points of danger [m].
-        air_draught_m: height above water [m], or None to close all bridges and cables.
-    """
-
-    needed_m: float
-    margin_m: float
-    air_draught_m: float | None
+    needed_m: float  # least charted depth, with the tide subtracted [m]
+    margin_m: float  # least distance from charted points of danger [m]
+    air_draught_m: float | None  # height above water [m], or None to close all bridges and cables
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ClosedWater:
-    """What objects close, as geometries (east_m, north_m).
+    """What objects close, as geometries (east_m, north_m)."""
 
-    Attributes:
-        solid: land and obstacles at any depth.
-        closed: dangers, buoys, what is overhead, and restricted areas.
-        notes: how many of which kind.
-    """
-
-    solid: shapely.Geometry
-    closed: shapely.Geometry
-    notes: tuple[str, ...]
+    solid: shapely.Geometry  # land and obstacles at any depth
+    closed: shapely.Geometry  # dangers, buoys, what is overhead, and restricted areas
+    notes: tuple[str, ...]  # how many of which kind
 
 
 def closed_water(

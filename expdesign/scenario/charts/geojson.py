@@ -63,19 +63,12 @@ FIRST_BYTES = 2000
 
 @dataclass(frozen=True)
 class Feature:
-    """One feature of a chart, not yet looked into.
+    """One feature of a chart, not yet looked into."""
 
-    Attributes:
-        entry: the file and the number of the feature in it, from 1.
-        layer: name of its layer, or `UNNAMED`.
-        geometry: the GeoJSON geometry.
-        properties: its other properties.
-    """
-
-    entry: Entry
-    layer: str
-    geometry: Mapping[str, Any]
-    properties: Mapping[str, Any] = field(default_factory=dict)
+    entry: Entry  # the file and the number of the feature in it, from 1
+    layer: str  # name of its layer, or `UNNAMED`
+    geometry: Mapping[str, Any]  # the GeoJSON geometry
+    properties: Mapping[str, Any] = field(default_factory=dict)  # its other properties
 
     @property
     def is_area(self) -> bool:
@@ -260,15 +253,10 @@ WORDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Chart:
-    """Valid polygons by layer, coordinates (longitude, latitude) [deg], longitudes continuous over the antimeridian.
+    """Valid polygons by layer, coordinates (longitude, latitude) [deg], longitudes continuous over the antimeridian."""
 
-    Attributes:
-        layers: layer name to polygons; they may overlap.
-        notes: on repairs.
-    """
-
-    layers: Mapping[str, tuple[shapely.Polygon, ...]]
-    notes: tuple[str, ...]
+    layers: Mapping[str, tuple[shapely.Polygon, ...]]  # layer name to polygons; they may overlap
+    notes: tuple[str, ...]  # on repairs
 
     @property
     def extent(self) -> tuple[float, float, float, float]:

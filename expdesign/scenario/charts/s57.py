@@ -64,15 +64,11 @@ DATUMS = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cell:
-    """The features of a cell that limit where a ship may go.
+    """The features of a cell that limit where a ship may go."""
 
-    Attributes:
-        features: of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, `UNSURVEYED`; restricted areas.
-        notes: edition, updates, datum, scale, and repairs.
-    """
-
+    # of the classes in `DEPTHS`, `SOLID`, `BUOYS`, `DANGERS`, `OVERHEAD`, `UNSURVEYED`; restricted areas
     features: tuple[ChartedObject, ...]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # edition, updates, datum, scale, and repairs
 
     def of(self, *kinds: str) -> tuple[ChartedObject, ...]:
         """The features of some classes."""

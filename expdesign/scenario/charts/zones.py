@@ -72,38 +72,23 @@ def off_km(geometry: shapely.Geometry, box: Box) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class ChartZones:
-    """Polygons (east_m, north_m) of a chart inside bounds.
+    """Polygons (east_m, north_m) of a chart inside bounds."""
 
-    Attributes:
-        land: land and solid structures.
-        deep: deep enough, or None when depth is not checked.
-        closed: forbidden for other reasons.
-        depths: (least depth [m], polygons), for drawing.
-        depth_rule: the rule for depth, in one sentence.
-        notes: on repairs, assumptions and closed areas.
-    """
-
-    land: shapely.Geometry
-    deep: shapely.Geometry | None
-    closed: shapely.Geometry
-    depths: tuple[tuple[float, shapely.Geometry], ...]
-    depth_rule: str
-    notes: tuple[str, ...]
+    land: shapely.Geometry  # land and solid structures
+    deep: shapely.Geometry | None  # deep enough, or None when depth is not checked
+    closed: shapely.Geometry  # forbidden for other reasons
+    depths: tuple[tuple[float, shapely.Geometry], ...]  # (least depth [m], polygons), for drawing
+    depth_rule: str  # the rule for depth, in one sentence
+    notes: tuple[str, ...]  # on repairs, assumptions and closed areas
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenChart:
-    """An open chart.
+    """An open chart."""
 
-    Attributes:
-        path: its file.
-        extent: west, south, east, north of its polygons [deg].
-        zones: bounds and frame -> zones.
-    """
-
-    path: Path
-    extent: Box
-    zones: Callable[[Box, LocalFrame], ChartZones]
+    path: Path  # its file
+    extent: Box  # west, south, east, north of its polygons [deg]
+    zones: Callable[[Box, LocalFrame], ChartZones]  # bounds and frame -> zones
 
 
 def rule_text(depth: DepthTable, draught_m: float) -> tuple[float, str]:

@@ -43,14 +43,10 @@ SLOW_START = 0.01  # share of the way's time that gaining speed must take for th
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpeedChanges:
-    """How fast speed through water can change.
+    """How fast speed through water can change."""
 
-    Attributes:
-        edges: (k + 1,) of ranges of speed, from 0 [m/s].
-        gain, loss: (k,) most in each range [m/s2]; not positive where the speed cannot be passed.
-    """
-
-    edges: Array
+    edges: Array  # (k + 1,) of ranges of speed, from 0 [m/s]
+    # gain, loss: (k,) most in each range [m/s2]; not positive where the speed cannot be passed
     gain: Array
     loss: Array
 

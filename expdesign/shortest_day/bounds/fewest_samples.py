@@ -63,17 +63,11 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Richest:
-    """The largest <G, B(x)>.
+    """The largest <G, B(x)>."""
 
-    Attributes:
-        found: of a sample found.
-        bound: no sample of the class has more.
-        points: (c, d) samples of which some have the most, and `found` is the best.
-    """
-
-    found: float
-    bound: float
-    points: Array
+    found: float  # of a sample found
+    bound: float  # no sample of the class has more
+    points: Array  # (c, d) samples of which some have the most, and `found` is the best
 
     def __post_init__(self) -> None:
         seal(self, points="c d")
@@ -201,19 +195,12 @@ def _halved(boxes: _Boxes, order: Indices, whole: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SampleBound:
-    """The fewest samples that reach an accuracy.
+    """The fewest samples that reach an accuracy."""
 
-    Attributes:
-        least: no motion of the class reaches it with fewer; proved.
-        estimate: the same if no sample tells more than those found; not proved.
-        enough: samples that a measure over the class needs, whether a motion can follow it or not.
-        multiplier: (k, k) G for the columns of `Motions.rows`: the information of all that is accurate enough has
-            <G, M> >= 1.
-    """
-
-    least: float
-    estimate: float
-    enough: float
+    least: float  # no motion of the class reaches it with fewer; proved
+    estimate: float  # the same if no sample tells more than those found; not proved
+    enough: float  # samples that a measure over the class needs, whether a motion can follow it or not
+    # (k, k) G for the columns of `Motions.rows`: the information of all that is accurate enough has <G, M> >= 1
     multiplier: Array
 
     def __post_init__(self) -> None:

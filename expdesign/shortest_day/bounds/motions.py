@@ -37,17 +37,11 @@ FEWEST_SIDES, MOST_SIDES = 4, 24  # of the polygon that holds the force of an az
 
 @dataclass(frozen=True, eq=False)
 class Affine:
-    """A quantity over each of b boxes with d sides.
+    """A quantity over each of b boxes with d sides."""
 
-    Attributes:
-        centre: (b,).
-        slopes: (d, b).
-        error: (b,) not negative.
-    """
-
-    centre: Array
-    slopes: Array
-    error: Array
+    centre: Array  # (b,)
+    slopes: Array  # (d, b)
+    error: Array  # (b,) not negative
 
     __array_ufunc__ = None  # an array on the left leaves the operation to this class
 
@@ -129,21 +123,15 @@ class Motions:
     A point is (u, v, r) through water, the heading where the air matters, and the inputs where terms read them or are
     not affine in the forces they give. In all other models the regressors are affine in the force, and the most that a
     convex function of them can be is at a corner of a polytope that holds all forces.
-
-    Attributes:
-        model: gives the terms.
-        parameters: names of the p parameters counted.
-        low, high: (d,) limits of a point.
-        air_to: (2,) mean wind less mean current, north and east [m/s].
-        forces: (f, 3) corners of a polytope of generalised forces; one of zeros where inputs are in the point.
     """
 
-    model: VesselModel
-    parameters: tuple[str, ...]
+    model: VesselModel  # gives the terms
+    parameters: tuple[str, ...]  # names of the p parameters counted
+    # low, high: (d,) limits of a point
     low: Array
     high: Array
-    air_to: Array
-    forces: Array
+    air_to: Array  # (2,) mean wind less mean current, north and east [m/s]
+    forces: Array  # (f, 3) corners of a polytope of generalised forces; one of zeros where inputs are in the point
 
     def __post_init__(self) -> None:
         seal(self, low="d", high="d", air_to="2", forces="f 3")

@@ -7,13 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Work limits and tolerances. All but `rounding` decide only how near to the truth the bound comes.
+    """Work limits and tolerances. All but `rounding` decide only how near to the truth the bound comes."""
 
-    Attributes:
-        rounds: of adding samples to a measure.
-    """
-
-    rounds: int = 40
+    rounds: int = 40  # of adding samples to a measure
 
 
 TUNING = Tuning()

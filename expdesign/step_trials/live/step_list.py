@@ -19,20 +19,14 @@ Inputs = tuple[float, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Listed:
-    """One step: a change from steady commands to others.
+    """One step: a change from steady commands to others."""
 
-    Attributes:
-        number: in the list, from 1.
-        before, after: commands on both sides.
-        attempts: that failed.
-        why: what was wrong with the last of them.
-    """
-
-    number: int
+    number: int  # in the list, from 1
+    # before, after: commands on both sides
     before: Inputs
     after: Inputs
-    attempts: int = 0
-    why: str = ""
+    attempts: int = 0  # that failed
+    why: str = ""  # what was wrong with the last of them
 
     def failed(self, why: str) -> Listed:
         """The step after an attempt that failed."""
@@ -41,23 +35,14 @@ class Listed:
 
 @dataclass(frozen=True, kw_only=True)
 class StepList:
-    """Steps to sail.
+    """Steps to sail."""
 
-    Attributes:
-        controls: which inputs are throttle and rudder.
-        names: input signals.
-        start: commands of the first hold, in which the noise is learnt.
-        steps: in the order of the list.
-        width: of each input, within which commands count as equal.
-        first_s: time planned for the first hold [s]; infinite where none is.
-    """
-
-    controls: Controls
-    names: tuple[str, ...]
-    start: Inputs
-    steps: tuple[Listed, ...]
-    width: Inputs
-    first_s: float = math.inf
+    controls: Controls  # which inputs are throttle and rudder
+    names: tuple[str, ...]  # input signals
+    start: Inputs  # commands of the first hold, in which the noise is learnt
+    steps: tuple[Listed, ...]  # in the order of the list
+    width: Inputs  # of each input, within which commands count as equal
+    first_s: float = math.inf  # time planned for the first hold [s]; infinite where none is
 
     def same(self, one: Sequence[float], other: Sequence[float]) -> bool:
         """Whether commands are equal within the width."""

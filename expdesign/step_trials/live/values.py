@@ -20,44 +20,26 @@ LEARNT, BEGUN, STEADY, OVER, BAD, LEFT_OUT, GAP, UNLISTED, DONE = (
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One sample.
+    """One sample."""
 
-    Attributes:
-        time_s: of the source [s].
-        motion: u, v, r over ground [m/s, m/s, rad/s]; v is nan where it is not measured.
-        inputs: commands.
-    """
-
-    time_s: float
-    motion: tuple[float, float, float]
-    inputs: Inputs
+    time_s: float  # of the source [s]
+    motion: tuple[float, float, float]  # u, v, r over ground [m/s, m/s, rad/s]; v is nan where it is not measured
+    inputs: Inputs  # commands
 
 
 @dataclass(frozen=True, kw_only=True)
 class Held:
-    """Commands that stand, or move towards where they will stand.
+    """Commands that stand, or move towards where they will stand."""
 
-    Attributes:
-        rows: since the commands began to change.
-        stands: first row from which on they have not moved.
-        inputs: commands, None while it is not clear where they will stand.
-        changed: which of throttle and rudder moved.
-        step: of the list that this is, None for commands only gone to.
-        steady: row from which on the vessel is steady, None before.
-        hold_s: time that it should stay so [s].
-        over: whether it has been judged.
-        gap_s: longest gap in its rows [s].
-    """
-
-    rows: tuple[Row, ...]
-    stands: int = 0
-    inputs: Inputs | None = None
-    changed: tuple[bool, bool] = (False, False)
-    step: Listed | None = None
-    steady: int | None = None
-    hold_s: float = 0.0
-    over: bool = False
-    gap_s: float = 0.0
+    rows: tuple[Row, ...]  # since the commands began to change
+    stands: int = 0  # first row from which on they have not moved
+    inputs: Inputs | None = None  # commands, None while it is not clear where they will stand
+    changed: tuple[bool, bool] = (False, False)  # which of throttle and rudder moved
+    step: Listed | None = None  # of the list that this is, None for commands only gone to
+    steady: int | None = None  # row from which on the vessel is steady, None before
+    hold_s: float = 0.0  # time that it should stay so [s]
+    over: bool = False  # whether it has been judged
+    gap_s: float = 0.0  # longest gap in its rows [s]
 
     @property
     def elapsed_s(self) -> float:
@@ -67,74 +49,46 @@ class Held:
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """A step that counts.
+    """A step that counts."""
 
-    Attributes:
-        number: in the list.
-        begins_s: time at which the commands changed [s].
-        steady_s: time until steady [s].
-        state, state_std: U [m/s] and r [rad/s] of the plateau, and their standard errors.
-    """
-
-    number: int
-    begins_s: float
-    steady_s: float
+    number: int  # in the list
+    begins_s: float  # time at which the commands changed [s]
+    steady_s: float  # time until steady [s]
+    # state, state_std: U [m/s] and r [rad/s] of the plateau, and their standard errors
     state: tuple[float, float]
     state_std: tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """Everything that goes on from row to row.
+    """Everything that goes on from row to row."""
 
-    Attributes:
-        left: steps to sail, in order; those to repeat are at the end.
-        finished: steps that count.
-        left_out: steps that failed too often.
-        sample_time_s: 0 before it is known [s].
-        tests: of steady state for U and r, None before the noise is learnt.
-        watched: states of both.
-        held: the present commands, None before the first row.
-        before: steady state under the commands before, and these; None where there was none.
-        skipped: rows whose time did not increase.
-    """
-
-    left: tuple[Listed, ...]
-    finished: tuple[Finished, ...] = ()
-    left_out: tuple[Listed, ...] = ()
-    sample_time_s: float = 0.0
-    tests: tuple[RatioTest, RatioTest] | None = None
-    watched: tuple[Watched, ...] = ()
-    held: Held | None = None
+    left: tuple[Listed, ...]  # steps to sail, in order; those to repeat are at the end
+    finished: tuple[Finished, ...] = ()  # steps that count
+    left_out: tuple[Listed, ...] = ()  # steps that failed too often
+    sample_time_s: float = 0.0  # 0 before it is known [s]
+    tests: tuple[RatioTest, RatioTest] | None = None  # of steady state for U and r, None before the noise is learnt
+    watched: tuple[Watched, ...] = ()  # states of both
+    held: Held | None = None  # the present commands, None before the first row
+    # steady state under the commands before, and these; None where there was none
     before: tuple[Inputs, Plateau] | None = None
-    skipped: int = 0
+    skipped: int = 0  # rows whose time did not increase
 
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """Something to tell the crew.
+    """Something to tell the crew."""
 
-    Attributes:
-        time_s: of the row [s].
-        kind: one of the above.
-        step: that it is about.
-        inputs: commands that it is about.
-        why: what is wrong.
-        seconds: time until steady, to hold, or of a gap [s].
-        whole_turn: whether that is the time of a whole turn.
-        state: U and r, where it is steady.
-        following: commands to set now, and the step that they are, None for commands only gone to before a step; None
-            where nothing is to be set.
-    """
-
-    time_s: float
-    kind: str
-    step: Listed | None = None
-    inputs: Inputs = ()
-    why: str = ""
-    seconds: float = 0.0
-    whole_turn: bool = False
-    state: tuple[float, float] | None = None
+    time_s: float  # of the row [s]
+    kind: str  # one of the above
+    step: Listed | None = None  # that it is about
+    inputs: Inputs = ()  # commands that it is about
+    why: str = ""  # what is wrong
+    seconds: float = 0.0  # time until steady, to hold, or of a gap [s]
+    whole_turn: bool = False  # whether that is the time of a whole turn
+    state: tuple[float, float] | None = None  # U and r, where it is steady
+    # commands to set now, and the step that they are, None for commands only gone to before a step; None where nothing
+    # is to be set
     following: tuple[Inputs, Listed | None] | None = None
 
 

@@ -84,19 +84,12 @@ StateAndEvents = tuple[State, tuple[Event, ...]]
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """What does not change while a trial is sailed.
+    """What does not change while a trial is sailed."""
 
-    Attributes:
-        steps: the list.
-        constants_s: expected time constants of U and r [s].
-        learn_s: time of the first hold from which the noise is learnt [s].
-        seed: of the calibration.
-    """
-
-    steps: StepList
-    constants_s: tuple[float, float]
-    learn_s: float
-    seed: int = 0
+    steps: StepList  # the list
+    constants_s: tuple[float, float]  # expected time constants of U and r [s]
+    learn_s: float  # time of the first hold from which the noise is learnt [s]
+    seed: int = 0  # of the calibration
 
     @property
     def longest_s(self) -> float:

@@ -22,17 +22,11 @@ LEAST_LOG_STD = 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class States:
-    """Motions that are compared with a model; n rows.
+    """Motions that are compared with a model; n rows."""
 
-    Attributes:
-        state: (n, 2) U and r.
-        sway: (n,) v, nan where it is not known.
-        inputs: (n, m).
-    """
-
-    state: Array
-    sway: Array
-    inputs: Array
+    state: Array  # (n, 2) U and r
+    sway: Array  # (n,) v, nan where it is not known
+    inputs: Array  # (n, m)
 
     def through_water(self, course: Array, to_mps: Array) -> States:
         """The evidence in water that moves to north and east (n, 2), at mean headings' cosines and sines (n, 2)."""
@@ -48,33 +42,20 @@ class States:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
-    """What the steps say about a model with three degrees of freedom.
+    """What the steps say about a model with three degrees of freedom."""
 
-    Attributes:
-        steady: the plateaus, over ground.
-        course: (n, 2) mean cosine and sine of their headings.
-        record: (n,) number of the record that each is in.
-        steady_std: (n, 3) errors of U, v and r; infinite where v is not known.
-        middle: of the steps that count.
-        output: (k,) 0 where the throttle was stepped, 2 where the rudder was.
-        before: (k, m) inputs before the step.
-        change: (k,) of U or r.
-        time_constant_s: (k,) as measured.
-        log_std: (k,) its relative standard error.
-        delay_std_s: (2,) of the dead times of throttle and rudder; a dead time too long makes all time constants of its
-            command too short by as much.
-    """
-
-    steady: States
-    course: Array
-    record: npt.NDArray[np.int64]
-    steady_std: Array
-    middle: States
-    output: Array
-    before: Array
-    change: Array
-    time_constant_s: Array
-    log_std: Array
+    steady: States  # the plateaus, over ground
+    course: Array  # (n, 2) mean cosine and sine of their headings
+    record: npt.NDArray[np.int64]  # (n,) number of the record that each is in
+    steady_std: Array  # (n, 3) errors of U, v and r; infinite where v is not known
+    middle: States  # of the steps that count
+    output: Array  # (k,) 0 where the throttle was stepped, 2 where the rudder was
+    before: Array  # (k, m) inputs before the step
+    change: Array  # (k,) of U or r
+    time_constant_s: Array  # (k,) as measured
+    log_std: Array  # (k,) its relative standard error
+    # (2,) of the dead times of throttle and rudder; a dead time too long makes all time constants of its command too
+    # short by as much
     delay_std_s: Array
 
     @property

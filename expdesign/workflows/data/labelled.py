@@ -28,23 +28,14 @@ OPTIMISED, RANDOM = "optimised", "random"
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What is asked of a design from labelled data.
+    """What is asked of a design from labelled data."""
 
-    Attributes:
-        labels: source of the labels, see `records.row_labels`.
-        piece_s: length of a piece [s].
-        keep: number of pieces in a design.
-        draws: of each design.
-        mean: subtracted from instruments, "complete" or "none".
-        seed: of the draws.
-    """
-
-    labels: str
-    piece_s: float
-    keep: int
-    draws: int
-    mean: str
-    seed: int
+    labels: str  # source of the labels, see `records.row_labels`
+    piece_s: float  # length of a piece [s]
+    keep: int  # number of pieces in a design
+    draws: int  # of each design
+    mean: str  # subtracted from instruments, "complete" or "none"
+    seed: int  # of the draws
 
     def __post_init__(self) -> None:
         if self.keep < 1:
@@ -57,23 +48,14 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Labelled:
-    """A design from labelled data, and how its draws and random subsets simulate.
+    """A design from labelled data, and how its draws and random subsets simulate."""
 
-    Attributes:
-        record: a batch for every piece.
-        labels: of each piece.
-        dictionary: moments of each label.
-        gains: (q,) of each label beside the pool of all.
-        design: shares and pieces of every label.
-        drawn: optimised and random subsets.
-    """
-
-    record: Record
-    labels: tuple[str, ...]
-    dictionary: tuple[BatchInformation, ...]
-    gains: tuple[float, ...]
-    design: DurationDesign
-    drawn: tuple[Drawn, ...]
+    record: Record  # a batch for every piece
+    labels: tuple[str, ...]  # of each piece
+    dictionary: tuple[BatchInformation, ...]  # moments of each label
+    gains: tuple[float, ...]  # (q,) of each label beside the pool of all
+    design: DurationDesign  # shares and pieces of every label
+    drawn: tuple[Drawn, ...]  # optimised and random subsets
 
 
 def labelled_design(

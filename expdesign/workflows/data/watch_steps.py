@@ -68,19 +68,12 @@ class _Work:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Watch:
-    """What goes on from row to row.
+    """What goes on from row to row."""
 
-    Attributes:
-        state: of the trial.
-        taken: rows of every source.
-        notes: on the data.
-        events: told so far.
-    """
-
-    state: State
-    taken: tuple[Taken, ...] = ()
-    notes: tuple[str, ...] = ()
-    events: int = 0
+    state: State  # of the trial
+    taken: tuple[Taken, ...] = ()  # rows of every source
+    notes: tuple[str, ...] = ()  # on the data
+    events: int = 0  # told so far
 
 
 def _nothing(line: str) -> None:

@@ -98,25 +98,15 @@ PIECE = "piece.csv"
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What the user asked for.
+    """What the user asked for."""
 
-    Attributes:
-        vessel: the model.
-        size: relative change that matters.
-        learn_s: length of a reference at the beginning of the data [s].
-        false_alarm_days: average time between false alarms [d].
-        port_s: time in port after which the ship may carry another load [s].
-        velocity: where velocities come from, as in `estimate`.
-        model: one of `watched_ship.MODELS`.
-    """
-
-    vessel: Vessel
-    size: float
-    learn_s: float
-    false_alarm_days: float
-    port_s: float
-    velocity: str
-    model: str = VESSEL
+    vessel: Vessel  # the model
+    size: float  # relative change that matters
+    learn_s: float  # length of a reference at the beginning of the data [s]
+    false_alarm_days: float  # average time between false alarms [d]
+    port_s: float  # time in port after which the ship may carry another load [s]
+    velocity: str  # where velocities come from, as in `estimate`
+    model: str = VESSEL  # one of `watched_ship.MODELS`
 
     @property
     def unread(self) -> tuple[str, ...]:
@@ -131,22 +121,14 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Read:
-    """A piece of the data as a record.
+    """A piece of the data as a record."""
 
-    Attributes:
-        record: of the piece.
-        begins_s: time at which each batch begins, in the clock of the file [s].
-        grams: inner products, linearised at the ship with some changes; times in the clock of the file.
-        changes: watched for; shift: (m,) by which the ship was changed, in their sizes.
-        notes: on the ship.
-    """
-
-    record: Record
-    begins_s: tuple[float, ...]
-    grams: Grams
-    changes: tuple[Change, ...]
+    record: Record  # of the piece
+    begins_s: tuple[float, ...]  # time at which each batch begins, in the clock of the file [s]
+    grams: Grams  # inner products, linearised at the ship with some changes; times in the clock of the file
+    changes: tuple[Change, ...]  # watched for; shift: (m,) by which the ship was changed, in their sizes
     shift: Array
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # on the ship
 
     def at(self, changes: tuple[Change, ...], shift: Array, asked: Asked, *, offset_s: float) -> Grams:
         """Inner products, linearised at the ship with changes (m,), with times that are later."""

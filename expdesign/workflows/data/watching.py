@@ -46,25 +46,15 @@ HOUR, DAY = 3600.0, 86_400.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reading:
-    """How far the data have been read.
+    """How far the data have been read."""
 
-    Attributes:
-        now_s: end of the data [s].
-        offset_s: added to the times of the file, where they begin again in each file.
-        left_out_rows: that lacked a number.
-        unread_rows: in pieces that could not be read.
-        notes: on the data.
-        pending: header, and lines that do not fill a stretch.
-        taken: rows of every source.
-    """
-
-    now_s: float = -np.inf
-    offset_s: float = 0.0
-    left_out_rows: int = 0
-    unread_rows: int = 0
-    notes: tuple[str, ...] = ()
-    pending: tuple[str, ...] = ()
-    taken: tuple[Taken, ...] = ()
+    now_s: float = -np.inf  # end of the data [s]
+    offset_s: float = 0.0  # added to the times of the file, where they begin again in each file
+    left_out_rows: int = 0  # that lacked a number
+    unread_rows: int = 0  # in pieces that could not be read
+    notes: tuple[str, ...] = ()  # on the data
+    pending: tuple[str, ...] = ()  # header, and lines that do not fill a stretch
+    taken: tuple[Taken, ...] = ()  # rows of every source
 
     def after(self, piece: Piece) -> Reading:
         """The reading after the rows of a piece."""
@@ -86,65 +76,41 @@ class Reading:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Learning:
-    """While the reference lasts.
+    """While the reference lasts."""
 
-    Attributes:
-        learnt: inner products of the reference so far.
-        lines: its header and rows, of a stream, which cannot be read again.
-    """
-
-    learnt: tuple[Grams, ...] = ()
-    lines: tuple[str, ...] = ()
+    learnt: tuple[Grams, ...] = ()  # inner products of the reference so far
+    lines: tuple[str, ...] = ()  # its header and rows, of a stream, which cannot be read again
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ready:
-    """Calibrated, before the first stretch that is judged.
+    """Calibrated, before the first stretch that is judged."""
 
-    Attributes:
-        calibration: of the reference.
-        reference_s: its end [s].
-    """
-
-    calibration: Calibration
-    reference_s: float
+    calibration: Calibration  # of the reference
+    reference_s: float  # its end [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watching:
-    """The phase after the reference.
+    """The phase after the reference."""
 
-    Attributes:
-        calibration: of the reference.
-        reference_s: its end [s].
-        state: after the last stretch.
-        alarms, moments: so far.
-        changed: header and lines since the last alarm's change.
-    """
-
-    calibration: Calibration
-    reference_s: float
-    state: State
+    calibration: Calibration  # of the reference
+    reference_s: float  # its end [s]
+    state: State  # after the last stretch
+    # alarms, moments: so far
     alarms: tuple[Alarm, ...] = ()
     moments: tuple[Moment, ...] = ()
-    changed: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()  # header and lines since the last alarm's change
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watch:
-    """Everything that goes on from piece to piece.
+    """Everything that goes on from piece to piece."""
 
-    Attributes:
-        changes: watched for; none before the first piece.
-        reading: how far the data have been read.
-        phase: what is known of the ship.
-        roll: what is known of its roll.
-    """
-
-    changes: tuple[Change, ...] = ()
-    reading: Reading = Reading()
-    phase: Learning | Ready | Watching = Learning()
-    roll: RollWatch = field(default_factory=RollWatch)
+    changes: tuple[Change, ...] = ()  # watched for; none before the first piece
+    reading: Reading = Reading()  # how far the data have been read
+    phase: Learning | Ready | Watching = Learning()  # what is known of the ship
+    roll: RollWatch = field(default_factory=RollWatch)  # what is known of its roll
 
 
 def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:

@@ -7,48 +7,28 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Explained:
-    """One thing that may be written.
+    """One thing that may be written."""
 
-    Attributes:
-        name: as it is written; keys are dotted.
-        meaning: what it is, with its unit.
-        default: what stands in for it; "required", "optional", or "".
-        allowed: the values it may have, or "".
-    """
-
-    name: str
-    meaning: str
-    default: str = ""
-    allowed: str = ""
+    name: str  # as it is written; keys are dotted
+    meaning: str  # what it is, with its unit
+    default: str = ""  # what stands in for it; "required", "optional", or ""
+    allowed: str = ""  # the values it may have, or ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """Entries that belong together.
+    """Entries that belong together."""
 
-    Attributes:
-        name: one word that asks for it.
-        title: what it is.
-        entries: what it explains.
-    """
-
-    name: str
-    title: str
-    entries: tuple[Explained, ...]
+    name: str  # one word that asks for it
+    title: str  # what it is
+    entries: tuple[Explained, ...]  # what it explains
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """Output of one call of `expdesign explain`.
+    """Output of one call of `expdesign explain`."""
 
-    Attributes:
-        name: the word that asks for it.
-        title: one line.
-        text: a few sentences, or "".
-        sections: what it explains.
-    """
-
-    name: str
-    title: str
-    text: str = ""
-    sections: tuple[Section, ...]
+    name: str  # the word that asks for it
+    title: str  # one line
+    text: str = ""  # a few sentences, or ""
+    sections: tuple[Section, ...]  # what it explains

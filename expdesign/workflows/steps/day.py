@@ -42,21 +42,13 @@ WORK = (0.2, 0.8)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Day:
-    """A planned trial.
+    """A planned trial."""
 
-    Attributes:
-        information: of the dictionary that the plan takes its runs from.
-        design: with the runs that the plan does.
-        plan: the trial.
-        shortest: how it was found to be the shortest, or None where total_s decides.
-        added: manoeuvres of it that the scenario's dictionary has not.
-    """
-
-    information: tuple[PrimitiveInformation, ...]
-    design: DurationDesign
-    plan: Plan
-    shortest: ShortestDay | None = None
-    added: tuple[PrimitiveSpec, ...] = ()
+    information: tuple[PrimitiveInformation, ...]  # of the dictionary that the plan takes its runs from
+    design: DurationDesign  # with the runs that the plan does
+    plan: Plan  # the trial
+    shortest: ShortestDay | None = None  # how it was found to be the shortest, or None where total_s decides
+    added: tuple[PrimitiveSpec, ...] = ()  # manoeuvres of it that the scenario's dictionary has not
 
 
 def planned_day(

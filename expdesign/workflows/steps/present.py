@@ -35,33 +35,19 @@ PARTICULARS = ("length_m", "beam_m", "draught_m", "sample_time_s")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PresentState:
-    """Where a trial stands.
+    """Where a trial stands."""
 
-    Attributes:
-        first: the scenario of the whole trial.
-        data: files so far.
-        record: what they hold.
-        pose: (3,) of the ship in the area's frame.
-        under_way: how it moves; None where it has stopped through the water.
-        sailed_s: time in the data.
-        left_s: informative time left; nan where it is as long as design.accuracy takes.
-        left_stated: whether --remaining gives it.
-        ship: what the rest is planned with.
-        origin: where its model comes from.
-        notes: what a reader must hear.
-    """
-
-    first: Scenario
-    data: tuple[Path, ...]
-    record: Record
-    pose: Array
-    sailed_s: float
-    left_s: float
-    left_stated: bool
-    ship: Vessel
-    origin: str
-    notes: tuple[str, ...]
-    under_way: UnderWay | None = None
+    first: Scenario  # the scenario of the whole trial
+    data: tuple[Path, ...]  # files so far
+    record: Record  # what they hold
+    pose: Array  # (3,) of the ship in the area's frame
+    sailed_s: float  # time in the data
+    left_s: float  # informative time left; nan where it is as long as design.accuracy takes
+    left_stated: bool  # whether --remaining gives it
+    ship: Vessel  # what the rest is planned with
+    origin: str  # where its model comes from
+    notes: tuple[str, ...]  # what a reader must hear
+    under_way: UnderWay | None = None  # how it moves; None where it has stopped through the water
 
     def __post_init__(self) -> None:
         seal(self, pose="3")
