@@ -4,23 +4,3 @@ from expdesign.assessment.assess import NO_TESTS, assess, default_methods, settl
 from expdesign.assessment.held_out import HeldOut
 from expdesign.assessment.misfit import Limits, OneStep, RunCheck, check_run, decomposed, one_step, sentence
 from expdesign.assessment.values import INSTRUMENTS, Assessed, Assessment, Disturbances, EstimateOptions
-
-__all__ = [
-    "INSTRUMENTS",
-    "NO_TESTS",
-    "Assessed",
-    "Assessment",
-    "Disturbances",
-    "EstimateOptions",
-    "HeldOut",
-    "Limits",
-    "OneStep",
-    "RunCheck",
-    "assess",
-    "check_run",
-    "decomposed",
-    "default_methods",
-    "one_step",
-    "sentence",
-    "settled",
-]

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 
 from expdesign.interruptions import interruptions_wait
 
-__all__ = ["main"]
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; arguments and exit status as of `expdesign.cli.entry.main`."""

@@ -19,5 +19,3 @@ from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.diagnose import diagnose
 from expdesign.diagnosis.discriminating_manoeuvre import Proposal
 from expdesign.diagnosis.values import Diagnosis, Estimate, Finding, Lead, Unexplained
-
-__all__ = ["CAUSES", "Accuracy", "Diagnosis", "Estimate", "Finding", "Lead", "Proposal", "Unexplained", "diagnose"]

@@ -4,16 +4,3 @@ from expdesign.dictionary.build import build_dictionary, build_primitive, family
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.spec import Family, Primitive, PrimitiveSpec, Setting, complete_settings
 from expdesign.dictionary.trim import trim
-
-__all__ = [
-    "FAMILIES",
-    "Family",
-    "Primitive",
-    "PrimitiveSpec",
-    "Setting",
-    "build_dictionary",
-    "build_primitive",
-    "complete_settings",
-    "family",
-    "trim",
-]

@@ -22,30 +22,3 @@ from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
 from expdesign.indices.steered_run import SteeredRun, steered_run
 from expdesign.indices.values import Circle, Execute, Stop, ZigZag
-
-__all__ = [
-    "BEAUFORT_MPS",
-    "DEPTH_BY_DRAUGHT",
-    "HIGHEST_SEA",
-    "OUTCOMES",
-    "STRONGEST_WIND",
-    "Circle",
-    "Condition",
-    "Conditions",
-    "Criterion",
-    "Execute",
-    "NotStandard",
-    "StandardResults",
-    "SteeredRun",
-    "Stop",
-    "Verdict",
-    "ZigZag",
-    "admissibility",
-    "beaufort",
-    "criteria",
-    "judge",
-    "measured_trial",
-    "outcomes",
-    "standard_results",
-    "steered_run",
-]

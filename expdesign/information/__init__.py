@@ -11,18 +11,3 @@ from expdesign.information.moments import (
     regressor_rows,
 )
 from expdesign.information.scoring import score_models, score_primitives
-
-__all__ = [
-    "EXCITATIONS",
-    "MEAN_SUBTRACTIONS",
-    "PrimitiveInformation",
-    "check_informative",
-    "estimated_parameters",
-    "excitation_condition",
-    "excitation_refusal",
-    "log_det_or_none",
-    "moments",
-    "regressor_rows",
-    "score_models",
-    "score_primitives",
-]

@@ -12,5 +12,3 @@ a log is.
 from expdesign.kinematics.check import checked, in_stated_time
 from expdesign.kinematics.held import Held, held
 from expdesign.kinematics.instruments import Finding
-
-__all__ = ["Finding", "Held", "checked", "held", "in_stated_time"]

@@ -11,16 +11,3 @@ from expdesign.loading.choice import LoadPlan, Step, choose_loads
 from expdesign.loading.inclining import Inclining, heel_of_shift, inclining
 from expdesign.loading.information import LoadOption, run_information
 from expdesign.loading.question import Question, build_question
-
-__all__ = [
-    "Inclining",
-    "LoadOption",
-    "LoadPlan",
-    "Question",
-    "Step",
-    "build_question",
-    "choose_loads",
-    "heel_of_shift",
-    "inclining",
-    "run_information",
-]

@@ -21,35 +21,3 @@ from expdesign.monitoring.rolled import RollEvent, RollWatch, restored_roll, rol
 from expdesign.monitoring.saved import restored_alarm, restored_calibration, restored_changes, restored_state, saved
 from expdesign.monitoring.state import Alarm, Call, Rules, State, Step
 from expdesign.monitoring.tuning import TUNING
-
-__all__ = [
-    "KINDS",
-    "TUNING",
-    "Alarm",
-    "Calibration",
-    "Call",
-    "Change",
-    "Grams",
-    "RollEvent",
-    "RollWatch",
-    "Rules",
-    "State",
-    "Step",
-    "calibrate",
-    "calls_of",
-    "estimates",
-    "grams_of",
-    "joined",
-    "restored_alarm",
-    "restored_calibration",
-    "restored_changes",
-    "restored_roll",
-    "restored_state",
-    "roll_learnt",
-    "roll_watched",
-    "saved",
-    "stretch_length",
-    "threshold",
-    "watch",
-    "watched_changes",
-]

@@ -2,5 +2,3 @@
 
 from expdesign.plan.values import Leg, Placement, Plan, PlanSettings, Verification
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon
-
-__all__ = ["Leg", "LocalFrame", "Placement", "Plan", "PlanSettings", "SeaArea", "Verification", "as_multipolygon"]

@@ -11,15 +11,3 @@ from expdesign.processes.sharing import (
     processors,
     shared_among,
 )
-
-__all__ = [
-    "ahead",
-    "as_finished",
-    "begin",
-    "in_order",
-    "local_processes",
-    "on_cluster",
-    "processors",
-    "reported_together",
-    "shared_among",
-]

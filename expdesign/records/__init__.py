@@ -22,22 +22,3 @@ from expdesign.records.levels import Levels, read_levels
 from expdesign.records.load import LABEL_SOURCES, load_records, row_labels
 from expdesign.records.pieces import STREAM, Piece, Taken, as_file, pieces
 from expdesign.records.pose import VELOCITY_METHODS, Fix, central_difference, last_fix, smoothed_velocity
-
-__all__ = [
-    "COLUMNS",
-    "LABEL_SOURCES",
-    "STREAM",
-    "VELOCITY_METHODS",
-    "Fix",
-    "Levels",
-    "Piece",
-    "Taken",
-    "as_file",
-    "central_difference",
-    "last_fix",
-    "load_records",
-    "pieces",
-    "read_levels",
-    "row_labels",
-    "smoothed_velocity",
-]

@@ -16,13 +16,3 @@ from expdesign.reduction.reduce import (
     with_reduced_wind,
 )
 from expdesign.reduction.uncertain_times import TIMES
-
-__all__ = [
-    "TIMES",
-    "at_reference_point",
-    "averaged",
-    "reduced",
-    "samples_of_a_mean",
-    "with_delivered_inputs",
-    "with_reduced_wind",
-]

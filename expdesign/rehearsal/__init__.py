@@ -10,20 +10,3 @@ from expdesign.rehearsal.recorded import (
     try_subsets,
 )
 from expdesign.rehearsal.validation import RANDOM, Rehearsal, Validated, equal_runs, trial_parts, validate
-
-__all__ = [
-    "RANDOM",
-    "Alone",
-    "Drawn",
-    "Pieces",
-    "Rehearsal",
-    "Validated",
-    "drawn_subsets",
-    "equal_runs",
-    "estimates_alone",
-    "random_subsets",
-    "recorded_pieces",
-    "trial_parts",
-    "try_subsets",
-    "validate",
-]

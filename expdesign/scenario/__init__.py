@@ -14,17 +14,3 @@ from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.variant_file import Variant, load_variant
 from expdesign.scenario.vessels import load_vessel
-
-__all__ = [
-    "DesignSettings",
-    "LoadCases",
-    "Scenario",
-    "Variant",
-    "load_area",
-    "load_cases",
-    "load_dictionary",
-    "load_repeats",
-    "load_scenario",
-    "load_variant",
-    "load_vessel",
-]

@@ -10,47 +10,5 @@ if TYPE_CHECKING:
     from expdesign.shortest_day.cheapest import Choice, cheapest_runs
     from expdesign.shortest_day.manoeuvres import manoeuvres_worth_adding
     from expdesign.shortest_day.values import AccuracySettings, DayBound, DayParts, DayTried, ShortestDay
-
-__all__ = [
-    "Accuracy",
-    "AccuracySettings",
-    "Choice",
-    "DayBound",
-    "DayParts",
-    "DayTried",
-    "ShortestDay",
-    "cheapest_runs",
-    "check_way_fits",
-    "fullest_day",
-    "manoeuvres_worth_adding",
-    "shortest_day",
-    "stated_accuracy",
-]
-
-if not TYPE_CHECKING:
-    __getattr__ = load_on_use(
-        __name__,
-        {
-            "accuracy": (
-                "Accuracy",
-                "stated_accuracy",
-            ),
-            "alternate": (
-                "check_way_fits",
-                "fullest_day",
-                "shortest_day",
-            ),
-            "cheapest": (
-                "Choice",
-                "cheapest_runs",
-            ),
-            "manoeuvres": ("manoeuvres_worth_adding",),
-            "values": (
-                "AccuracySettings",
-                "DayBound",
-                "DayParts",
-                "DayTried",
-                "ShortestDay",
-            ),
-        },
-    )
+else:
+    __getattr__, __all__ = load_on_use(__name__, __file__)

@@ -15,25 +15,3 @@ from expdesign.step_trials.nominal import nominal_vessel, with_delays
 from expdesign.step_trials.samples import StepSample
 from expdesign.step_trials.surfaces import NO_BEND, Comparison, Surface, ValidityRegion
 from expdesign.step_trials.tuning import TUNING
-
-__all__ = [
-    "CHANNELS",
-    "NO_BEND",
-    "TUNING",
-    "Comparison",
-    "Controls",
-    "Hold",
-    "Sailed",
-    "StepSample",
-    "StepTrial",
-    "Surface",
-    "TwoDofModel",
-    "ValidityRegion",
-    "controls_of",
-    "fit_percent",
-    "identify_steps",
-    "levels_of",
-    "nominal_vessel",
-    "sailed",
-    "with_delays",
-]

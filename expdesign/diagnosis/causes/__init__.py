@@ -45,5 +45,3 @@ CAUSES: tuple[Cause, ...] = (
     ROLL_COUPLING,
     CHANGE_POINT,
 )
-
-__all__ = ["CAUSES", "UNLISTED_TERM", "Candidate", "Cause", "Situation", "Values", "rounded", "wind_can_be_told"]

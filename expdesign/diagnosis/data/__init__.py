@@ -17,20 +17,3 @@ from expdesign.diagnosis.data.sampled_batch import (
     missing_wind_share,
 )
 from expdesign.diagnosis.data.windows import Windows, cut_windows
-
-__all__ = [
-    "Noise",
-    "Windows",
-    "averaging_half_width",
-    "before_windows",
-    "channel_std",
-    "cut_windows",
-    "derived_outputs",
-    "fit_ar_noise",
-    "has_heading",
-    "linear_basis",
-    "missing_wind_share",
-    "random_current_precision",
-    "white_noise",
-    "whitened",
-]

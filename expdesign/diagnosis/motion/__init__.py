@@ -23,25 +23,3 @@ from expdesign.diagnosis.motion.simulation import (
     simulate_windows,
     stable_windows,
 )
-
-__all__ = [
-    "Disturbance",
-    "LinearisedMotion",
-    "Motion",
-    "channels_apart",
-    "disturbance_of",
-    "exogenous_inputs",
-    "fitted_start",
-    "initial_states",
-    "linearise",
-    "linearised_like",
-    "longest_windows",
-    "responses",
-    "simulate_from_measured",
-    "simulate_nearby",
-    "simulate_windows",
-    "stable_windows",
-    "stacked_rates",
-    "start_responses",
-    "term_disturbances",
-]

@@ -4,5 +4,3 @@
 """
 
 from expdesign.diagnosis.remainder.search import Missing, Remainder, missing_effects, with_unlisted_terms
-
-__all__ = ["Missing", "Remainder", "missing_effects", "with_unlisted_terms"]

@@ -23,33 +23,3 @@ from expdesign.diagnosis.select.selection import (
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates, same_effects_as_any
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, starting_point
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING
-
-__all__ = [
-    "SELECTION_TUNING",
-    "FittedCandidate",
-    "Rival",
-    "ScoreTest",
-    "Selection",
-    "StartingPoint",
-    "Step",
-    "candidate_disturbances",
-    "certain_reductions",
-    "compared_with",
-    "eliminate_backward",
-    "fit_nuisance",
-    "fitted_ahead",
-    "improves_held_out",
-    "joint_keys",
-    "leading_candidates",
-    "only_nuisance",
-    "open_candidates",
-    "p_value_between_runs",
-    "redundant_step",
-    "same_effects_as_any",
-    "score_tests",
-    "select_forward",
-    "shows_for_certain",
-    "simulates_better",
-    "starting_point",
-    "without_step",
-]

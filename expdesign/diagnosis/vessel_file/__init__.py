@@ -2,10 +2,3 @@
 
 from expdesign.diagnosis.vessel_file.reading import extended_model, public_name, stated_values
 from expdesign.diagnosis.vessel_file.writing import extend
-
-__all__ = [
-    "extend",
-    "extended_model",
-    "public_name",
-    "stated_values",
-]

@@ -57,16 +57,3 @@ def criterion(name: str) -> Criterion:
         if candidate.name == name:
             return candidate
     raise UnknownName("criterion", name, known=[candidate.name for candidate in CRITERIA])
-
-
-__all__ = [
-    "CRITERIA",
-    "Aim",
-    "Criterion",
-    "LogDet",
-    "LogSmallest",
-    "LogTrace",
-    "Measure",
-    "Picked",
-    "criterion",
-]

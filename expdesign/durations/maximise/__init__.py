@@ -2,5 +2,3 @@
 
 from expdesign.durations.maximise.large_scale import LargeDesign, d_optimal, rows_of
 from expdesign.durations.maximise.maximise import CVXPY, NEWTON, Optimum, maximised
-
-__all__ = ["CVXPY", "NEWTON", "LargeDesign", "Optimum", "d_optimal", "maximised", "rows_of"]

@@ -17,21 +17,3 @@ from expdesign.estimation.noise.covariance import (
     score_covariance,
     white_parts,
 )
-
-__all__ = [
-    "Components",
-    "Coupled",
-    "Fitted",
-    "Stretch",
-    "Timeline",
-    "automatic_lags",
-    "coupled_covariance",
-    "fit_components",
-    "fit_coupled",
-    "long_run_covariance",
-    "lost_share",
-    "score_covariance",
-    "stretches",
-    "timeline",
-    "white_parts",
-]

@@ -2,5 +2,3 @@
 
 from expdesign.estimation.output_error.minimise import minimise_output_error
 from expdesign.estimation.output_error.problem import ActuatorTime, Begun, Fitting
-
-__all__ = ["ActuatorTime", "Begun", "Fitting", "minimise_output_error"]

@@ -14,23 +14,3 @@ from expdesign.estimation.replay.instruments import (
     treatment_of,
 )
 from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
-
-__all__ = [
-    "LEAVE_OUT",
-    "PLANNED",
-    "STEERED",
-    "Compiled",
-    "InstrumentModel",
-    "Integration",
-    "Replay",
-    "Steered",
-    "Stretches",
-    "apart_from_start",
-    "as_planned",
-    "build_replay",
-    "compiled",
-    "instrument_wind",
-    "open_loop",
-    "simulate_batch",
-    "treatment_of",
-]

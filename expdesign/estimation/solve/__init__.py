@@ -4,19 +4,3 @@ from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
 from expdesign.estimation.solve.solution import Prior, Refined, Solution, Weighting, refine_iv, solve_iv, solve_ls
 from expdesign.estimation.solve.systems import BLOCKS
-
-__all__ = [
-    "BLOCKS",
-    "Direction",
-    "NullSpace",
-    "Prior",
-    "Refined",
-    "Solution",
-    "Weighting",
-    "changing_variance",
-    "misfit_note",
-    "refine_iv",
-    "solve_iv",
-    "solve_ls",
-    "widening",
-]

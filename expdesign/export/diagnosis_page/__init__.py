@@ -8,13 +8,3 @@ from expdesign.export.diagnosis_page.results import (
     extended_vessel,
     roll_sentences,
 )
-
-__all__ = [
-    "RollVerdict",
-    "diagnosis_html",
-    "diagnosis_json",
-    "diagnosis_notes",
-    "diagnosis_tables",
-    "extended_vessel",
-    "roll_sentences",
-]

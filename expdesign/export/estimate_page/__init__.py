@@ -1,5 +1,3 @@
 """The page about an estimation: one self-contained file."""
 
 from expdesign.export.estimate_page.page import EstimateContent, estimate_html, estimate_notes
-
-__all__ = ["EstimateContent", "estimate_html", "estimate_notes"]

@@ -43,6 +43,3 @@ def route_files(route: Route, formats: Sequence[str]) -> dict[str, bytes]:
     """
     chosen = [find_format(name) for name in formats]
     return {named_file(known.file_name, route): known.write(route) for known in chosen}
-
-
-__all__ = ["FORMATS", "STANDARD", "Format", "find_format", "route_files"]

@@ -2,5 +2,3 @@
 
 from expdesign.export.indices_form.form import Held, IndicesContent, indices_json, verdict_rows, zigzag_rows
 from expdesign.export.indices_form.page import indices_html
-
-__all__ = ["Held", "IndicesContent", "indices_html", "indices_json", "verdict_rows", "zigzag_rows"]

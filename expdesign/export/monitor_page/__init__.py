@@ -9,14 +9,3 @@ from expdesign.export.monitor_page.content import (
     sentences,
 )
 from expdesign.export.monitor_page.page import budget_entries, monitor_html
-
-__all__ = [
-    "Moment",
-    "MonitorContent",
-    "budget_entries",
-    "monitor_header",
-    "monitor_html",
-    "monitor_json",
-    "monitor_tables",
-    "sentences",
-]

@@ -2,5 +2,3 @@
 
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.page import report_html
-
-__all__ = ["ReportContent", "report_html"]

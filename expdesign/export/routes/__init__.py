@@ -4,17 +4,3 @@ from expdesign.export.routes.build import build_bridge_route, build_route
 from expdesign.export.routes.fence import build_fence
 from expdesign.export.routes.read_plan import PlannedTrack, planned_track, read_plan, require_verified
 from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, Route, Waypoint
-
-__all__ = [
-    "DEGREE_DECIMALS",
-    "ROUTE_NAME",
-    "PlannedTrack",
-    "Route",
-    "Waypoint",
-    "build_bridge_route",
-    "build_fence",
-    "build_route",
-    "planned_track",
-    "read_plan",
-    "require_verified",
-]

@@ -20,22 +20,3 @@ from expdesign.export.step_trial_page.live import (
     to_do_table,
 )
 from expdesign.export.step_trial_page.page import step_trial_html
-
-__all__ = [
-    "REPEAT_HEADER",
-    "TO_DO_HEADER",
-    "LiveContent",
-    "StepTrialContent",
-    "Validated",
-    "event_line",
-    "live_json",
-    "live_sentences",
-    "nominal_rows",
-    "repeat_rows",
-    "sentences",
-    "step_model_json",
-    "step_trial_html",
-    "to_do_csv",
-    "to_do_table",
-    "to_repeat",
-]

@@ -2,5 +2,3 @@
 
 from expdesign.export.whatif_page.content import Case, WhatIfContent, explanations, whatif_json
 from expdesign.export.whatif_page.page import whatif_html
-
-__all__ = ["Case", "WhatIfContent", "explanations", "whatif_html", "whatif_json"]

@@ -15,24 +15,3 @@ from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_
 from expdesign.monitoring.yaw.learnt import estimate_yaw_by_instruments, halves_in_words, learnt_ship
 from expdesign.monitoring.yaw.model import YAW_MODELS, YawData, YawModel, needed_columns, term_budget
 from expdesign.monitoring.yaw.ship import KEY, YawShip, ship_of_changes, yaw_changes, yaw_grams
-
-__all__ = [
-    "KEY",
-    "YAW_MODELS",
-    "YawData",
-    "YawEstimate",
-    "YawModel",
-    "YawShip",
-    "estimate_yaw",
-    "estimate_yaw_by_instruments",
-    "halves_differ",
-    "halves_in_words",
-    "learnt_ship",
-    "needed_columns",
-    "ship_of_changes",
-    "simulate_yaw",
-    "start_values",
-    "term_budget",
-    "yaw_changes",
-    "yaw_grams",
-]

@@ -6,24 +6,3 @@ from expdesign.plan.control.helm_capability import full_ahead, stopped
 from expdesign.plan.control.ships import AgileShip, Capability, DubinsShip, HelmShip, arc_spare_m
 from expdesign.plan.control.tracking import Helmsman, Reference, lengths, over_ground
 from expdesign.plan.control.tuning import CONTROL
-
-__all__ = [
-    "CONTROL",
-    "AgileShip",
-    "Capability",
-    "DubinsShip",
-    "HelmShip",
-    "Helmsman",
-    "LegEnd",
-    "Reference",
-    "SpeedChanges",
-    "arc_spare_m",
-    "capability",
-    "full_ahead",
-    "least_loss",
-    "leg_end",
-    "lengths",
-    "over_ground",
-    "stopped",
-    "to_work_s",
-]

@@ -17,25 +17,3 @@ from expdesign.plan.legs.water import (
     nearest_turns,
     through_water,
 )
-
-__all__ = [
-    "LEGS",
-    "FoundLeg",
-    "LegPath",
-    "LegTask",
-    "LegWater",
-    "acceptable",
-    "agile_leg",
-    "check_ends",
-    "curved_leg",
-    "displaced",
-    "dubins_curve",
-    "escapes",
-    "free_leg",
-    "helm_leg",
-    "last_state",
-    "leg_speed_mps",
-    "nearest_turns",
-    "recover",
-    "through_water",
-]

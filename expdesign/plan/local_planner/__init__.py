@@ -15,21 +15,3 @@ from expdesign.plan.local_planner.protocol import (
     TriedTransition,
 )
 from expdesign.plan.local_planner.transitions import pairs_of
-
-__all__ = [
-    "GoAroundTime",
-    "LegEnds",
-    "LocalPlanner",
-    "Pair",
-    "PartialPlans",
-    "RunSpace",
-    "SearchSpace",
-    "Successors",
-    "TransitionTrials",
-    "TriedTransition",
-    "arc_end",
-    "local_planner",
-    "moved",
-    "pairs_of",
-    "run_ends",
-]

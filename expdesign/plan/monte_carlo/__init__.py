@@ -9,14 +9,3 @@ from expdesign.plan.monte_carlo.risk import (
     worst_leg,
 )
 from expdesign.plan.monte_carlo.trials import Trials, sail_trials
-
-__all__ = [
-    "Trials",
-    "estimate_risk",
-    "failed_chance_constraint",
-    "sail_trials",
-    "shares_allowed",
-    "trials_needed",
-    "violates_chance_constraint",
-    "worst_leg",
-]

@@ -5,5 +5,3 @@ says what was not tried, and where no remedy could be checked.
 """
 
 from expdesign.plan.remedies.advice import advised
-
-__all__ = ["advised"]

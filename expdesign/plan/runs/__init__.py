@@ -2,13 +2,3 @@
 
 from expdesign.plan.runs.dispersion import Footprint, dispersion_m, draw_truths, draws_for, footprint, run_at_headings
 from expdesign.plan.runs.ensemble import Fleet
-
-__all__ = [
-    "Fleet",
-    "Footprint",
-    "dispersion_m",
-    "draw_truths",
-    "draws_for",
-    "footprint",
-    "run_at_headings",
-]

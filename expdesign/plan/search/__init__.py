@@ -3,12 +3,3 @@
 from expdesign.plan.search.beam import path_exceeds_displacement, place_runs
 from expdesign.plan.search.local_search import have_room, runs_clear
 from expdesign.plan.search.planners import PlacementSearch, placement_search
-
-__all__ = [
-    "PlacementSearch",
-    "have_room",
-    "path_exceeds_displacement",
-    "place_runs",
-    "placement_search",
-    "runs_clear",
-]

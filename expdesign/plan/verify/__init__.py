@@ -9,14 +9,3 @@ from expdesign.plan.verify.efficiency import (
     track_covariance,
     track_information,
 )
-
-__all__ = [
-    "about_ship",
-    "expected_errors",
-    "hull_clearance",
-    "part_of_track",
-    "realised_efficiencies",
-    "track_covariance",
-    "track_information",
-    "verify_plan",
-]

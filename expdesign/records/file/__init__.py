@@ -17,30 +17,3 @@ from expdesign.records.file.names import (
 )
 from expdesign.records.file.ranges import check_ranges
 from expdesign.records.file.table import MISSING, Table, check_wind, read_table, relative_wind
-
-__all__ = [
-    "COLUMNS",
-    "FIRST_ROW",
-    "LABEL",
-    "MISSING",
-    "PLANNED",
-    "REACHED",
-    "STEERED",
-    "Clock",
-    "Inputs",
-    "Source",
-    "Sources",
-    "Table",
-    "check_ranges",
-    "check_wind",
-    "choose_columns",
-    "input_name",
-    "is_input",
-    "is_turning_input",
-    "meaning",
-    "mistyped",
-    "read_cells",
-    "read_clock",
-    "read_table",
-    "relative_wind",
-]

@@ -17,27 +17,3 @@ from expdesign.records.pose.motion import (
     velocity_origins,
 )
 from expdesign.records.pose.position import Fix, LocalMetres, check_jumps, last_fix, with_continuous_angles, with_metres
-
-__all__ = [
-    "MEASURED",
-    "SMOOTHED",
-    "VELOCITY_METHODS",
-    "Fix",
-    "LocalMetres",
-    "Request",
-    "batch_velocity",
-    "central_difference",
-    "check_agreement",
-    "check_heading",
-    "check_jumps",
-    "kept_samples",
-    "last_fix",
-    "left_out_notes",
-    "long_enough",
-    "needed_columns",
-    "origin_notes",
-    "smoothed_velocity",
-    "velocity_origins",
-    "with_continuous_angles",
-    "with_metres",
-]

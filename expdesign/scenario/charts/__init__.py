@@ -2,5 +2,3 @@
 
 from expdesign.scenario.charts.area_file import load_area
 from expdesign.scenario.charts.area_tables import Latitude, Longitude
-
-__all__ = ["Latitude", "Longitude", "load_area"]

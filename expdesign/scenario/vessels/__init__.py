@@ -2,5 +2,3 @@
 
 from expdesign.scenario.vessels.vessel_file import load_vessel
 from expdesign.scenario.vessels.vessel_tables import EnvironmentTable, build_environment
-
-__all__ = ["EnvironmentTable", "build_environment", "load_vessel"]

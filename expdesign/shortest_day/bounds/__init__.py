@@ -3,16 +3,3 @@
 from expdesign.shortest_day.bounds.day import SpeedChanges, day_bound, fastest_mps, speed_changes, way_bound_s
 from expdesign.shortest_day.bounds.fewest_samples import Richest, SampleBound, fewest_samples, richest_sample
 from expdesign.shortest_day.bounds.motions import Motions
-
-__all__ = [
-    "Motions",
-    "Richest",
-    "SampleBound",
-    "SpeedChanges",
-    "day_bound",
-    "fastest_mps",
-    "fewest_samples",
-    "richest_sample",
-    "speed_changes",
-    "way_bound_s",
-]

@@ -3,20 +3,3 @@
 from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence, step_list
 from expdesign.step_trials.live.values import Event, Finished, Row, State, restored_state
 from expdesign.step_trials.live.watch import Setup, after_row, beginning, expected_constants
-
-__all__ = [
-    "Event",
-    "Finished",
-    "Inputs",
-    "Listed",
-    "Row",
-    "Setup",
-    "State",
-    "StepList",
-    "after_row",
-    "beginning",
-    "expected_constants",
-    "in_sequence",
-    "restored_state",
-    "step_list",
-]

@@ -2,5 +2,3 @@
 
 from expdesign.step_trials.nominal.evidence import States, correlated
 from expdesign.step_trials.nominal.vessel import nominal_vessel, with_delays
-
-__all__ = ["States", "correlated", "nominal_vessel", "with_delays"]
