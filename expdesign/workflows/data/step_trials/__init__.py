@@ -1,1 +1,0 @@
-"""Commands on the data of step trials; one file each."""
