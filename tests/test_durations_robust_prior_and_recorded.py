@@ -20,7 +20,6 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.durations.solve import log_abs_det
-from expdesign.durations.tuning import Tuning
 from expdesign.errors import InputError, NotInformative
 from expdesign.information import score_models, score_primitives
 from expdesign.information.prior import score_prior, stated_information
@@ -195,7 +194,7 @@ def test_the_best_subset_is_the_best_of_all(draw: int):
 def test_a_large_choice_has_a_bound_that_holds(monkeypatch: pytest.MonkeyPatch):
     items = batches(1, 12)
     exact = best_subset(items, ("a", "b", "c"), size=5)
-    monkeypatch.setattr("expdesign.durations.mining.TUNING", Tuning(all_subsets=10))
+    monkeypatch.setattr("expdesign.durations.mining.ALL_SUBSETS", 10)
     quick = best_subset(items, ("a", "b", "c"), size=5)
     assert not quick.exact
     assert quick.efficiency <= exact.efficiency + 1e-9 <= quick.bound + 2e-9

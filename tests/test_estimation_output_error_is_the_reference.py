@@ -12,7 +12,7 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.disturbance import current_moments
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
-from expdesign.estimation.output_error import gauss_newton, minimise
+from expdesign.estimation.output_error import minimise
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.estimation.replay.replay import Integration, build_replay, simulate_batch, start_state
 from expdesign.estimation.values import fit_percent
@@ -273,8 +273,7 @@ def test_runge_kutta_gives_the_parameters_of_the_motion_and_euler_those_of_its_m
 def test_thinner_samples_on_the_way_do_not_change_where_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     data = trials(TRUE)
     found = estimate(data, NOMINAL, method="oe")
-    for room in (minimise, gauss_newton):
-        monkeypatch.setattr(room, "TUNING", replace(minimise.TUNING, rough_samples=300, rough_step_s=3.0))
+    monkeypatch.setattr(minimise, "TUNING", replace(minimise.TUNING, rough_samples=300, rough_step_s=3.0))
     thinned = []
     build = minimise.build_problem
     monkeypatch.setattr(minimise, "build_problem", lambda *args: thinned.append(args[3].every) or build(*args))

@@ -23,7 +23,7 @@ from expdesign.plan.legs.escape_check import check_ends
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies import advised, changes, trials
+from expdesign.plan.remedies import advice, advised, changes
 from expdesign.plan.remedies.advice import REMEDY_WORK
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
@@ -227,17 +227,17 @@ def test_the_forecast_named_where_most_trials_are_aborted_is_one_with_which_the_
 
 def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch, story):
     whole = in_current(story, 1.4)
-    monkeypatch.setattr(trials, "first_sailed", lambda other, budget: ())
+    monkeypatch.setattr(advice, "first_sailed", lambda other, budget: ())
     refused = {"what": "risk", "which": "deceleration"}
 
-    monkeypatch.setattr(trials, "accepted", lambda other, budget: other.repeats["deceleration"] == 0)
+    monkeypatch.setattr(advice, "accepted", lambda other, budget: other.repeats["deceleration"] == 0)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
-    monkeypatch.setattr(trials, "accepted", lambda other, budget: other.environment.current_std_mps < 1.0)
+    monkeypatch.setattr(advice, "accepted", lambda other, budget: other.environment.current_std_mps < 1.0)
     forecast = "environment.current_to.std_mps = 0.7 (a better forecast)"
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f"too risky; with {forecast} drawn trials accept the plan"
-    monkeypatch.setattr(trials, "accepted", lambda other, budget: False)
+    monkeypatch.setattr(advice, "accepted", lambda other, budget: False)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f'too risky; no single change of those tried helps ({forecast}, design.excluded = ["deceleration"])'
     known = in_current(story, 0.0)
@@ -267,16 +267,16 @@ def made(monkeypatch):
         budget.spent_s += PLAN_S
         return (), ()
 
-    monkeypatch.setattr(trials, "first_sailed", first)
-    monkeypatch.setattr(trials, "promising", lambda other, water, sailed, budget: False)
-    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: False)
+    monkeypatch.setattr(advice, "first_sailed", first)
+    monkeypatch.setattr(advice, "promising", lambda other, water, sailed, budget: False)
+    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: False)
     return planned
 
 
 @pytest.mark.parametrize("helps", [True, False])
 def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypatch, story, made, helps):
     case = in_current(story, 1.4)
-    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: helps and other.settings.confidence == 0.8)
+    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: helps and other.settings.confidence == 0.8)
     text = str(advised(case, too_risky(case, 3)))
     assert [other.settings.confidence for other in made] == [0.8]
     assert ("with plan.confidence = 0.8 drawn trials accept the plan" in text) == helps
@@ -291,7 +291,7 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
         judged.append((other.environment.current_std_mps, water.environment is other.environment))
         return False
 
-    monkeypatch.setattr(trials, "promising", likely)
+    monkeypatch.setattr(advice, "promising", likely)
     text = str(advised(case, too_risky(case, 1)))
     assert judged == [(0.7, True)]
     assert [other.environment.current_std_mps for other in made] == [1.4] * len(made)
@@ -301,9 +301,9 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
 @pytest.mark.parametrize("plans", [1, 2, 3])
 def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_before(monkeypatch, story, plans):
     case, told, said = in_current(story, 1.4), [], []
-    monkeypatch.setattr(trials, "first_sailed", lambda other, budget: said.append(told[-1]) or ((), ()))
-    monkeypatch.setattr(trials, "promising", lambda other, water, sailed, budget: True)
-    monkeypatch.setattr(trials, "accepted", lambda other, *_, budget: False)
+    monkeypatch.setattr(advice, "first_sailed", lambda other, budget: said.append(told[-1]) or ((), ()))
+    monkeypatch.setattr(advice, "promising", lambda other, water, sailed, budget: True)
+    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: False)
     advised(case, too_risky(case, plans), lambda activity, share: told.append(activity))
     assert "too risky" in told[0]
     assert 1 <= len(said) <= max(1, PLAN.replans + 1 - plans)
@@ -321,7 +321,7 @@ def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(mon
         budget.spent_s += spent * PLAN_S
         return False
 
-    monkeypatch.setattr(trials, "promising", likely)
+    monkeypatch.setattr(advice, "promising", likely)
     text = str(advised(case, refused))
     fits = 1.0 + spent <= REMEDY_WORK
     assert len(made) == fits

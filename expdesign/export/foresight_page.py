@@ -305,7 +305,7 @@ def operation_json(content: OperationContent) -> str:
 
 def operation_html(content: OperationContent) -> str:
     """One HTML page without any outside reference."""
-    return page_template("expdesign.export.foresight_page", "operation.html").render(
+    return page_template("operation.html").render(
         content=content,
         sentences=operation_sentences(content.found),
         header=OPERATION_HEADER,
@@ -349,7 +349,7 @@ def foresight_html(content: ForesightContent) -> str:
     found = content.found
     with report_style():
         figure = power_figure(found)
-    return page_template("expdesign.export.foresight_page", "foresee.html").render(
+    return page_template("foresee.html").render(
         content=content,
         found=found,
         figure=figure,

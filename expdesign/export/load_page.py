@@ -197,7 +197,7 @@ def loads_toml(content: LoadContent) -> str:
 
 def load_plan_html(content: LoadContent) -> str:
     """One HTML page without any outside reference."""
-    return page_template("expdesign.export.load_page", "load_plan.html").render(
+    return page_template("load_plan.html").render(
         content=content,
         sentences=load_sentences(content),
         case_header=[name.capitalize() for name in CASE_HEADER],

@@ -104,7 +104,7 @@ def refused_html(refusal: Refusal) -> str:
     """One HTML page without any outside reference."""
     with report_style():
         figure = _chart(refusal)
-    return page_template("expdesign.export.refused_page", "refused.html").render(
+    return page_template("refused.html").render(
         content=refusal, error=refusal.error, chart=figure, legend=_legend(refusal)
     )
 

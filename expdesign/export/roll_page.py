@@ -258,7 +258,7 @@ def _parameter(content: RollContent, name: str) -> dict[str, object]:
 
 def roll_html(content: RollContent) -> str:
     """One HTML page without any outside reference."""
-    return page_template("expdesign.export.roll_page", "roll.html").render(
+    return page_template("roll.html").render(
         content=content,
         sentences=roll_sentences(content),
         parameter_header=[name.capitalize() for name in PARAMETER_HEADER],

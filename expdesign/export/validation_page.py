@@ -328,7 +328,7 @@ def validation_html(content: ValidationContent) -> str:
             "errors": error_figure(content.results),
             "spread": None if predicted is None else spread_figure(predicted),
         }
-    return page_template("expdesign.export.validation_page", "validation.html").render(
+    return page_template("validation.html").render(
         content=content,
         judgements=judgements(content),
         designs=[_design_row(content, item) for item in content.results],

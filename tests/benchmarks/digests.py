@@ -47,7 +47,7 @@ LINES = (
     "explain scenario",
     "explain vessel",
 )
-WORK = re.compile(r"(^|_)(seconds|version|versions|work|created|command)(_|$)|_cpu_s$|processor")
+WORK = re.compile(r"(^|_)(seconds|version|versions|work|created|command)(_|$)|_(cpu|wall)_s$|^wall_s$|processor")
 
 
 def carried_out(checkout: Path, folder: Path, lines: Sequence[str]) -> dict[str, str]:

@@ -309,7 +309,7 @@ def cards_html(content: ReportContent) -> str:
     runs = primitive_runs(content.plan)
     cards = drawn([partial(build_card, content, group) for group in card_groups(content, runs)])
     overview = drawn([partial(chart, content)])[0]
-    page = page_template("expdesign.export.cards", "cards.html")
+    page = page_template("cards.html")
     return page.render(
         content=content,
         cards=cards,

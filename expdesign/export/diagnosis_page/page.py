@@ -123,7 +123,7 @@ def diagnosis_html(
 ) -> str:
     """One HTML page without any outside reference."""
     figures = _figures(found, progress)
-    page = page_template("expdesign.export.diagnosis_page", "diagnosis.html")
+    page = page_template("diagnosis.html")
     return page.render(
         found=found,
         verdict=found.verdict.partition(". "),

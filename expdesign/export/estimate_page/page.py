@@ -157,7 +157,7 @@ def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> s
     """One HTML page without any outside reference."""
     found = content.found
     methods = [_notes(content, item) for item in found.methods]
-    page = page_template("expdesign.export.estimate_page", "estimate.html")
+    page = page_template("estimate.html")
     return page.render(
         content=content,
         found=found,

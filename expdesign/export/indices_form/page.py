@@ -184,7 +184,7 @@ def condition_rows(content: IndicesContent) -> list[Shown]:
 def indices_html(content: IndicesContent) -> str:
     """One HTML page without outside references."""
     sources = tuple(dict.fromkeys(source for source, _ in content.trials))
-    page = page_template("expdesign.export.indices_form", "indices.html")
+    page = page_template("indices.html")
     return page.render(
         content=content,
         rows=verdict_rows(content),

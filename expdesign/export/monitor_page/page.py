@@ -191,7 +191,7 @@ def monitor_html(content: MonitorContent) -> str:
     with report_style():
         figures = {"statistic": statistic_figure(content), "estimate": estimate_figure(content)}
         figures["budget"] = budget_figure(content)
-    return page_template("expdesign.export.monitor_page", "monitor.html").render(
+    return page_template("monitor.html").render(
         content=content,
         sentences=sentences(content),
         judged=hours(content.state.judged_s),

@@ -7,14 +7,14 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Te
 from expdesign.export.formats.format import xml_text
 
 
-def page_template(package: str, name: str) -> Template:
-    """A template of a package, which may use what all pages share: `base.html`, `parts.html` and the style sheet.
+def page_template(name: str, *, package: str = __name__) -> Template:
+    """A template in the folder `templates` of a package.
 
-    A name that a template uses without a value is an error; text is escaped, and characters that no page may hold are
-    replaced.
+    It may use what all pages share: `base.html`, `parts.html` and the style sheet. A name that a template uses without
+    a value is an error; text is escaped, and characters that no page may hold are replaced.
     """
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(name) for name in (package, "expdesign.export.pages")]),
+        loader=ChoiceLoader([PackageLoader(one) for one in (package, __name__)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

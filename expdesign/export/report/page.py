@@ -108,7 +108,7 @@ def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = expected(content)
     rows = parameter_rows(content, after)
-    page = page_template("expdesign.export.report", "report.html")
+    page = page_template("report.html")
     return page.render(
         content=content,
         plan=content.plan,

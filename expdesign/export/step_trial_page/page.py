@@ -126,7 +126,7 @@ def step_trial_html(content: StepTrialContent) -> str:
     with report_style():
         figures = {"coverage": coverage_figure(content), "surfaces": surface_figure(content)}
         simulations = [(part, simulation_figure(part, f"simulation{place}")) for place, part in enumerate(parts)]
-    return page_template("expdesign.export.step_trial_page", "step_trial.html").render(
+    return page_template("step_trial.html").render(
         content=content,
         sentences=sentences(content),
         repeat_header=[name.capitalize() for name in REPEAT_HEADER],

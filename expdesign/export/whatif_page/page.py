@@ -121,7 +121,7 @@ def whatif_html(content: WhatIfContent) -> str:
             "ratios": ratio_figure(content),
             "runs": runs_figure(content),
         }
-    return page_template("expdesign.export.whatif_page", "whatif.html").render(
+    return page_template("whatif.html").render(
         content=content,
         header=table_header(content),
         rows=[_row(content, case) for case in content.cases],

@@ -91,7 +91,7 @@ def design_value_html(
             "outputs": _shares(designs),
             "norm": _stems(designs, [item.norm for item in designs], CUT_NORM, limits[1], "norm"),
         }
-    return page_template("design_value_page", "design_value.html").render(
+    return page_template("design_value.html", package="design_value_page").render(
         trials=len(designs[0].parameters),
         tables=tables,
         figures=figures,
