@@ -12,6 +12,7 @@ import pytest
 import expdesign
 from expdesign.cli import main
 from expdesign.cli.options import repeat_option
+from expdesign.cli.summary import _rows
 from short_examples import copied
 
 SUMMARY = {
@@ -334,3 +335,8 @@ def modules_after(*calls: tuple[str, ...]) -> tuple[set[str], str]:
 def test_the_module_is_the_console_script() -> None:
     done = subprocess.run([sys.executable, "-m", "expdesign", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"expdesign {expdesign.__version__}\n"
+
+
+def test_what_nobody_knows_has_no_unit() -> None:
+    rows = dict(_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
+    assert rows == {"day median": "-", "bound": "-", "day": "60 s"}

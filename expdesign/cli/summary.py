@@ -130,7 +130,8 @@ def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str
         if isinstance(value, Mapping):
             yield from _rows(value, f"{label}, ")
         else:
-            yield label, _text(value) if value is None else f"{_text(value)} {unit}".rstrip()
+            text = _text(value)
+            yield label, text if text == "-" else f"{text} {unit}".rstrip()
 
 
 def _text(value: object) -> str:
