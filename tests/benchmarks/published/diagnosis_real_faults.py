@@ -357,7 +357,7 @@ FAULTS = (
     ),
     Fault(
         name="u, v late 0.7 s", batch=_late, causes=("sensor_delay",), effects=(("late:u", LATE_S), ("late:v", LATE_S)),
-        record=(f"u_mps and v_mps come {PLUS} s later", LATE_S),
+        record=(f"u_mps and v_mps come {PLUS} s later than heading", LATE_S),
     ),
     Fault(name="term taken out", model=_taken_out),
     Fault(
