@@ -58,3 +58,15 @@ def unknown(path: Path) -> Iterator[str]:
 
 def test_what_docstrings_name_exists() -> None:
     assert [name for path in sorted(PACKAGE.rglob("*.py")) for name in unknown(path)] == []
+
+
+def test_tuning_constants_that_texts_name_exist() -> None:
+    files = {path: path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
+    fields = set[str]()
+    for text in files.values():
+        for node in ast.walk(ast.parse(text)):
+            fields |= attributes(node) if isinstance(node, ast.ClassDef) and node.name == "Tuning" else set()
+    named = {
+        (path.name, name) for path, text in files.items() for name in re.findall(r"`(?:TUNING|Tuning)\.(\w+)`", text)
+    }
+    assert {item for item in named if item[1] not in fields} == set()

@@ -313,7 +313,7 @@ def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_befor
 
 @pytest.mark.parametrize("spent", [0.0, 0.7, 0.8])
 def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(monkeypatch, story, made, spent):
-    """Of `PLAN.remedy_work` times the refused plan, a plan takes one, and drawn trials in a forecast what is spent."""
+    """Of `REMEDY_WORK` times the refused plan, a plan takes one, and drawn trials in a forecast what is spent."""
     case, refused = in_current(story, 1.4), too_risky(in_current(story, 1.4), 1)
     refused.confidence = None
 

@@ -4,7 +4,7 @@ Runs are left out in turn, or pieces of a few, and every method estimates from t
 was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states would hide a useless model,
 and one simulation of a whole run tells more of the ship's stability than of the model. An error is over the standard
 deviation of the measured output; 1 is no better than a constant, and more counts as 1. Runs and outputs are joined by
-geometric means, in which no single one decides. Errors that differ by less than `Tuning.same_error` of themselves count
+geometric means, in which no single one decides. Errors that differ by less than `SAME_ERROR` of themselves count
 as equal. Of such methods the one goes first that noise in the measured velocities does not bias: instrumental
 variables, then output error, then least squares.
 

@@ -217,7 +217,7 @@ def _one_step(stretches: Stretches) -> Compiled:
 
 
 def _slow_part(values: Array, sample_time_s: float) -> Array:
-    """The part with periods over `Tuning.slow_s` or 40 samples; a cosine transform is not periodic at the ends."""
+    """The part with periods over `SLOW_S` or 40 samples; a cosine transform is not periodic at the ends."""
     spectrum = scipy.fft.dct(values, axis=0, norm="ortho")
     period_s = max(SLOW_S, 40 * sample_time_s)
     spectrum[int(2 * len(values) * sample_time_s / period_s) + 1 :] = 0.0

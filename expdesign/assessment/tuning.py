@@ -1,4 +1,4 @@
-"""The tuning constants of the assessment of estimates, in one place."""
+"""Tuning constants of the assessment of estimates that several modules read."""
 
 from __future__ import annotations
 

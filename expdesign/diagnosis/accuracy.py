@@ -29,7 +29,7 @@ from expdesign.values import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Numbers of this room."""
+    """Numbers of this module."""
 
     # times after a start at which the growth of the error is measured [s]
     horizons_s: tuple[float, ...] = (2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)

@@ -274,5 +274,5 @@ def deviation(primitive: Primitive) -> float:
 
 
 def deviating(primitives: Sequence[Primitive]) -> tuple[Primitive, ...]:
-    """Primitives that deviate from the desired motion by more than `Tuning.reported_deviation`."""
+    """Primitives that deviate from the desired motion by more than `REPORTED_DEVIATION`."""
     return tuple(item for item in primitives if deviation(item) > REPORTED_DEVIATION)

@@ -34,7 +34,7 @@ def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
 
 
 def lost(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
-    """(...) change of speed per sample, relative; `Tuning.steady_change` at most in a steady state."""
+    """(...) change of speed per sample, relative; `STEADY_CHANGE` at most in a steady state."""
     change = np.abs(drift(vessel, velocity, inputs)).max(axis=-1) * vessel.sample_time_s
     return np.asarray(change / np.maximum(1e-9, np.abs(velocity).max(axis=-1)))
 

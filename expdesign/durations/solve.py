@@ -77,7 +77,7 @@ def improved(problem: DurationProblem, polytope: Polytope, start: Array | None) 
     Args:
         problem: with matrices that need not be symmetric.
         polytope: limits.
-        start: (q,), or None for `Tuning.starts` random ones.
+        start: (q,), or None for `STARTS` random ones.
 
     Raises:
         NotInformative: |det B| is zero wherever the search began.

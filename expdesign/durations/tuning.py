@@ -1,4 +1,4 @@
-"""The tuning constants of the durations, in one place."""
+"""Tuning constants of the durations that several modules read."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class WorstCase:
 
 
 def worst_case(sensors: Sensors, *, current_mps: float = 0.0, wind_mps: float = 0.0) -> WorstCase:
-    """`TUNING.worst_case_sigmas` standard deviations of the sensors, and the strongest current and wind."""
+    """`WORST_CASE_SIGMAS` standard deviations of the sensors, and the strongest current and wind."""
     return WorstCase(
         velocity_mps=WORST_CASE_SIGMAS * sensors.velocity_mps,
         yaw_rate_radps=WORST_CASE_SIGMAS * sensors.yaw_rate_radps,

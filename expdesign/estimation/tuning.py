@@ -1,4 +1,4 @@
-"""The tuning constants of the estimation, in one place."""
+"""Tuning constants of the estimation that several modules read."""
 
 from __future__ import annotations
 

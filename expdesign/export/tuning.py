@@ -1,4 +1,4 @@
-"""The tuning constants of pages, figures, cards and files, in one place."""
+"""Tuning constants of pages, figures, cards and files that several modules read."""
 
 from __future__ import annotations
 

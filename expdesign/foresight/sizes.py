@@ -147,7 +147,7 @@ def _default(item: Direction, defaults: Mapping[str, float]) -> float:
 
 
 def _by_fit(item: Direction, trials: StandardTrials | None, default: float) -> Size:
-    """The size that costs `Tuning.fit_points` in the standard trials, else the default."""
+    """The size that costs `FIT_POINTS` in the standard trials, else the default."""
     usual = Size(value=default, rule="default" if math.isfinite(default) else "no size is known")
     if trials is None:
         return usual

@@ -1,4 +1,4 @@
-"""The tuning constants of the manoeuvring indices, in one place."""
+"""Tuning constants of the manoeuvring indices that several modules read."""
 
 from __future__ import annotations
 

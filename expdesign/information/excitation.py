@@ -8,7 +8,7 @@ manoeuvring model, surge has |u|, sway and yaw have |v|. A design counts by choi
 - "rewarded": in each equation the samples that meet its condition, which is the information of the estimate from
   equation-wise samples;
 - "required": the same, of runs only that meet it from when they first do until they last do, which is at least
-  `Tuning.least_clear` of the run; heading by heading. Manoeuvres begin straight, so an offset takes time to build up.
+  `LEAST_CLEAR` of the run; heading by heading. Manoeuvres begin straight, so an offset takes time to build up.
 
 On either side of zero the mean of a square's noise has another sign, so samples of each side are a stratum with a mean
 of its own, as in `estimation.equation_wise`.

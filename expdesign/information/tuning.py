@@ -1,4 +1,4 @@
-"""The tuning constants of the information room, in one place."""
+"""Tuning constants of information that several modules read."""
 
 from __future__ import annotations
 

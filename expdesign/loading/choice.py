@@ -73,7 +73,7 @@ def choose_loads(
         primitives: the manoeuvres.
         total_s: informative time, without changing loads.
         aim: the criterion.
-        most_loads: at most so many load cases; None for the fewest that keep `Tuning.least_efficiency`.
+        most_loads: at most so many load cases; None for the fewest that keep `LEAST_EFFICIENCY`.
         progress: of the calculation.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The tuning constants of monitoring, in one place."""
+"""Tuning constants of monitoring that several modules read."""
 
 from __future__ import annotations
 

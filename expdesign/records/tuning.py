@@ -1,4 +1,4 @@
-"""The tuning constants of reading measured data, in one place."""
+"""Tuning constants of reading measured data that several modules read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tuning constants of the reduction, in one place."""
+"""Tuning constants of the reduction that several modules read."""
 
 from __future__ import annotations
 

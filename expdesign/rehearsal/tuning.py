@@ -1,4 +1,4 @@
-"""The tuning constants of the rehearsal of designs, in one place."""
+"""Tuning constants of the rehearsal of designs that several modules read."""
 
 from __future__ import annotations
 

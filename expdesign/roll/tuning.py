@@ -1,4 +1,4 @@
-"""The tuning constants of roll identification, in one place."""
+"""Tuning constants of roll identification that several modules read."""
 
 from __future__ import annotations
 

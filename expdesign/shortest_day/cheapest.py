@@ -172,7 +172,7 @@ def cheapest_shares(
 def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
     """The largest level of the margin f that runs, whole or not, reach at a cost of `most_s`.
 
-    Levels are searched from `Tuning.least_level` to that of the most runs; the least where even it costs more.
+    Levels are searched from `LEAST_LEVEL` to that of the most runs; the least where even it costs more.
     """
     low, high = LEAST_LEVEL, accuracy.margin(offer.information(offer.most))
     tangents: tuple[Tangent, ...] = ()

@@ -267,7 +267,7 @@ def learnt_prices(problem: PlanProblem, days: Sequence[DraftedDay]) -> Prices:
 def _legs_s(names: Sequence[str], days: Sequence[DraftedDay], saved_s: Array) -> Array:
     """(q,) repositioning for each run, beyond the way that it and its leg make good, as drawn trials take it [s].
 
-    By the legs that led to it so far, and the average leg, which counts as `Tuning.average_legs` of them.
+    By the legs that led to it so far, and the average leg, which counts as `AVERAGE_LEGS` of them.
     """
     beyond_s, into = list[float](), list[int]()
     for day in days:

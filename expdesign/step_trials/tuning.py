@@ -1,4 +1,4 @@
-"""The tuning constants of step trials, in one place."""
+"""Tuning constants of step trials that several modules read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The catalogue of causes: one file each, one signature, one visible tuple."""
+"""The catalogue of causes by where they act: one signature, one visible tuple."""
 
 from expdesign.diagnosis.causes.actuators import (
     ACTUATOR_DEADBAND,

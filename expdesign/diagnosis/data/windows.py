@@ -172,7 +172,7 @@ ROWS = ("batch", "first", "measured", "heading", "wind", "depth_m", "time_s")
 def fastest_rate(model: VesselModel, record: Record) -> float:
     """Largest linear damping rate of the model at the measured speeds [1/s].
 
-    Speeds are means over `Tuning.coarsest_step_s`, because differences of positions at a high rate are mostly noise.
+    Speeds are means over `COARSEST_STEP_S`, because differences of positions at a high rate are mostly noise.
     """
     speeds = np.abs(np.concatenate([_slowly(batch) for batch in record.batches]))
     seen = np.isfinite(speeds)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tuning:
-    """Numbers of this room. "Cost" is twice the negative log likelihood."""
+    """Numbers of this package. "Cost" is twice the negative log likelihood."""
 
     # numbers in sensitivities and their inner products of windows that are taken together, so that memory does not grow
     # with the data

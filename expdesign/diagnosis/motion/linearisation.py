@@ -59,7 +59,7 @@ class Motion:
 
     @property
     def diverged(self) -> bool:
-        """Whether a speed exceeds `Tuning.largest_speed`."""
+        """Whether a speed exceeds `LARGEST_SPEED`."""
         return bool(self.diverged_windows.any())
 
     @property

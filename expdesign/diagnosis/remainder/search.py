@@ -150,7 +150,7 @@ def _between_units(given: UnitInformation, chosen: Sequence[int]) -> Dispersion:
 
 
 def _begun_anew(base: Fit, windows: Windows) -> Fit:
-    """The fit in windows of `Tuning.window_s`: simulated from what is measured, the path stays near the ship's own."""
+    """The fit in windows of `WINDOW_S`: simulated from what is measured, the path stays near the ship's own."""
     short = windows.cut_shorter(max(FEWEST_SAMPLES, round(WINDOW_S / windows.sample_s)))
     starts = initial_states(short, base.ship.states)
     try:

@@ -1,4 +1,4 @@
-"""Manoeuvre families, one file each; adding one is a file and a line."""
+"""Manoeuvre families, in one visible tuple; adding one is a function, a `Family` and its name here."""
 
 from expdesign.dictionary.families.motions import (
     ACCELERATION,

@@ -15,7 +15,7 @@ Dead times and lags of actuators that are not known exactly are estimated beside
 beforehand counts as one more measurement, and their errors are in the covariance.
 
 The method is Levenberg and Marquardt with exact derivatives. It starts from least squares with a short horizon, which
-grows by `TUNING.horizon_growth` until it is the requested one: a poor model diverges over a whole run, but not over few
+grows by `HORIZON_GROWTH` until it is the requested one: a poor model diverges over a whole run, but not over few
 samples. Where it still diverges, stretches in which it does are left out at first, or a horizon between the last two is
 taken. Of long data only some stretches are compared until then, and of fast ones only some samples. The weight of an
 output is the inverse residual variance of the stage before.

@@ -220,7 +220,7 @@ class Danger:
     """Least distances over a run."""
 
     # ahead_m, port_m, starboard_m: from the hull along straight lines to forbidden water, at most
-    # `Tuning.farthest_danger_m` [m]
+    # `FARTHEST_DANGER_M` [m]
     ahead_m: float
     port_m: float
     starboard_m: float

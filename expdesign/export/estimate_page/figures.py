@@ -60,7 +60,7 @@ def _draw_output(axes: Axes, output: str, checks: list[RunCheck], names: list[st
 
 
 def thinned(time: Array, values: Array) -> tuple[Array, Array]:
-    """About `Tuning.line_points` points at most, with the highest and the lowest of every stretch among them."""
+    """About `LINE_POINTS` points at most, with the highest and the lowest of every stretch among them."""
     stretch = -(-2 * len(values) // LINE_POINTS)
     if stretch < 3:
         return time, values

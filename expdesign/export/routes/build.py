@@ -71,9 +71,9 @@ def build_bridge_route(
 ) -> Route:
     """Few legs: one for each run, or a stop where runs stay in one place, and the legs between them.
 
-    Neighbouring waypoints are at least `Tuning.waypoint_spacing` ship lengths apart, unless the corridor would leave
+    Neighbouring waypoints are at least `WAYPOINT_SPACING` ship lengths apart, unless the corridor would leave
     the water. The track stays within the cross-track distances of each leg, to port and to starboard. Where the water
-    has room for it, they are `Tuning.corridor` ship lengths at least.
+    has room for it, they are `CORRIDOR` ship lengths at least.
 
     Args:
         track: the verified plan.

@@ -157,10 +157,10 @@ SIDES = np.stack([np.cos(angle := np.arange(BOUNDS.sides) * 2 * np.pi / BOUNDS.s
 class Track:
     """A run over ground from a reference: points that turn with the heading, and their drift, which does not."""
 
-    # (3 Tuning.track_samples, 2) ahead and to starboard: amidships, both ends included, then points ahead and astern of
+    # (3 TRACK_SAMPLES, 2) ahead and to starboard: amidships, both ends included, then points ahead and astern of
     # it that are also half the beam from the hull's sides
     water: Array
-    drift: Array  # (3 Tuning.track_samples, 2) north and east
+    drift: Array  # (3 TRACK_SAMPLES, 2) north and east
     hull_m: Array  # (24,) distances from the reference of the sides of a polygon that contains the track through water
 
     @property

@@ -72,7 +72,7 @@ def clearance_field(area: SeaArea, *, resolution_m: float) -> ClearanceField:
 
     Args:
         area: allowed water.
-        resolution_m: desired spacing; coarser where the area would need more than `Tuning.grid_cells`.
+        resolution_m: desired spacing; coarser where the area would need more than `GRID_CELLS`.
     """
     return _clearance_field(area.water, grid_cell_m(area, resolution_m))
 

@@ -63,7 +63,7 @@ def build_goal_distance(graph: VisibilityGraph, field: ClearanceField, goal: Arr
 
     Args:
         graph: of the water that centre lines may use.
-        field: its grid; thinned to `Tuning.table_cells`.
+        field: its grid; thinned to `TABLE_CELLS`.
         goal: position.
     """
     return _goal_distance(graph, field, (float(goal[0]), float(goal[1])))

@@ -35,7 +35,7 @@ Corners = tuple[tuple[float, int], ...]
 class Roadmap:
     """Water, and the lengths between places of it that are in sight of each other."""
 
-    water: shapely.MultiPolygon  # polygons (east, north), grown by `Tuning.slit_m`
+    water: shapely.MultiPolygon  # polygons (east, north), grown by `SLIT_M`
     # (n, 2) north/east of places where paths may bend: shores' corners that stick out into the water, ..
     corners: Array
     # (n, n) sparse distances between such places in sight of each other; not all need be there
@@ -124,7 +124,7 @@ class VisibilityGraph(Roadmap):
         """(k, n) whether a shortest path from a point (k, 2) may bend at a corner (n,), on to a place (n, 2).
 
         Such a path is taut: it turns towards the obstacle, which lies on one side of both its lines. Lines may miss
-        this by `Tuning.taut` of the water's size, as paths may touch the shore.
+        this by `TAUT` of the water's size, as paths may touch the shore.
         """
         place = self.corners[corners]
         directions = np.concatenate([ahead[:, None], self.beside[corners]], axis=1) - place[:, None]  # (n, 3, 2)
@@ -158,7 +158,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
 
 
 def opened(water: shapely.Geometry) -> shapely.MultiPolygon:
-    """Water grown by `Tuning.slit_m`, prepared for lines of sight, which may touch the shore."""
+    """Water grown by `SLIT_M`, prepared for lines of sight, which may touch the shore."""
     grown = as_multipolygon(shapely.buffer(as_multipolygon(water), SLIT_M, join_style="mitre"))
     shapely.prepare(grown)
     return grown

@@ -297,7 +297,7 @@ def nearest_turns(vessel: Vessel, inputs: Array, near: Array) -> Array:
 
 
 def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) -> Array:
-    """(j,) how far each centre may move to one side while its discs keep clear; bounded by `Tuning.corridor_hulls`."""
+    """(j,) how far each centre may move to one side while its discs keep clear; bounded by `CORRIDOR_HULLS`."""
     steps = np.arange(0.0, CORRIDOR_HULLS * water.vessel.length_m, water.field.cell_m)
     points = centre[:, None] + steps[:, None] * side[:, None, :]
     free = water.field.at(points) >= margin_m

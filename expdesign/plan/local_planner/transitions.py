@@ -137,7 +137,7 @@ class Transitions:
 def transitions(times: LegTimes, exit_mps: float, entry_mps: float, *, short: bool = True) -> Transitions:
     """The best legs between two speeds: for every turn and every direction to go, the one that loses least time.
 
-    Unless they may be `short` they are `Tuning.near_hulls` hull lengths long.
+    Unless they may be `short` they are `NEAR_HULLS` hull lengths long.
     """
     course, length, turn, seconds = _all_transitions(times, exit_mps, entry_mps, short)
     along = np.cos(course - DIRECTIONS[:, None, None, None]) * length / times.speed_mps

@@ -4,12 +4,12 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
 
 1. Each run is sailed open loop from the ship's true state.
 2. After it the ship rejoins the planned leg from where it is and follows it in closed loop. Where the leg is too short
-   for that, a ship that keeps station follows a parallel leg, as far beside it as `Tuning.parallel_share` of the start
+   for that, a ship that keeps station follows a parallel leg, as far beside it as `PARALLEL_SHARE` of the start
    tolerance of the position.
 3. At the planned start of the next run it begins the run if position, heading, speed and yaw rate are within
    `Tolerances`.
 4. Otherwise it goes around: by the shortest path in safe water to the beginning of a run-up, then up to the start
-   again, steady on the planned heading and speed; `Tuning.go_arounds` times at most. Then the trial is aborted.
+   again, steady on the planned heading and speed; `GO_AROUNDS` times at most. Then the trial is aborted.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The numbers of this room that are chosen, not derived."""
+"""Numbers of this package that are chosen, not derived, and that several modules read."""
 
 from __future__ import annotations
 

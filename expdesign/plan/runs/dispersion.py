@@ -69,7 +69,7 @@ def dispersion_m(
 def draws_for(confidence: float) -> int:
     """How many draws resolve what a share `confidence` of runs keeps to.
 
-    So many that `Tuning.expected_outside` are outside, or one where that takes many.
+    So many that `EXPECTED_OUTSIDE` are outside, or one where that takes many.
 
     Raises:
         NoPlan: the share is so high that it takes too many.

@@ -1,4 +1,4 @@
-"""The tuning constants of the verification of plans, in one place."""
+"""Tuning constants of the verification of plans that several modules read."""
 
 from __future__ import annotations
 
