@@ -19,6 +19,7 @@ from expdesign.simulation import CALM, Environment, deliver, measure, simulate, 
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import SCALAR, SENSORS, Mounting, Response, Sensors, Vessel, response_values, std_keys
 from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 from measured_trials import tug_commands
 
 WIND = Environment(wind_to=np.array([4.0, -3.0]))
@@ -42,6 +43,7 @@ FAULTS = {
     "axes of the log": ship(velocity_angle_rad=0.05),
     "scale and bias": ship(yaw_rate_scale=1.1, heading_bias_rad=0.1),
     "scale of the log": ship(velocity_scale=0.9, velocity_angle_rad=0.05, velocity=Mounting(forward_m=6.0)),
+    **{fault.key: ship(**{fault.key: fault.neutral + 5 * fault.matters}) for fault in GAINS_AND_OFFSETS},
     "late log": ship(velocity=Mounting(delay_s=2.0)),
     "late gyro": ship(yaw_rate=Mounting(delay_s=1.0), velocity=Mounting(forward_m=6.0)),
     "wind": ship(wind=replace(TIMED, forward_m=8.0, starboard_m=-1.0), heading=Mounting(delay_s=1.0)),
@@ -49,7 +51,7 @@ FAULTS = {
 HELD = ship(*LAG, velocity=TWICE, yaw_rate=Mounting(interval_s=2.0))
 ALL = ship(
     Response(rate=0.5, lag_s=3.0, delay_s=1.0), Response(rate=0.1, lag_s=2.0, deadband=0.3, offset=0.03),
-    heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1,
+    heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1, yaw_rate_bias_radps=0.01,
     position=Mounting(forward_m=5.0, starboard_m=-1.5, delay_s=1.0), heading=Mounting(delay_s=1.0),
     velocity=replace(TWICE, forward_m=6.0, starboard_m=2.0),
     yaw_rate=Mounting(delay_s=1.0), wind=replace(TIMED, forward_m=8.0),

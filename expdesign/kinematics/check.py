@@ -23,6 +23,7 @@ from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Mounting, Sensors, Vessel, VesselModel
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 
 DRIFTS = 0.2  # that distance of ships, at least, from which the drift is expected
 
@@ -31,8 +32,14 @@ SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velociti
            "wind": "winds"}  # fmt: skip
 
 
-SCALES = {"yaw_rate_scale": (2,), "velocity_scale": (0, 1), "surge_scale": (0,), "sway_scale": (1,)}
+SCALES = {
+    **{fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if fault.is_gain},
+    "surge_scale": (0,),
+    "sway_scale": (1,),
+}
 """Findings that are undone -> columns of the velocity that are divided by them."""
+OFFSETS = {fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if not fault.is_gain}
+"""Findings that are undone -> columns of the velocity that they are taken off."""
 LATE = "velocity_delay_s"
 """A finding that is undone where it is positive: then one instrument is late by two others."""
 OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m")[1:]
@@ -42,7 +49,7 @@ OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", 
 def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: bool = True) -> Record:
     """The record with held and interpolated signals read in time, and its doubts: what does not agree.
 
-    A scale or a delay that two other instruments show in all files together is undone.
+    A gain, an offset or a delay that two other instruments show in all files together is undone.
 
     Args:
         record: as measured.
@@ -74,25 +81,29 @@ def _what_is_done(item: Finding) -> str:
     """A sentence on what is undone of a finding; "" for nothing."""
     if item.name in SCALES:
         return " Here it is divided by that."
+    if item.name in OFFSETS:
+        return " Here that is taken off."
     return " Here they are moved to their own time." if item.name == LATE and item.value > 0 else ""
 
 
 def _undone(record: Record, found: Sequence[Finding], sensors: Sensors, *, smoothed: bool) -> Record:
-    """The record with measured velocities divided by the scales that were found, and at their own times."""
+    """The record with measured velocities without the gains and offsets that were found, and at their own times."""
     late = sum(item.value for item in found if item.name == LATE)
-    record = replace(record, batches=tuple(_divided(batch, found) for batch in record.batches))
+    record = replace(record, batches=tuple(_corrected(batch, found) for batch in record.batches))
     if not late:
         return record
     like = Sensors(heading_rad=sensors.heading_rad, velocity=Mounting(delay_s=late))
     return replace(record, batches=at_reference_point(record, like, smoothed=smoothed).batches)
 
 
-def _divided(batch: Batch, found: Sequence[Finding]) -> Batch:
-    factors = np.ones(3)
+def _corrected(batch: Batch, found: Sequence[Finding]) -> Batch:
+    gains, offsets = np.ones(3), np.zeros(3)
+    measured = [name not in batch.derived for name in OUTPUTS]
     for item in found:
-        for column in SCALES.get(item.name, ()):
-            factors[column] *= 1.0 if OUTPUTS[column] in batch.derived else item.value
-    return batch if (factors == 1.0).all() else replace(batch, velocity=batch.velocity / factors)
+        gains[[column for column in SCALES.get(item.name, ()) if measured[column]]] *= item.value
+        offsets[[column for column in OFFSETS.get(item.name, ()) if measured[column]]] += item.value
+    same = (gains == 1.0).all() and not offsets.any()
+    return batch if same else replace(batch, velocity=(batch.velocity - offsets) / gains)
 
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:

@@ -79,7 +79,7 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
         yield Finding(
             name="yaw_rate_bias_radps", value=bias, std=std, rest=found.rest,
             text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of "
-            "a gyro?",
+            f"a gyro? Where the heading is right, add {bias:.4g} to sensors.yaw_rate_bias_radps.",
         )  # fmt: skip
     delay, std = -float(found.others[1].real), float(found.others_std[1, 0])
     if abs(delay) > max(CERTAIN * std, DELAY_MATTERS * own[0].sample_time_s):

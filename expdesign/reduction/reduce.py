@@ -20,7 +20,7 @@ from expdesign.simulation import acting_response, deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, RATE_UNITS, Mounting, Response, Sensors, Vessel, VesselModel, column_name, stem
-from expdesign.vessel.sensors import NOISE
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS, NOISE, PLACED
 
 # Remarks on what was undone of the sensors of a batch, and what could not be.
 
@@ -40,15 +40,14 @@ def remarks(stated: Stated) -> Iterator[str]:
         yield f"{STATED}{sensors.heading_bias_rad:.4g} rad is taken off the headings."
     if "velocity" in signals and sensors.velocity_angle_rad:
         yield from _along_axes(stated)
-    if "velocity" in signals and sensors.velocity_scale != 1.0:
-        yield f"{STATED}surge and sway speed are divided by {sensors.velocity_scale:.4g}."
-    if "yaw_rate" in signals and sensors.yaw_rate_scale != 1.0:
-        yield f"{STATED}the yaw rate is divided by {sensors.yaw_rate_scale:.4g}."
+    for fault in GAINS_AND_OFFSETS:
+        value = getattr(sensors, fault.key)
+        if fault.sensor in signals and value != fault.neutral:
+            yield f"{STATED}{fault.undone(value)}."
     if "wind" in signals and (shrunk := shrinkage(sensors)) < 1.0:
         yield f"{STATED}noise on the vane's angle shrinks the wind to {shrunk:.4g}; it is divided by that."
 
 
-PLACED = ("position", "velocity", "wind")
 WORDS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
          "wind": "winds"}  # fmt: skip
 

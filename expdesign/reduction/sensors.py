@@ -205,11 +205,13 @@ def _velocity(stated: Stated, pose: Array | None) -> tuple[Array, Array]:
     batch, sensors = stated.batch, stated.sensors
     derived = _derived(stated, pose)
     r, r_read = stated.in_time("yaw_rate", batch.velocity[:, 2:])
-    r = r / sensors.yaw_rate_scale
+    gain, offset = sensors.faults("r")
+    r = (r - offset) / gain
     if "r" in batch.derived:
         r, r_read = derived[:, 2:], np.ones(len(batch), dtype=bool)
     uv, uv_read = stated.in_time("velocity", batch.velocity[:, :2])
-    uv = uv / sensors.velocity_scale
+    gains, offsets = np.transpose([sensors.faults("u"), sensors.faults("v")])
+    uv = (uv - offsets) / gains
     if measured(uv[:, 0]) and measured(uv[:, 1]):
         uv = turned(uv, np.full(len(uv), sensors.velocity_angle_rad))
     uv = _at_centre(uv, sensors.velocity, r[:, 0])

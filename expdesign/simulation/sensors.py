@@ -37,8 +37,8 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
     """Measurements of a motion.
 
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
-        u = scale (u - r starboard)     v = scale (v + r forward), along axes turned from the ship's by an angle
-        r = scale r, by a scale of its own
+        u = u - r starboard     v = v + r forward     along axes turned from the ship's by an angle
+        of u, v and r: gain * true + offset (`GAINS_AND_OFFSETS`)
         (u_q, v_q) likewise for the place of the wind sensor
 
     all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
@@ -83,16 +83,19 @@ def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
     u, v = _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
-    if sensors.velocity_scale != 1.0:
-        u, v = sensors.velocity_scale * u, sensors.velocity_scale * v
-    if not sensors.velocity_angle_rad:
-        return u, v
-    c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)
-    return c * u + s * v, c * v - s * u
+    if sensors.velocity_angle_rad:
+        c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)
+        u, v = c * u + s * v, c * v - s * u
+    return _shown(sensors, "u", u), _shown(sensors, "v", v)
 
 
 def _yaw_rate(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    return (states[:, 5] if sensors.yaw_rate_scale == 1.0 else sensors.yaw_rate_scale * states[:, 5],)
+    return (_shown(sensors, "r", states[:, 5]),)
+
+
+def _shown(sensors: Sensors, signal: str, true: Array) -> Array:
+    gain, offset = sensors.faults(signal)
+    return true if (gain, offset) == (1.0, 0.0) else gain * true + offset
 
 
 def _wind(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:

@@ -8,8 +8,16 @@ from dataclasses import dataclass
 from expdesign.errors import InputError, UnknownName
 
 WIND_SENSORS = ("cartesian", "vane")
-SENSORS = ("position", "heading", "velocity", "yaw_rate", "wind")
-"""Measured quantities; each has a `Mounting`."""
+SENSORS = {
+    "position": "the positions",
+    "heading": "the headings",
+    "velocity": "surge and sway speed",
+    "yaw_rate": "the yaw rate",
+    "wind": "the wind",
+}
+"""Sensor -> what it measures; each has a `Mounting`."""
+PLACED = ("position", "velocity", "wind")
+"""Sensors that measure something else at another place of the ship."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,20 +38,95 @@ class Mounting:
                 raise InputError(f"mounting.{name} is {value:g}, expected a finite number, not negative for times")
 
 
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """A gain or an offset of what a sensor shows of a velocity: gain * true, or true + offset.
+
+    Its row in `GAINS_AND_OFFSETS` and its field in `Sensors` are all that a fault needs. Vessel files state it,
+    simulations have it, reductions of records undo it, a diagnosis looks for it, foresight asks whether it would be
+    found, and `explain` describes it.
+    """
+
+    key: str  # field of `Sensors`, key in vessel files, and effect of a diagnosis, which is the value less `neutral`
+    sensor: str  # one of `SENSORS`
+    signals: tuple[str, ...]  # of u, v and r: what it acts on
+    neutral: float  # value without the fault: 1 for a gain, 0 for an offset
+    unit: str = ""
+    possible: float  # farthest from `neutral` that a sensor can be
+    matters: float  # distance from `neutral` that matters, for foresight
+    what: str  # it acts on, in words
+    cause: str  # name in diagnoses
+    title: str  # of the cause
+    summary: str  # of the cause
+    explained: str  # a sentence with {} for the size: a gain in per cent, an offset in its unit
+    unseen: str  # when records cannot show it
+
+    @property
+    def is_gain(self) -> bool:
+        """Whether it multiplies."""
+        return self.neutral == 1.0
+
+    def undone(self, value: float) -> str:
+        """What a reduction does about it."""
+        if self.is_gain:
+            return f"the {self.what} {'is' if len(self.signals) == 1 else 'are'} divided by {value:.4g}"
+        return f"{value:.4g} {self.unit} is taken off the {self.what}"
+
+    @property
+    def words(self) -> str:
+        """What the number is."""
+        unit, ones = f" [{self.unit}]" if self.unit else "", "one" if len(self.signals) == 1 else "ones"
+        return f"the measured {self.what} {'over' if self.is_gain else 'less'} the true {ones}{unit}"
+
+
+GAINS_AND_OFFSETS = (
+    Fault(
+        key="velocity_scale", sensor="velocity", signals=("u", "v"), neutral=1.0, possible=0.5, matters=0.05,
+        what="surge and sway speed",
+        cause="log_scale", title="Scale error of the log",
+        summary="a log with a wrong scale, where no positions tell it",
+        explained="The log has a scale error. It shows {} % of the speed that inputs and turns show.",
+        unseen="surge and sway are not measured by a log, or positions beside them tell its scale without a model",
+    ),
+    Fault(
+        key="yaw_rate_scale", sensor="yaw_rate", signals=("r",), neutral=1.0, possible=0.5, matters=0.05,
+        what="yaw rate",
+        cause="gyro_scale", title="Scale error of the rate gyro",
+        summary="a rate gyro with a wrong scale, by heading and motion",
+        explained="The yaw rate sensor has a scale error. It shows {} % of the yaw rate that heading and motion show.",
+        unseen="no yaw rate is measured",
+    ),
+    Fault(
+        key="yaw_rate_bias_radps", sensor="yaw_rate", signals=("r",), neutral=0.0, unit="rad/s", possible=0.2,
+        matters=0.002, what="yaw rate",
+        cause="gyro_bias", title="Bias of the rate gyro",
+        summary="a rate gyro that shows a turn when the heading stands still",
+        explained="The yaw rate sensor shows {} rad/s more than heading and motion do: its zero is wrong.",
+        unseen="no yaw rate is measured",
+    ),
+)  # fmt: skip
+"""Of a velocity sensor, along its own axes, and of a gyro."""
+
 FAULTS = (
     "heading_bias_rad",
     "velocity_angle_rad",
-    "velocity_scale",
-    "yaw_rate_scale",
-    *(f"{name}_{axis}_m" for name in ("position", "velocity", "wind") for axis in ("forward", "starboard")),
+    *(fault.key for fault in GAINS_AND_OFFSETS),
+    *(f"{name}_{axis}_m" for name in PLACED for axis in ("forward", "starboard")),
     *(f"{name}_delay_s" for name in SENSORS),
 )
 """Errors of sensors that a diagnosis estimates, as vessel files call them."""
-NOISE = (
-    "position_m", "heading_rad", "velocity_mps", "yaw_rate_radps", "wind_mps", "wind_angle_rad", "roll_rad",
-    "roll_rate_radps", "acceleration_mps2",
-)  # fmt: skip
-"""Standard deviations, as vessel files call them."""
+NOISE = {
+    "position_m": "positions [m]",
+    "heading_rad": "headings [rad]",
+    "velocity_mps": "surge and sway speed [m/s]",
+    "yaw_rate_radps": "yaw rate [rad/s]",
+    "wind_mps": "wind speed, or of each component [m/s]",
+    "wind_angle_rad": "a vane's angle [rad]",
+    "roll_rad": "roll angles [rad]",
+    "roll_rate_radps": "roll rates [rad/s]",
+    "acceleration_mps2": "sway and lateral accelerations [m/s2]",
+}
+"""Standard deviation, as vessel files call it -> what it is of."""
 CENTRAL = Mounting()
 """At the origin of the b-frame, at once, every sample."""
 
@@ -66,8 +149,10 @@ class Sensors:
     heading_bias_rad: float = 0.0  # measured heading less true heading
     # from the bow to the velocity sensor's own forward axis, clockwise; it measures along that
     velocity_angle_rad: float = 0.0
-    velocity_scale: float = 1.0  # measured surge and sway over true ones
-    yaw_rate_scale: float = 1.0  # measured yaw rate over true yaw rate
+    # gains and offsets, see `GAINS_AND_OFFSETS`
+    velocity_scale: float = 1.0
+    yaw_rate_scale: float = 1.0
+    yaw_rate_bias_radps: float = 0.0
     # "cartesian" measures the components of the relative wind, "vane" its speed and angle
     wind_sensor: str = "cartesian"
     # position, heading, velocity, yaw_rate, wind: where, how late and how often each is measured
@@ -85,11 +170,19 @@ class Sensors:
         for name in ("heading_bias_rad", "velocity_angle_rad"):
             if not math.isfinite(getattr(self, name)):
                 raise InputError(f"sensors.{name} is {getattr(self, name):g}, expected a finite angle")
-        for name in ("velocity_scale", "yaw_rate_scale"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InputError(f"sensors.{name} is {getattr(self, name):g}, expected more than 0")
+        for fault in GAINS_AND_OFFSETS:
+            value = getattr(self, fault.key)
+            if not math.isfinite(value) or (fault.is_gain and not value > 0):
+                expected = "more than 0" if fault.is_gain else "a finite number"
+                raise InputError(f"sensors.{fault.key} is {value:g}, expected {expected}")
         if self.wind_sensor not in WIND_SENSORS:
             raise UnknownName("wind sensor", self.wind_sensor, known=WIND_SENSORS)
+
+    def faults(self, signal: str) -> tuple[float, float]:
+        """Gain and offset with which u, v or r is shown: gain * true + offset."""
+        own = [(getattr(self, fault.key), fault) for fault in GAINS_AND_OFFSETS if signal in fault.signals]
+        gain = math.prod(value for value, fault in own if fault.is_gain)
+        return gain, sum(value for value, fault in own if not fault.is_gain)
 
 
 EXACT = Sensors()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, create_model
 
 from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.scenario.vessels.pendulum_table import PendulumTable
-from expdesign.vessel import STRUCTURES, Environment, Variation
+from expdesign.vessel import KINDS, RATE_UNITS, SENSORS, STRUCTURES, Environment, Variation, limit_keys, response_keys
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS, NOISE, PLACED
 
 # `[environment]` of scenario and vessel files: expected current and wind.
 
@@ -115,96 +116,68 @@ class ActuatorTable(Table):
     )
 
 
-class PropellerTable(ActuatorTable):
-    """A tunnel thruster or a propeller on a fixed shaft."""
-
-    speed_min_rps: Number = Field(description="the lowest propeller speed [rps], negative for astern")
-    speed_max_rps: Number = Field(description="the highest propeller speed [rps]")
-    speed_rate_rps2: Positive | None = Field(
-        default=None,
-        description="the slew rate at which the speed follows orders [rps per second]; no limit when not given",
-    )
-    speed_lag_s: NonNegative = Field(
-        default=0.0, description="the time constant with which the propeller speed follows [s]"
-    )
-    speed_delay_s: NonNegative = Field(default=0.0, description="the dead time of the propeller speed [s]")
-    speed_deadband_rps: NonNegative = Field(
-        default=0.0, description="the dead band: smaller commanded speeds have no effect [rps]"
-    )
+SIGNALS: dict[str, tuple[str, Any, str]] = {
+    "n": ("the propeller speed", Number, " [rps], negative for astern"),
+    "a": ("the angle", TwoTurns, " [rad], positive to starboard"),
+    "rudder": ("the rudder angle", HalfTurn, " [rad], positive to starboard"),
+    "tau_x": ("tau_x", Number, ", the surge force in the model's unit"),
+    "tau_y": ("tau_y", Number, ", the sway force in the model's unit"),
+    "tau_psi": ("tau_psi", Number, ", the yaw moment in the model's unit"),
+}
+"""Signal stem -> words, type and unit of its limits."""
 
 
-class AzimuthTable(PropellerTable):
-    """An azimuth thruster; without angle limits it turns freely."""
+def _signal_keys(stem: str, *, free: bool) -> dict[str, Any]:
+    """Fields of the table of an actuator for one of its signals: limits, and what `Response` holds.
 
-    angle_min_rad: TwoTurns | None = Field(
-        default=None, description="the lowest angle [rad], positive to starboard; it turns freely when not given"
-    )
-    angle_max_rad: TwoTurns | None = Field(default=None, description="the highest angle [rad]; free when not given")
-    angle_rate_radps: Positive | None = Field(
-        default=None, description="the slew rate at which the angle follows orders [rad/s]; no limit when not given"
-    )
-    angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
-    angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
-    angle_deadband_rad: NonNegative = Field(
-        default=0.0, description="the dead band: smaller commanded angles have no effect [rad]"
-    )
-    angle_offset_rad: HalfTurn = Field(
-        default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
-    )
-
-
-class PoddedTable(AzimuthTable):
-    """A podded drive: an azimuth thruster with angle limits."""
-
-    angle_min_rad: TwoTurns = Field(description="the lowest angle [rad]")
-    angle_max_rad: TwoTurns = Field(description="the highest angle [rad]")
-
-
-class RudderTable(ActuatorTable):
-    """A rudder."""
-
-    angle_min_rad: HalfTurn = Field(description="the lowest rudder angle [rad]")
-    angle_max_rad: HalfTurn = Field(description="the highest rudder angle [rad]")
-    angle_rate_radps: Positive | None = Field(
-        default=None, description="the slew rate at which the angle follows orders [rad/s]; no limit when not given"
-    )
-    angle_lag_s: NonNegative = Field(default=0.0, description="the time constant with which the angle follows [s]")
-    angle_delay_s: NonNegative = Field(default=0.0, description="the dead time of the angle [s]")
-    angle_deadband_rad: NonNegative = Field(
-        default=0.0, description="the dead band: smaller commanded angles have no effect [rad]"
-    )
-    angle_offset_rad: HalfTurn = Field(
-        default=0.0, description="the misalignment [rad]: the true angle less the commanded one"
-    )
+    Args:
+        stem: of the signal.
+        free: whether it may do without limits.
+    """
+    words, limit, unit = SIGNALS[stem]
+    name, key = words.removeprefix("the "), response_keys(stem)
+    per = {"rps2": "rps per second", "radps": "rad/s", "": "per second"}[RATE_UNITS[stem]]
+    kind, default, or_free = (limit | None, None, "; it turns freely when not given") if free else (limit, ..., "")
+    rows: dict[str, tuple[Any, Any, str]] = {
+        low_or_high: (kind, default, f"the {which} {name}{unit}{or_free}")
+        for low_or_high, which in zip(limit_keys(stem), ("lowest", "highest"), strict=True)
+    }
+    rows |= {
+        key["rate"]: (
+            Positive | None, None, f"the slew rate at which {words} follows orders [{per}]; no limit when not given"
+        ),
+        key["lag_s"]: (NonNegative, 0.0, f"the time constant with which {words} follows [s]"),
+        key["delay_s"]: (NonNegative, 0.0, f"the dead time of {words} [s]"),
+        key["deadband"]: (
+            NonNegative, 0.0, f"the dead band: a smaller {name} ordered has no effect{unit.split(',')[0]}"
+        ),
+    }  # fmt: skip
+    if stem in ("a", "rudder"):
+        rows[key["offset"]] = HalfTurn, 0.0, "the misalignment [rad]: the true angle less the commanded one"
+    return {name: (kind, Field(default=default, description=text)) for name, (kind, default, text) in rows.items()}
 
 
-class ForceTable(ActuatorTable):
-    """Generalised forces, in the model's own unit."""
+def _actuator_table(name: str, words: str, stems: tuple[str, ...], *, free: bool = False) -> type[ActuatorTable]:
+    """The table of a kind of actuator; its angle may be free."""
+    keys = {key: field for stem in stems for key, field in _signal_keys(stem, free=free and stem == "a").items()}
+    return create_model(name, __base__=ActuatorTable, __doc__=words, **keys)
 
-    x_min: Number = Field(description="the lowest tau_x, the surge force in the model's unit")
-    x_max: Number = Field(description="the highest tau_x")
-    x_rate: Positive | None = Field(
-        default=None, description="the slew rate of tau_x [per second]; no limit when not given"
-    )
-    x_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_x follows [s]")
-    x_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_x [s]")
-    x_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_x have no effect")
-    y_min: Number = Field(description="the lowest tau_y, the sway force in the model's unit")
-    y_max: Number = Field(description="the highest tau_y")
-    y_rate: Positive | None = Field(
-        default=None, description="the slew rate of tau_y [per second]; no limit when not given"
-    )
-    y_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_y follows [s]")
-    y_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_y [s]")
-    y_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_y have no effect")
-    psi_min: Number = Field(description="the lowest tau_psi, the yaw moment in the model's unit")
-    psi_max: Number = Field(description="the highest tau_psi")
-    psi_rate: Positive | None = Field(
-        default=None, description="the slew rate of tau_psi [per second]; no limit when not given"
-    )
-    psi_lag_s: NonNegative = Field(default=0.0, description="the time constant with which tau_psi follows [s]")
-    psi_delay_s: NonNegative = Field(default=0.0, description="the dead time of tau_psi [s]")
-    psi_deadband: NonNegative = Field(default=0.0, description="the dead band: smaller tau_psi have no effect")
+
+_PROPELLER = _actuator_table("PropellerTable", "A tunnel thruster or a propeller on a fixed shaft.", KINDS["tunnel"])
+ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
+    "azimuth": _actuator_table(
+        "AzimuthTable", "An azimuth thruster; without angle limits it turns freely.", KINDS["azimuth"], free=True
+    ),
+    "tunnel": _PROPELLER,
+    "propeller": _PROPELLER,
+    "rudder": _actuator_table("RudderTable", "A rudder.", KINDS["rudder"]),
+    "force": _actuator_table("ForceTable", "Generalised forces, in the model's own unit.", KINDS["force"]),
+    "podded": _actuator_table("PoddedTable", "A podded drive: an azimuth thruster with limits.", KINDS["azimuth"]),
+}
+"""Kind of actuator -> its table."""
+
+SAME_AS = {"podded": "azimuth"}
+"""Kind in a file -> the kind it is a case of."""
 
 
 class TermTable(Table):
@@ -284,75 +257,36 @@ class ModelTable(Table):
     )
 
 
-class SensorsTable(Table):
-    """`[sensors]`: standard deviations per sample, faults, and by sensor its place, delay and interval."""
+def _sensor_keys() -> dict[str, Any]:
+    """Fields of `[sensors]`: noise, axes, gains and offsets, and by sensor its place, delay and interval."""
+    rows: dict[str, tuple[Any, Any, str]] = {
+        key: (NonNegative, 0.0, f"the standard deviation of {of}") for key, of in NOISE.items()
+    }
+    axis = "the angle from the bow to the velocity sensor's forward axis [rad], clockwise"
+    rows |= {
+        "heading_bias_rad": (HalfTurn, 0.0, "the measured heading less the true one [rad]"),
+        "velocity_angle_rad": (HalfTurn, 0.0, axis),
+    }
+    rows |= {
+        fault.key: (Positive if fault.is_gain else Number, fault.neutral, fault.words) for fault in GAINS_AND_OFFSETS
+    }
+    wind = "the kind of wind sensor: components of the relative wind, or its speed and angle"
+    rows["wind_sensor"] = Literal["cartesian", "vane"], "cartesian", wind
+    for sensor, words in SENSORS.items():
+        if sensor in PLACED:
+            place = f"the place of the sensor of {words}"
+            rows[f"{sensor}_forward_m"] = Number, 0.0, f"{place} forward of amidships [m]"
+            rows[f"{sensor}_starboard_m"] = Number, 0.0, f"{place} to starboard of the centre line [m]"
+        rows[f"{sensor}_delay_s"] = NonNegative, 0.0, f"the delay of {words} [s]"
+        between = f"the time between new readings of {words} [s], or 0 for every sample"
+        rows[f"{sensor}_interval_s"] = NonNegative, 0.0, between
+    return {key: (kind, Field(default=default, description=text)) for key, (kind, default, text) in rows.items()}
 
-    position_m: NonNegative = Field(default=0.0, description="the standard deviation of positions [m]")
-    heading_rad: NonNegative = Field(default=0.0, description="the standard deviation of headings [rad]")
-    velocity_mps: NonNegative = Field(default=0.0, description="the standard deviation of surge and sway speed [m/s]")
-    yaw_rate_radps: NonNegative = Field(default=0.0, description="the standard deviation of yaw rate [rad/s]")
-    wind_mps: NonNegative = Field(
-        default=0.0, description="the standard deviation of wind speed, or of each component [m/s]"
-    )
-    wind_angle_rad: NonNegative = Field(default=0.0, description="the standard deviation of a vane's angle [rad]")
-    roll_rad: NonNegative = Field(default=0.0, description="the standard deviation of roll angles [rad]")
-    roll_rate_radps: NonNegative = Field(default=0.0, description="the standard deviation of roll rates [rad/s]")
-    acceleration_mps2: NonNegative = Field(
-        default=0.0, description="the standard deviation of sway and lateral accelerations [m/s2]"
-    )
-    heading_bias_rad: HalfTurn = Field(default=0.0, description="the measured heading less the true one [rad]")
-    velocity_angle_rad: HalfTurn = Field(
-        default=0.0, description="the angle from the bow to the velocity sensor's forward axis [rad], clockwise"
-    )
-    velocity_scale: Positive = Field(default=1.0, description="the measured surge and sway speed over the true ones")
-    yaw_rate_scale: Positive = Field(default=1.0, description="the measured yaw rate over the true one")
-    wind_sensor: Literal["cartesian", "vane"] = Field(
-        default="cartesian",
-        description="the kind of wind sensor: components of the relative wind, or its speed and angle",
-    )
-    position_forward_m: Number = Field(
-        default=0.0, description="the place of the sensor of the positions forward of amidships [m]"
-    )
-    position_starboard_m: Number = Field(
-        default=0.0, description="the place of the sensor of the positions to starboard of the centre line [m]"
-    )
-    position_delay_s: NonNegative = Field(default=0.0, description="the delay of the positions [s]")
-    position_interval_s: NonNegative = Field(
-        default=0.0,
-        description="the time between new readings of the positions [s], or 0 for every sample",
-    )
-    heading_delay_s: NonNegative = Field(default=0.0, description="the delay of the headings [s]")
-    heading_interval_s: NonNegative = Field(
-        default=0.0,
-        description="the time between new readings of the headings [s], or 0 for every sample",
-    )
-    velocity_forward_m: Number = Field(
-        default=0.0, description="the place of the sensor of surge and sway speed forward of amidships [m]"
-    )
-    velocity_starboard_m: Number = Field(
-        default=0.0, description="the place of the sensor of surge and sway speed to starboard of the centre line [m]"
-    )
-    velocity_delay_s: NonNegative = Field(default=0.0, description="the delay of surge and sway speed [s]")
-    velocity_interval_s: NonNegative = Field(
-        default=0.0,
-        description="the time between new readings of surge and sway speed [s], or 0 for every sample",
-    )
-    yaw_rate_delay_s: NonNegative = Field(default=0.0, description="the delay of the yaw rate [s]")
-    yaw_rate_interval_s: NonNegative = Field(
-        default=0.0,
-        description="the time between new readings of the yaw rate [s], or 0 for every sample",
-    )
-    wind_forward_m: Number = Field(
-        default=0.0, description="the place of the sensor of the wind forward of amidships [m]"
-    )
-    wind_starboard_m: Number = Field(
-        default=0.0, description="the place of the sensor of the wind to starboard of the centre line [m]"
-    )
-    wind_delay_s: NonNegative = Field(default=0.0, description="the delay of the wind [s]")
-    wind_interval_s: NonNegative = Field(
-        default=0.0,
-        description="the time between new readings of the wind [s], or 0 for every sample",
-    )
+
+if TYPE_CHECKING:
+    SensorsTable = Table
+else:
+    SensorsTable = create_model("SensorsTable", __base__=Table, __doc__="`[sensors]`.", **_sensor_keys())
 
 
 class VesselTable(Table):
@@ -379,17 +313,3 @@ class VesselTable(Table):
     environment: EnvironmentTable | None = Field(
         default=None, description="the weather that simulations of this vessel meet and a diagnosis found"
     )
-
-
-ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
-    "azimuth": AzimuthTable,
-    "tunnel": PropellerTable,
-    "propeller": PropellerTable,
-    "rudder": RudderTable,
-    "force": ForceTable,
-    "podded": PoddedTable,
-}
-"""Kind of actuator -> its table."""
-
-SAME_AS = {"podded": "azimuth"}
-"""Kind in a file -> the kind it is a case of."""
