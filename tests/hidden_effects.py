@@ -282,7 +282,8 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
     """What the instruments record, (n, b, k) by column name.
 
     Faults: heading_bias (v_meas = v + u sin(bias)), lever_m (antenna and velocity sensor this far forward of the
-    origin: v_meas = v + lever r), gyro (r_meas = (1 + gyro) r), late_u, late_v, late_r (seconds).
+    origin: v_meas = v + lever r), gyro and gyro_bias (r_meas = (1 + gyro) r + gyro_bias), late_u,
+    late_v, late_r (seconds).
     """
 
     def of(name: str) -> np.ndarray:
@@ -303,7 +304,7 @@ def measure(true: dict[str, np.ndarray], step_s: float, sensors: Sensors, rng: n
         "heading_rad": noisy(heading, sensors.heading),
         "u_mps": noisy(u, sensors.velocity),
         "v_mps": noisy(v, sensors.velocity),
-        "r_radps": noisy(late((1 + of("gyro")) * r, of("late_r"), step_s), sensors.yaw_rate),
+        "r_radps": noisy(late((1 + of("gyro")) * r + of("gyro_bias"), of("late_r"), step_s), sensors.yaw_rate),
         "wind_u_mps": noisy(true["u_q"], sensors.wind),
         "wind_v_mps": noisy(true["v_q"], sensors.wind),
     }

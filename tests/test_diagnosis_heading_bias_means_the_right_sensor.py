@@ -20,6 +20,7 @@ from expdesign.records import load_records
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, measure, simulate
 from expdesign.vessel import Mounting, Sensors
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 
 BIAS = 0.06
 SHIP = vessel_of("barge")
@@ -95,8 +96,9 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
     place = "position" if pose_only else "velocity"
     effects = {
         "heading_bias": 0.04, "lever:forward": 2.0, "lever:starboard": -1.0, "late:psi": 0.5, "current:north": 0.2,
-        "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"gyro": -0.05, "log": 0.1, "late:r": 0.7}),
+        "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"late:r": 0.7}),
     }  # fmt: skip
+    effects |= {} if pose_only else {fault.effect: -fault.matters for fault in GAINS_AND_OFFSETS}
     driven = SHIP.model.inputs[0]
     effects |= {f"{kind}:{driven}": value for kind, value in {"offset": 0.03, "lag": 2.0, "delay": 1.0}.items()}
     found = extended_model(SHIP, record).with_effects(effects)
@@ -107,7 +109,8 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
         "heading_bias": sensors.heading_bias_rad if pose_only else sensors.velocity_angle_rad,
         "lever:forward": getattr(sensors, place).forward_m, "lever:starboard": getattr(sensors, place).starboard_m,
         "late:psi": sensors.heading.delay_s, "late:position": sensors.position.delay_s,
-        "late:r": sensors.yaw_rate.delay_s, "gyro": sensors.yaw_rate_scale, "log": sensors.velocity_scale,
+        "late:r": sensors.yaw_rate.delay_s,
+        **{fault.effect: getattr(sensors, fault.key) for fault in GAINS_AND_OFFSETS},
         "current:north": ship.environment.current_to[0], "current:east": ship.environment.current_to[1],
         f"offset:{driven}": response.offset, f"lag:{driven}": response.lag_s,
         f"delay:{driven}": response.delay_s,

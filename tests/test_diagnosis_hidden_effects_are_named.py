@@ -19,13 +19,14 @@ CASES = (
     ("barge", "heading_bias", {}, {"heading_bias": 0.04}, "velocity_angle_rad", -0.04),
     ("barge", "lever_arm", {}, {"lever_m": 3.0}, "forward_m", 3.0),
     ("barge", "gyro_scale", {}, {"gyro": 0.08}, "factor", 1.08),
+    ("barge", "gyro_bias", {}, {"gyro_bias": -0.004}, "yaw_rate_bias_radps", -0.004),
     ("barge", "sensor_delay", {}, {"late_v": 2.0}, "v_delay_s", 2.0),
     ("tug", "thruster_asymmetry", {"angle_offset": 0.06}, {}, "angle_offset_a_rad", 0.06),
     ("coaster", "actuator_scale", {"rudder_scale": -0.1}, {}, "angle_factor_rudder", 0.9),
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
     ("barge", "missing_term:N_rrr", {"N_rrr": -60.0}, {}, "N_rrr", -60.0),
 )
-DEFAULT = (0, 7, 12, 13)
+DEFAULT = (0, 7, 10, 13, 14)
 """Tried in every run of the tests; the others take minutes."""
 
 

@@ -104,7 +104,7 @@ BY_FORCE = {
 }  # fmt: skip
 BY_ERROR = {
     "lag:n": "time since", "delay:all": "time since", "inertia:v": "rate of change of v", "late:psi": "r [",
-    "late:r": "rate of change of r", "gyro": "r [", "lever:forward": "r [", "heading_bias": "u [",
+    "late:r": "rate of change of r", "gyro": "r [", "gyro_bias": "r [", "lever:forward": "r [", "heading_bias": "u [",
     "current:north": "heading", "roll:sway": "time [min]", "change:time": "time [min]",
 }  # fmt: skip
 

@@ -23,7 +23,7 @@ from expdesign.signals import Record
 from expdesign.vessel import Mounting, Response, Vessel
 
 EVERYTHING = {"current:north", "current:east", "lag:n", "delay:a", "deadband:a", "offset:a", "heading_bias", "gyro",
-              "lever:forward", "late:r"}  # fmt: skip
+              "gyro_bias", "lever:forward", "late:r"}  # fmt: skip
 
 
 def in_current(ship: str, north: float, east: float) -> Vessel:
@@ -38,6 +38,7 @@ def stating_everything() -> Vessel:
     actuators = tuple(replace(one, responses=responses) for one in vessel.model.actuators)
     sensors = replace(
         vessel.sensors, velocity=Mounting(forward_m=2.0), velocity_angle_rad=-0.02, yaw_rate_scale=1.04,
+        yaw_rate_bias_radps=0.003,
         yaw_rate=replace(vessel.sensors.yaw_rate, delay_s=1.0),
     )  # fmt: skip
     return replace(vessel, model=replace(vessel.model, actuators=actuators), sensors=sensors)

@@ -12,7 +12,7 @@ import numpy as np
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit
-from expdesign.diagnosis.model import ROLL, ExtendedModel
+from expdesign.diagnosis.model import ACTUATORS, ROLL, ExtendedModel, acts_on
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
 from expdesign.diagnosis.select import candidate_disturbances
 from expdesign.diagnosis.vessel_file import public_name
@@ -92,8 +92,8 @@ def usual_roll_period(ship: ExtendedModel) -> float:
 
 def _is_one_of_a_kind(key: str, ship: ExtendedModel) -> bool:
     """A fault of one actuator of several of the same kind."""
-    kind, _, group = key.partition(":")
-    if kind not in ("slew", "lag", "delay", "deadband", "offset", "scale") or group not in ship.model.inputs:
+    group = key.partition(":")[2]
+    if not acts_on(key, ACTUATORS) or group not in ship.model.inputs:
         return False
     return sum(stem(name) == stem(group) for name in ship.model.inputs) > 1
 

@@ -36,7 +36,7 @@ from expdesign.foresight.power import (
     share_shown,
 )
 from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
-from expdesign.foresight.trial import UNSEEN, Background, TrialRun, background
+from expdesign.foresight.trial import Background, TrialRun, background
 from expdesign.foresight.values import WANTED_POWER, Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.simulation import Environment
@@ -85,9 +85,7 @@ def foresee(
     return Foresight(
         effects=found,
         unseen=tuple(
-            (cause.name, UNSEEN.get(cause.name, "it is in the model already"))
-            for cause in CAUSES
-            if cause.name not in names
+            (cause.name, cause.unseen or "it is in the model already") for cause in CAUSES if cause.name not in names
         ),
         duration_s=known.windows.duration_s,
         wanted_power=WANTED_POWER,

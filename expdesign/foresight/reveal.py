@@ -28,7 +28,7 @@ from expdesign.foresight.effects import HiddenEffect, described, hidden_effects
 from expdesign.foresight.foresee import effect_name, sizes_of
 from expdesign.foresight.information import allowed_by_prior, beside_nuisance
 from expdesign.foresight.power import freedom_of, level_of, needed_noncentrality
-from expdesign.foresight.trial import UNSEEN, Background, background, design_runs
+from expdesign.foresight.trial import Background, background, design_runs
 from expdesign.foresight.values import WANTED_POWER
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import Environment
@@ -134,7 +134,8 @@ def wanted(
     hidden = hidden_effects([test.candidate for test in tests], known.base, known.windows)
     for cause in causes:
         if not any(item.cause == cause for item in hidden):
-            why = UNSEEN.get(cause, "nothing that differs from the model and its uncertain parameters shows it")
+            why = {one.name: one.unseen for one in CAUSES}.get(cause)
+            why = why or "nothing that differs from the model and its uncertain parameters shows it"
             raise NoAnswer(f"design.reveal: no trial of this ship reveals {cause}: {why}")
     chosen = sizes_of(vessel, hidden, known, weather, stated=sizes, progress=within(progress, 0.4, 0.9))
     for item, own in zip(hidden, chosen, strict=True):

@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import cut_windows
-from expdesign.diagnosis.model import ROLL, ExtendedModel
+from expdesign.diagnosis.model import EFFECTS, ROLL, SENSOR, WEATHER, ExtendedModel, acts_on
 from expdesign.diagnosis.motion import LinearisedMotion, linearise, responses, simulate_from_measured
 from expdesign.diagnosis.vessel_file import extend, extended_model
 from expdesign.errors import InputError, NoAnswer
@@ -36,10 +36,6 @@ OUTCOMES = ("advance_m", "tactical_diameter_m", "overshoot_10_10_rad", "overshoo
 """Of the standard trials, whose change matters."""
 WORDS = dict(zip(OUTCOMES, ("advance", "tactical diameter", "10/10 overshoot", "20/20 overshoot"), strict=True))
 ZIGZAGS = (math.radians(10.0), math.radians(20.0))
-SENSORS = ("heading_bias", "lever", "log", "gyro", "late")
-"""Kinds of effects that change no motion."""
-WEATHER = ("current", "wind")
-"""Kinds of effects that standard trials, in calm water, do not have."""
 PROPORTIONAL = ("theta:", "term:")
 """Effects in proportion to their size."""
 NEGLIGIBLE = 1e-6
@@ -129,7 +125,7 @@ def sizes_that_matter(
             for item, size in zip(directions, found, strict=True)
             if np.isfinite(size.value)
             and size.value > _least(item, stated_std)
-            and item.key.split(":")[0] not in (*SENSORS, *WEATHER)
+            and not acts_on(item.key, SENSOR, WEATHER)  # which change no motion, or that of no trial in calm water
         ]
         changes = in_order(outcome_changes, (trials.vessel, trials.speed_mps, trials.ship), asked)
         changed = {}
@@ -236,22 +232,5 @@ def default_sizes(length_m: float, speed_mps: float) -> dict[str, float]:
         length_m: of the ship [m].
         speed_mps: at which it sails [m/s].
     """
-    time_s = length_m / max(speed_mps, 1e-6)
-    return {
-        "current": 0.05 * speed_mps,
-        "wind": 3.0,
-        "gain": 0.1,
-        "inertia": 0.1,
-        "asymmetry": 0.02 * length_m,
-        "offset": math.radians(2.0),
-        "scale": 0.1,
-        "lag": 0.1 * time_s,
-        "delay": 0.1 * time_s,
-        "heading_bias": math.radians(2.0),
-        "lever": 0.1 * length_m,
-        "log": 0.05,
-        "gyro": 0.05,
-        "late": 0.05 * time_s,
-        "shallow": 0.5,
-        "change": 0.2,
-    }
+    sizes = {kind: row.size(length_m, speed_mps) for kind, row in EFFECTS.items()}
+    return {kind: size for kind, size in sizes.items() if math.isfinite(size)}

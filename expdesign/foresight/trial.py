@@ -119,21 +119,6 @@ def exact_record(runs: Sequence[tuple[str, Commands, Trajectory]], wind_to: Arra
 
 # A planned trial with nothing hidden, as a diagnosis sees it before it looks for causes.
 
-UNSEEN = {
-    "shallow_water": "no depth is recorded",
-    "actuator_deadband": "commands have too few sizes, or a dead band is stated",
-    "actuator_scale": "the ship has no rudder, or the scale is stated",
-    "wind": "the model has no equation that air acts in",
-    "current": "no heading is measured",
-    "log_scale": "surge and sway are not measured by a log, or positions beside them tell its scale without a model",
-    "gyro_scale": "no yaw rate is measured",
-    "heading_bias": "surge and sway are not both measured",
-    "lever_arm": "sway and yaw are not both measured",
-    "roll_coupling": "sway and yaw are not both in the model",
-    "thruster_asymmetry": "yaw is not in the model",
-}
-"""Cause -> why a trial's records cannot show it, where they cannot."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Background:

@@ -47,7 +47,8 @@ class Fault:
     found, and `explain` describes it.
     """
 
-    key: str  # field of `Sensors`, key in vessel files, and effect of a diagnosis, which is the value less `neutral`
+    key: str  # field of `Sensors` and key in vessel files
+    effect: str  # key in the extended model of a diagnosis; the effect is the value less `neutral`
     sensor: str  # one of `SENSORS`
     signals: tuple[str, ...]  # of u, v and r: what it acts on
     neutral: float  # value without the fault: 1 for a gain, 0 for an offset
@@ -57,6 +58,7 @@ class Fault:
     what: str  # it acts on, in words
     cause: str  # name in diagnoses
     title: str  # of the cause
+    missing: str  # from a simulation that ignores it
     summary: str  # of the cause
     explained: str  # a sentence with {} for the size: a gain in per cent, an offset in its unit
     unseen: str  # when records cannot show it
@@ -81,25 +83,25 @@ class Fault:
 
 GAINS_AND_OFFSETS = (
     Fault(
-        key="velocity_scale", sensor="velocity", signals=("u", "v"), neutral=1.0, possible=0.5, matters=0.05,
-        what="surge and sway speed",
-        cause="log_scale", title="Scale error of the log",
+        key="velocity_scale", effect="log", sensor="velocity", signals=("u", "v"), neutral=1.0, possible=0.5,
+        matters=0.05, what="surge and sway speed",
+        cause="log_scale", title="Scale error of the log", missing="the scale of the log",
         summary="a log with a wrong scale, where no positions tell it",
         explained="The log has a scale error. It shows {} % of the speed that inputs and turns show.",
         unseen="surge and sway are not measured by a log, or positions beside them tell its scale without a model",
     ),
     Fault(
-        key="yaw_rate_scale", sensor="yaw_rate", signals=("r",), neutral=1.0, possible=0.5, matters=0.05,
+        key="yaw_rate_scale", effect="gyro", sensor="yaw_rate", signals=("r",), neutral=1.0, possible=0.5, matters=0.05,
         what="yaw rate",
-        cause="gyro_scale", title="Scale error of the rate gyro",
+        cause="gyro_scale", title="Scale error of the rate gyro", missing="the scale of the rate gyro",
         summary="a rate gyro with a wrong scale, by heading and motion",
         explained="The yaw rate sensor has a scale error. It shows {} % of the yaw rate that heading and motion show.",
         unseen="no yaw rate is measured",
     ),
     Fault(
-        key="yaw_rate_bias_radps", sensor="yaw_rate", signals=("r",), neutral=0.0, unit="rad/s", possible=0.2,
-        matters=0.002, what="yaw rate",
-        cause="gyro_bias", title="Bias of the rate gyro",
+        key="yaw_rate_bias_radps", effect="gyro_bias", sensor="yaw_rate", signals=("r",), neutral=0.0, unit="rad/s",
+        possible=0.2, matters=0.002, what="yaw rate",
+        cause="gyro_bias", title="Bias of the rate gyro", missing="the bias of the rate gyro",
         summary="a rate gyro that shows a turn when the heading stands still",
         explained="The yaw rate sensor shows {} rad/s more than heading and motion do: its zero is wrong.",
         unseen="no yaw rate is measured",

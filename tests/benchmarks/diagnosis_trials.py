@@ -30,7 +30,7 @@ from expdesign.vessel import Vessel
 LEAST_POINTS, GROWTH, MOST_GROWTHS = 5.0, 1.5, 6
 LEVELS = (0.03, 0.1, 0.3, 1.0)
 """Sizes in the power part, in shares of the size that just costs the points asked."""
-UNSEEN = {"gyro_scale": ("measured",), "sensor_delay": ("measured",)}
+UNSEEN = {"gyro_scale": ("measured",), "gyro_bias": ("measured",), "sensor_delay": ("measured",)}
 """Faults of sensors that other ways of recording do without."""
 AIR = ("W_abs_u_u", "W_abs_v_v", "W_uv")
 PARTS = ("known", "uncertain", "clean", "pairs", "power", "varied", "beyond")
@@ -109,6 +109,7 @@ class Hidden:
             "heading_bias_rad": -f.get("heading_bias", 0.0), "velocity_angle_rad": -f.get("heading_bias", 0.0),
             "forward_m": f.get("lever_m", 0.0), "starboard_m": 0.0,
             **{f"{axis}_delay_s": f.get(f"late_{axis}", 0.0) for axis in "uvr"},
+            "yaw_rate_bias_radps": f.get("gyro_bias", 0.0),
             "factor": 1 + (f["gyro"] if "gyro" in f else e.get("gain", 0.0)),
         }  # fmt: skip
 
@@ -173,6 +174,7 @@ def drawn_effect(cause: str, ship: str, rng: np.random.Generator, length_s: floa
         "heading_bias": Hidden(cause=cause, faults={"heading_bias": 0.04 * sign * size}),
         "lever_arm": Hidden(cause=cause, faults={"lever_m": 3 * sign * size}),
         "gyro_scale": Hidden(cause=cause, faults={"gyro": 0.08 * sign * size}),
+        "gyro_bias": Hidden(cause=cause, faults={"gyro_bias": 0.003 * sign * size}),
     }[cause]
 
 

@@ -20,7 +20,7 @@ from expdesign.diagnosis.causes.hull import (
     ROLL_COUPLING,
     UNLISTED_TERM,
 )
-from expdesign.diagnosis.causes.sensors import GYRO_SCALE, HEADING_BIAS, LEVER_ARM, LOG_SCALE, SENSOR_DELAY
+from expdesign.diagnosis.causes.sensors import SENSOR_CAUSES
 
 CAUSES: tuple[Cause, ...] = (
     PARAMETERS,
@@ -36,11 +36,7 @@ CAUSES: tuple[Cause, ...] = (
     ACTUATOR_DEADBAND,
     ACTUATOR_SCALE,
     LOAD_CHANGE,
-    HEADING_BIAS,
-    LEVER_ARM,
-    SENSOR_DELAY,
-    LOG_SCALE,
-    GYRO_SCALE,
+    *SENSOR_CAUSES,
     SHALLOW_WATER,
     ROLL_COUPLING,
     CHANGE_POINT,

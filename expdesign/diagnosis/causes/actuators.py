@@ -65,6 +65,8 @@ def _explain_lag(values: Values, _ship: ExtendedModel) -> str:
 
 ACTUATOR_LAG = Cause(
     name="actuator_lag",
+    title="Actuator lag",
+    missing="the lag of the actuators",
     summary="actuators that follow their commands with a first-order lag",
     candidates=_candidates_lag,
     explain=_explain_lag,
@@ -89,6 +91,8 @@ def _explain_slew(values: Values, _ship: ExtendedModel) -> str:
 
 ACTUATOR_SLEW = Cause(
     name="actuator_slew",
+    title="Slew rate of the actuators",
+    missing="the slew rate of the actuators",
     summary="actuators that move at another rate than stated",
     candidates=_slewing,
     explain=_explain_slew,
@@ -132,9 +136,12 @@ def _explain_deadband(values: Values, _ship: ExtendedModel) -> str:
 
 ACTUATOR_DEADBAND = Cause(
     name="actuator_deadband",
+    title="Actuator dead band",
+    missing="the dead band of the actuators",
     summary="actuators that do not answer small commands",
     candidates=_candidates_deadband,
     explain=_explain_deadband,
+    unseen="commands have too few sizes, or a dead band is stated",
 )
 
 
@@ -152,6 +159,8 @@ def _explain_delay(values: Values, _ship: ExtendedModel) -> str:
 
 ACTUATOR_DELAY = Cause(
     name="actuator_delay",
+    title="Actuator dead time",
+    missing="the dead time of the actuators",
     summary="actuators that follow their commands after a dead time",
     candidates=_candidates_delay,
     explain=_explain_delay,
@@ -178,9 +187,12 @@ def _explain_scale(values: Values, _ship: ExtendedModel) -> str:
 
 ACTUATOR_SCALE = Cause(
     name="actuator_scale",
+    title="Scale of the rudder angle",
+    missing="the scale of the rudder angle",
     summary="rudders that turn by a share of the ordered angle: a wrong scale of the recorded orders or of the linkage",
     candidates=_candidates_scale,
     explain=_explain_scale,
+    unseen="the ship has no rudder, or the scale is stated",
 )
 
 
@@ -203,6 +215,8 @@ def _explain_thrust_advance_loss(values: Values, _ship: ExtendedModel) -> str:
 
 THRUST_ADVANCE_LOSS = Cause(
     name="thrust_advance_loss",
+    title="Thrust loss with advance speed",
+    missing="the loss of thrust with speed",
     summary="thrust that falls with the speed of advance",
     candidates=_candidates_thrust_advance_loss,
     explain=_explain_thrust_advance_loss,
@@ -231,6 +245,8 @@ def _explain_thrust_gain(values: Values, _ship: ExtendedModel) -> str:
 
 THRUST_GAIN = Cause(
     name="thrust_gain",
+    title="Thrust gain",
+    missing="the correct thrust gain",
     summary="thrust too weak or too strong by one factor in every regime",
     candidates=_candidates_thrust_gain,
     explain=_explain_thrust_gain,
@@ -270,7 +286,10 @@ def _explain_asymmetry(values: Values, ship: ExtendedModel) -> str:
 
 THRUSTER_ASYMMETRY = Cause(
     name="thruster_asymmetry",
+    title="Asymmetry of thrust or angles",
+    missing="an asymmetry of thrust",
     summary="a ship that turns at zero angle: thrust off the centre line, or wrong angles",
     candidates=_candidates_asymmetry,
     explain=_explain_asymmetry,
+    unseen="yaw is not in the model",
 )

@@ -62,10 +62,13 @@ class Cause:
     """An entry of the catalogue."""
 
     name: str  # in the vocabulary of diagnosis.json
+    title: str  # of its section in reports
+    missing: str  # from the simulation, e.g. "a current"; "" where it depends on which term
     summary: str  # what is wrong, in a few words
     candidates: Callable[[Situation], tuple[Candidate, ...]]  # for a situation; none if the data cannot show the cause
     # one or two sentences for a person, from the estimates and the model they are of
     explain: Callable[[Values, ExtendedModel], str]
+    unseen: str = ""  # when records cannot show it
 
 
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"

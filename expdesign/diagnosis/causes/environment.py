@@ -29,7 +29,15 @@ def _explain_current(values: Values, _ship: ExtendedModel) -> str:
     )
 
 
-CURRENT = Cause(name="current", summary="a steady current", candidates=_candidates_current, explain=_explain_current)
+CURRENT = Cause(
+    name="current",
+    title="Current",
+    missing="a current",
+    summary="a steady current",
+    candidates=_candidates_current,
+    explain=_explain_current,
+    unseen="no heading is measured",
+)
 
 
 LEAST_VARIATION = 0.01
@@ -55,9 +63,12 @@ def _explain_shallow_water(values: Values, _ship: ExtendedModel) -> str:
 
 SHALLOW_WATER = Cause(
     name="shallow_water",
+    title="Shallow water",
+    missing="shallow water",
     summary="shallow water: damping and inertia grow with draught over depth",
     candidates=_candidates_shallow_water,
     explain=_explain_shallow_water,
+    unseen="no depth is recorded",
 )
 
 
@@ -162,7 +173,10 @@ def _explain_wind(values: Values, _ship: ExtendedModel) -> str:
 
 WIND = Cause(
     name="wind",
+    title="Wind",
+    missing="wind",
     summary="wind: drag of the air on hull and superstructure, with measured wind or with an unknown mean one",
     candidates=_candidates_wind,
     explain=_explain_wind,
+    unseen="the model has no equation that air acts in",
 )

@@ -57,6 +57,8 @@ def _explain_change_point(values: Values, _ship: ExtendedModel) -> str:
 
 CHANGE_POINT = Cause(
     name="change_point",
+    title="Change during the trial",
+    missing="a change of the ship during the trial",
     summary="a change of parameters during a run; between separate runs much else may differ",
     candidates=_candidates_change_point,
     explain=_explain_change_point,
@@ -85,6 +87,8 @@ def _explain_load_change(values: Values, _ship: ExtendedModel) -> str:
 
 LOAD_CHANGE = Cause(
     name="load_change",
+    title="Change of load (inertia)",
+    missing="the correct inertia",
     summary="inertia that differs from the model's: other accelerations, the same steady speeds",
     candidates=_candidates_load_change,
     explain=_explain_load_change,
@@ -116,6 +120,8 @@ def _explain_missing_term(values: Values, ship: ExtendedModel) -> str:
 
 MISSING_TERM = Cause(
     name="missing_term",
+    title="Missing term",
+    missing="",
     summary="a term of the library that the model lacks: linear, a product or modulus of speeds, or cubic damping",
     candidates=_candidates_missing_term,
     explain=_explain_missing_term,
@@ -140,6 +146,8 @@ def _explain_parameters(values: Values, _ship: ExtendedModel) -> str:
 
 PARAMETERS = Cause(
     name="parameters",
+    title="Parameter values",
+    missing="the correct values of some parameters",
     summary="parameter values that are wrong by more than their stated standard deviations",
     candidates=_candidates_parameters,
     explain=_explain_parameters,
@@ -185,9 +193,12 @@ def _explain_roll_coupling(values: Values, _ship: ExtendedModel) -> str:
 
 ROLL_COUPLING = Cause(
     name="roll_coupling",
+    title="Roll, or a similar oscillation",
+    missing="an oscillation like roll",
     summary="roll that shows in sway and yaw: a lightly damped mode driven by the side acceleration",
     candidates=_candidates_roll_coupling,
     explain=_explain_roll_coupling,
+    unseen="sway and yaw are not both in the model",
 )
 
 
@@ -204,6 +215,8 @@ def _explain_unlisted_term(values: Values, ship: ExtendedModel) -> str:
 
 UNLISTED_TERM = Cause(
     name="unlisted_term",
+    title="Unlisted term",
+    missing="",
     summary="a term that no cause of the catalogue is: found by regression on products of motion and inputs",
     candidates=lambda _situation: (),
     explain=_explain_unlisted_term,

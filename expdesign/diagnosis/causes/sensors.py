@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, listed, rounded
 from expdesign.diagnosis.model import ExtendedModel
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS, Fault
 
 
 def _candidates_heading_bias(situation: Situation) -> tuple[Candidate, ...]:
@@ -32,9 +32,12 @@ def _explain_heading_bias(values: Values, ship: ExtendedModel) -> str:
 
 HEADING_BIAS = Cause(
     name="heading_bias",
+    title="Misaligned compass or speed sensor",
+    missing="the misalignment of a sensor",
     summary="a misaligned compass or velocity sensor: surge speed leaks into measured sway",
     candidates=_candidates_heading_bias,
     explain=_explain_heading_bias,
+    unseen="surge and sway are not both measured",
 )
 
 
@@ -61,47 +64,39 @@ def _explain_lever_arm(values: Values, ship: ExtendedModel) -> str:
 
 LEVER_ARM = Cause(
     name="lever_arm",
+    title="Sensor position",
+    missing="the distance of a sensor from amidships",
     summary="an antenna or velocity sensor away from the point that the model describes",
     candidates=_candidates_lever_arm,
     explain=_explain_lever_arm,
+    unseen="sway and yaw are not both measured",
 )
 
 
-def _of_gyro(situation: Situation) -> tuple[Candidate, ...]:
-    if "r" in situation.windows.derived or "r" not in situation.ship.model.outputs:
-        return ()
-    return (Candidate(cause="gyro_scale", free={"gyro": 0.0}),)
+def _of_fault(fault: Fault) -> Cause:
+    """The cause of a gain or an offset.
 
+    None of a log where positions are measured: these tell it before any model (`kinematics`).
+    """
 
-def _of_log(situation: Situation) -> tuple[Candidate, ...]:
-    """None where positions are measured: these tell the scale before any model (`kinematics`)."""
-    if situation.windows.has_position or not {"u", "v"} <= set(situation.ship.model.outputs):
-        return ()
-    return (Candidate(cause="log_scale", free={"log": 0.0}),)
-
-
-def _shows(sensor: str, motion: str) -> Callable[[Values, ExtendedModel], str]:
-    """An explanation: what share of a motion a sensor shows."""
+    def candidates(situation: Situation) -> tuple[Candidate, ...]:
+        signals = {*fault.signals}
+        told = fault.sensor == "velocity" and situation.windows.has_position
+        if told or signals & {*situation.windows.derived} or not signals <= {*situation.ship.model.outputs}:
+            return ()
+        return (Candidate(cause=fault.cause, free={fault.effect: 0.0}),)
 
     def explain(values: Values, _ship: ExtendedModel) -> str:
         _, value, std = first(values)
-        return f"{sensor} has a scale error. It shows {rounded(100 * (1 + value), 100 * std)} % of the {motion} show."
+        return fault.explained.format(rounded(100 * (1 + value), 100 * std) if fault.is_gain else rounded(value, std))
 
-    return explain
+    return Cause(
+        name=fault.cause, title=fault.title, missing=fault.missing, summary=fault.summary, unseen=fault.unseen,
+        candidates=candidates, explain=explain,
+    )  # fmt: skip
 
 
-GYRO_SCALE = Cause(
-    name="gyro_scale",
-    summary="a rate gyro with a wrong scale, by heading and motion",
-    candidates=_of_gyro,
-    explain=_shows("The yaw rate sensor", "yaw rate that heading and motion"),
-)
-LOG_SCALE = Cause(
-    name="log_scale",
-    summary="a log with a wrong scale, where no positions tell it",
-    candidates=_of_log,
-    explain=_shows("The log", "speed that inputs and turns"),
-)
+OF_FAULTS = tuple(map(_of_fault, GAINS_AND_OFFSETS))
 
 
 NAMES = {
@@ -139,7 +134,13 @@ def _explain_sensor_delay(values: Values, _ship: ExtendedModel) -> str:
 
 SENSOR_DELAY = Cause(
     name="sensor_delay",
+    title="Sensor delay",
+    missing="the delay of a sensor",
     summary="one measured signal late against the others",
     candidates=_candidates_sensor_delay,
     explain=_explain_sensor_delay,
 )
+
+
+SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_FAULTS)
+"""Faults of the record rather than of the model."""

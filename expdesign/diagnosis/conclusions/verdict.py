@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from expdesign.diagnosis.accuracy import Accuracy
-from expdesign.diagnosis.causes import Cause, sensors
+from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import AHEAD_S, validation_units
 from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
@@ -20,28 +20,7 @@ from expdesign.values import Array
 
 DIVERGED_FIT = -300.0
 """Fit [%] below which the simulation has diverged from the ship; the number then has no meaning."""
-MISSING_EFFECTS = {
-    "parameters": "the correct values of some parameters",
-    "current": "a current",
-    "wind": "wind",
-    "thrust_gain": "the correct thrust gain",
-    "thrust_advance_loss": "the loss of thrust with speed",
-    "thruster_asymmetry": "an asymmetry of thrust",
-    "actuator_lag": "the lag of the actuators",
-    "actuator_delay": "the dead time of the actuators",
-    "actuator_slew": "the slew rate of the actuators",
-    "actuator_deadband": "the dead band of the actuators",
-    "actuator_scale": "the scale of the rudder angle",
-    "load_change": "the correct inertia",
-    "heading_bias": "the misalignment of a sensor",
-    "lever_arm": "the distance of a sensor from amidships",
-    "sensor_delay": "the delay of a sensor",
-    "log_scale": "the scale of the log",
-    "gyro_scale": "the scale of the rate gyro",
-    "shallow_water": "shallow water",
-    "roll_coupling": "an oscillation like roll",
-    "change_point": "a change of the ship during the trial",
-}
+MISSING_EFFECTS = {cause.name: cause.missing for cause in CAUSES if cause.missing}
 """Cause -> missing effect of the simulation."""
 WORDS = {"u": "surge", "v": "sway", "r": "yaw"}
 MANOEUVRES = {
@@ -62,7 +41,7 @@ LITTLE_FIT = 50.0
 """Fit [%] of an output below which data are not called free of error, whatever noise there is."""
 MOST_NAMED = 3
 """Parameters, or equivalent causes, in a sentence."""
-SENSORS = tuple(cause.name for cause in vars(sensors).values() if isinstance(cause, Cause))
+SENSORS = tuple(cause.name for cause in SENSOR_CAUSES)
 WEATHER = ("current", "wind")
 
 

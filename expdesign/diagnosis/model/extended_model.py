@@ -1,25 +1,6 @@
 """A simulation model with effects added to it; each cause of the catalogue has a few effects, zero without it.
 
-Effects, by key:
-
-    theta:NAME            change of a model parameter term:NAME             coefficient of a library term that the model
-    lacks current:north/east    steady current [m/s] wind:north/east       mean wind where none is measured [m/s];
-    wind:speed [m/s] and wind:toward [rad] likewise gain, gain:propeller  thrust too strong by this share; all terms of
-    inputs, or those without a rudder asymmetry             yaw moment per unit of ahead force: the thrust's line of
-    action passes this far to port [m] offset:GROUP          added to the angles of a group of inputs [rad] scale:GROUP
-    share by which rudder angles exceed what is ordered, offset included lag:GROUP,
-    delay:GROUP, deadband:GROUP    of a group of inputs [s], [s], [unit of the input] inertia:u/v/r         inertia too
-    small by this share shallow:damping, shallow:inertia          growth per unit of draught over depth roll:sway,
-    roll:yaw   acceleration per unit of roll; roll:period [s] and roll:damping are of the mode (`vessel.roll`)
-    change:time           [s]; change:gain, change:damping, change:damping_u/v/r act after it heading_bias [rad],
-    lever:forward/starboard [m], log, gyro (shares by which u and v, and r, show too much),
-    late:u/v/r/psi/position [s]   (sensors)
-
-Measured sway is v + u sin(heading_bias). For velocities from the pose, a positive bias is a compass that shows too
-little; for measured ones, a sensor whose axes lie anticlockwise of the ship's. The lever is that of the position
-antenna or of the velocity sensor likewise.
-
-A GROUP is the stem of input names ("n", "a", "rudder", "tau_x", ...), one input, or "all".
+Their keys are those of `effects.EFFECTS`.
 
 The search begins at the values that the vessel file states; every test is of the difference.
 """
@@ -35,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
+from expdesign.diagnosis.model.effects import effect_kind
 from expdesign.diagnosis.model.terms import (
     Effects,
     ScaledTerm,
@@ -48,6 +30,7 @@ from expdesign.simulation.tape import Evaluation, evaluation
 from expdesign.values import Array
 from expdesign.vessel import Roll, Term, VesselModel
 from expdesign.vessel.expressions import Expression
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 from expdesign.waves import G_MPS2
 
 ANGLE_STEMS = ("a", "rudder")
@@ -58,26 +41,6 @@ LEAST_HEIGHT = 0.01
 0.017."""
 SLIGHTLY = 1e-6
 """Distance from a bound that is rounding."""
-BOUNDS: Mapping[str, tuple[float, float]] = {
-    "gain": (-0.8, 1.5),
-    "scale": (-0.8, 1.5),
-    "inertia": (-0.6, 1.5),
-    "gyro": (-0.5, 0.5),
-    "log": (-0.5, 0.5),
-    "lag": (0.0, 120.0),
-    "delay": (0.0, 120.0),
-    "slew": (0.0, 120.0),
-    "deadband": (0.0, math.inf),
-    "offset": (-0.5, 0.5),
-    "heading_bias": (-0.8, 0.8),
-    "late": (-60.0, 60.0),
-    "current": (-5.0, 5.0),
-    "wind": (-60.0, 60.0),
-    "shallow": (0.0, 20.0),
-    "change": (-0.9, 2.0),
-}
-"""Kind of effect -> least and greatest value that a ship, her sensors and the sea can have. What may have any size is
-not here: parameters and terms, whose signs `resisting` keeps, and times of the data."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,6 +112,12 @@ class ExtendedModel:
             for key, value in self.effects.items()
         )
 
+    def gain_and_offset(self, signal: str) -> tuple[float, float]:
+        """With which sensors show u, v or r: gain * true + offset; see `vessel.sensors.Fault`."""
+        own = [fault for fault in GAINS_AND_OFFSETS if signal in fault.signals]
+        gain = math.prod(1.0 + self.get(fault.effect) for fault in own if fault.is_gain)
+        return gain, sum(self.get(fault.effect) for fault in own if not fault.is_gain)
+
     def get(self, key: str) -> float:
         """Value of an effect."""
         return self.effects.get(key, 0.0)
@@ -157,13 +126,12 @@ class ExtendedModel:
         """Least and greatest possible value of an effect; what the vessel file states is possible."""
         kind, _, which = key.partition(":")
         sizes = {"forward": self.length_m, "starboard": self.beam_m, "asymmetry": self.beam_m / 2}
-        low, high = BOUNDS.get(kind, (-math.inf, math.inf))
+        row = effect_kind(key)
+        low, high = row.low, row.high
         if kind == "lever" or (kind == "asymmetry" and turns_by_force(self.model)):
             low, high = -sizes[which or kind], sizes[which or kind]
         elif key == "roll:period":
             high = self.longest_roll_s
-        elif key in ("change:time", "wind:toward"):
-            low, high = -math.inf, math.inf
         stated = self.stated.get(key, 0.0)
         return min(low, stated), max(high, stated)
 

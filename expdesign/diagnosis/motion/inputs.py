@@ -13,7 +13,15 @@ import numpy as np
 import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
-from expdesign.diagnosis.model import RESPONSES, ExtendedModel, group_columns, mean_wind, response_effect
+from expdesign.diagnosis.model import (
+    ACTUATORS,
+    RESPONSES,
+    ExtendedModel,
+    acts_on,
+    group_columns,
+    mean_wind,
+    response_effect,
+)
 from expdesign.simulation import deliver, keeps_to, positions
 from expdesign.simulation.motion import to_body
 from expdesign.simulation.tape import evaluation
@@ -82,8 +90,7 @@ def _stated_rate(ship: ExtendedModel, column: int, rate: float) -> float:
 
 def actuator_effects(ship: ExtendedModel) -> dict[str, float]:
     """Effects that change what actuators deliver."""
-    kinds = {*RESPONSES, "scale"}
-    return {key: value for key, value in ship.effects.items() if value and key.split(":", 1)[0] in kinds}
+    return {key: value for key, value in ship.effects.items() if value and acts_on(key, ACTUATORS)}
 
 
 def _scales(ship: ExtendedModel) -> Array:

@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.model import SENSOR, TERMS, ExtendedModel, acts_on
 from expdesign.diagnosis.motion.equations_of_motion import (
     parts_of_step,
     propagated,
@@ -124,10 +125,10 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
             u, v = simpson_mean_of_track(u, v, headings, finer)
     u, v = _rotated(u, v, ship.get("heading_bias"))
     if not from_position:
-        u, v = (1 + ship.get("log")) * u, (1 + ship.get("log")) * v
+        u, v = _with_faults(ship, "u", u), _with_faults(ship, "v", v)
     if from_position and ship.get("late:psi"):
         u, v = _rotated(u, v, r * ship.get("late:psi"))
-    channels = {"u": u, "v": v, "r": (1 + ship.get("gyro")) * r, "psi_rate": simpson_mean(r, finer)}
+    channels = {"u": u, "v": v, "r": _with_faults(ship, "r", r), "psi_rate": simpson_mean(r, finer)}
     if headings is not None and finer == 1:
         channels["psi_rate"] = heading_differences(headings, channels["psi_rate"], windows)
     if "r" in windows.derived:
@@ -144,10 +145,15 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
 
 def ship_velocities(ship: ExtendedModel, predicted: Array) -> Array:
     """(w, 3) velocities of the ship for sensor outputs (w, 3), without delays."""
-    u, v, r = predicted.T
-    r = r / (1 + ship.get("gyro"))
-    u, v = _rotated(u / (1 + ship.get("log")), v / (1 + ship.get("log")), -ship.get("heading_bias"))
+    gains, offsets = np.transpose([ship.gain_and_offset(name) for name in OUTPUTS])
+    u, v, r = ((predicted - offsets) / gains).T
+    u, v = _rotated(u, v, -ship.get("heading_bias"))
     return np.stack([u + ship.get("lever:starboard") * r, v - ship.get("lever:forward") * r, r], axis=-1)
+
+
+def _with_faults(ship: ExtendedModel, signal: str, true: Array) -> Array:
+    gain, offset = ship.gain_and_offset(signal)
+    return gain * true + offset
 
 
 def _rotated(u: Array, v: Array, angle: Array | float) -> tuple[Array, Array]:
@@ -201,8 +207,8 @@ def _shifted(values: Array, samples: float) -> Array:
 
 # Linearised motion of all windows, and its responses to small disturbances.
 
-INNER, OUTER = {"theta", "term", "gain", "inertia", "asymmetry"}, {"lever", "log", "gyro", "late"}
-"""Kinds of effects that change neither exogenous signals nor sensors, and those that change sensors alone."""
+TURNS = "heading_bias"
+"""The effect of a sensor that also turns current and wind, where the heading is the compass's."""
 
 
 def linearise(motion: Motion) -> LinearisedMotion:
@@ -238,14 +244,13 @@ class Disturbance:
 def disturbance_of(linear: LinearisedMotion, changed: ExtendedModel, per: float) -> Disturbance:
     """The disturbance by a change of effects along the path, divided by `per`."""
     motion = linear.motion
-    kinds = {key.split(":")[0] for key in _differing(motion.ship, changed)}
+    keys = _differing(motion.ship, changed)
+    terms_alone = all(acts_on(key, TERMS) for key in keys)
     sensor = force = np.zeros(1)
-    if kinds - INNER:
+    if not terms_alone:
         sensor = sensor_outputs(changed, motion.states, motion.windows, motion.heading_change) - motion.predicted
-    if kinds - OUTER:
-        known = not kinds - INNER and (
-            "u_w" in motion.exogenous or not any(part.reads_air for part in changed.scaled_terms)
-        )
+    if not all(acts_on(key, SENSOR) and key != TURNS for key in keys):
+        known = terms_alone and ("u_w" in motion.exogenous or not any(part.reads_air for part in changed.scaled_terms))
         exogenous = motion.exogenous if known else _exogenous_after(motion, changed)
         exogenous = exogenous.without_last_step
         force = stacked_rates(changed, motion.ends, exogenous).mean(axis=0) - linear.mean_rates
@@ -338,7 +343,7 @@ def _shown(motion: Motion, moved: Array) -> Array:
     """
     windows, count = motion.windows, moved.shape[-1]
     result = channels_apart(count, motion.predicted.shape[:2])
-    if any(key.startswith(("heading", "lever", "log", "gyro", "late")) for key in motion.ship.effects):
+    if any(acts_on(key, SENSOR) for key in motion.ship.effects):
         size = 1e-4
         still = sensor_outputs(motion.ship, motion.states, windows)
         for index in range(count):

@@ -14,6 +14,7 @@ from expdesign.diagnosis.model import (
     Effects,
     ExtendedModel,
     ahead_force_text,
+    effect_kind,
     group_columns,
     response_effect,
     term_library,
@@ -25,6 +26,7 @@ from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
 from expdesign.simulation import acting_response
 from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, VesselModel, column_name
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import SHOAL
 
 # Standard deviations of what a vessel file states of water, air, actuators and sensors: read and written alike.
@@ -92,8 +94,8 @@ def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> t
         return (f"{late[rest]}_delay_s",)
     if kind == "lever":
         return (f"{place}_{rest}_m",)
-    names = {"heading_bias": "heading_bias_rad" if from_pose else "velocity_angle_rad", "log": "velocity_scale",
-             "gyro": "yaw_rate_scale"}  # fmt: skip
+    names = {fault.effect: fault.key for fault in GAINS_AND_OFFSETS}
+    names["heading_bias"] = "heading_bias_rad" if from_pose else "velocity_angle_rad"
     return (names[kind],) if kind in names else ()
 
 
@@ -160,8 +162,10 @@ def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
     velocity_s = 0.0 if from_pose else sensors.velocity.delay_s
     return {
         "heading_bias": -(sensors.heading_bias_rad if from_pose else sensors.velocity_angle_rad),
-        "log": 0.0 if from_pose else sensors.velocity_scale - 1.0,
-        "gyro": 0.0 if "r" in derived else sensors.yaw_rate_scale - 1.0,
+        **{
+            fault.effect: 0.0 if {*fault.signals} & {*derived} else getattr(sensors, fault.key) - fault.neutral
+            for fault in GAINS_AND_OFFSETS
+        },
         "lever:forward": place.forward_m,
         "lever:starboard": place.starboard_m,
         "late:u": velocity_s,
@@ -213,8 +217,6 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
         return rest, 1.0, float(model.parameters[model.names.index(rest)]), ""
     if key == "heading_bias":  # as the vessel file counts it: of the compass, or of the velocity sensor's axes
         return ("heading_bias_rad" if "u" in ship.derived else "velocity_angle_rad"), -1.0, 0.0, "rad"
-    if key in NAMES:
-        return NAMES[key][0], 1.0, 0.0, NAMES[key][1]
     if kind == "deadband":
         unit = _input_unit(rest, model)
         return f"deadband_{rest}_{unit}" if unit else f"deadband_{rest}", 1.0, 0.0, unit
@@ -223,25 +225,8 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
         return f"slew_{rest}_s_per_{unit or 'unit'}", 1.0, 0.0, f"s/{unit}" if unit else "s"
     if key == "asymmetry":
         return _lean_name(model)
-    if kind in PATTERNS:
-        name, offset, unit = PATTERNS[kind]
-        return name.format(rest), 1.0, offset, unit
-    return ROLL[key], 1.0, 0.0, "rad/m" if key == "roll:yaw" else ""
-
-
-NAMES = {
-    "wind:toward": ("toward_rad", "rad"), "change:time": ("time_s", "s"),
-    "roll:period": ("roll_period_s", "s"), "roll:damping": ("roll_damping_ratio", ""),
-}  # fmt: skip
-"""Effect -> name in results and unit."""
-PATTERNS = {
-    "current": ("{}_mps", 0.0, "m/s"), "wind": ("{}_mps", 0.0, "m/s"), "offset": ("angle_offset_{}_rad", 0.0, "rad"),
-    "lag": ("lag_{}_s", 0.0, "s"), "delay": ("delay_{}_s", 0.0, "s"), "lever": ("{}_m", 0.0, "m"),
-    "late": ("{}_delay_s", 0.0, "s"), "shallow": ("{}_growth", 0.0, ""), "term": ("{}", 0.0, ""),
-    "gain": ("factor", 1.0, ""), "gyro": ("factor", 1.0, ""), "log": ("factor", 1.0, ""),
-    "inertia": ("inertia_factor_{}", 1.0, ""), "change": ("{}_factor", 1.0, ""), "scale": ("angle_factor_{}", 1.0, ""),
-}  # fmt: skip
-"""Kind of effect -> name in results with {} for the rest of its key, value without the effect, unit."""
+    row = effect_kind(key)
+    return row.name.format(rest), 1.0, row.neutral, row.unit
 
 
 def _input_unit(group: str, model: VesselModel) -> str:

@@ -20,6 +20,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -40,6 +41,7 @@ from expdesign.diagnosis.vessel_file.reading import found_std, with_std
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel, std_keys
 from expdesign.vessel.expressions import Expression
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import SHOAL
 
 # Dependence on depth as factors of a model's terms.
@@ -377,13 +379,16 @@ def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:
         return max(0.0, *(get(key) for key in keys))
 
     lever = {"forward_m": get("lever:forward"), "starboard_m": get("lever:starboard")}
-    sensors = replace(sensors, heading=replace(sensors.heading, delay_s=late("late:psi")))
+    faults: dict[str, Any] = {
+        fault.key: fault.neutral + get(fault.effect)
+        for fault in GAINS_AND_OFFSETS
+        if not {*fault.signals} & {*ship.derived}
+    }
+    sensors = replace(sensors, heading=replace(sensors.heading, delay_s=late("late:psi")), **faults)
     if "r" not in ship.derived:
-        yaw_rate = replace(sensors.yaw_rate, delay_s=late("late:r"))
-        sensors = replace(sensors, yaw_rate_scale=1.0 + get("gyro"), yaw_rate=yaw_rate)
+        sensors = replace(sensors, yaw_rate=replace(sensors.yaw_rate, delay_s=late("late:r")))
     if "u" in ship.derived:
         position = replace(sensors.position, **lever, delay_s=late("late:position"))
         return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
     velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
-    angle_rad, scale = 0.0 - get("heading_bias"), 1.0 + get("log")
-    return replace(sensors, velocity_angle_rad=angle_rad, velocity_scale=scale, velocity=velocity)
+    return replace(sensors, velocity_angle_rad=0.0 - get("heading_bias"), velocity=velocity)

@@ -18,6 +18,7 @@ from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, ne
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
 from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
 
 if TYPE_CHECKING:
@@ -42,7 +43,9 @@ RATES = {
 }
 FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "scale", "shallow")
 """Kinds of effects that are forces."""
-SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "log": "u", "gyro": "r", "lever": "r"}
+SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "lever": "r"} | {
+    fault.effect: fault.signals[0] for fault in GAINS_AND_OFFSETS
+}
 """Effect, or kind of effect, of a sensor -> the velocity that it depends on."""
 
 

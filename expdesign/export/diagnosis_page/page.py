@@ -11,6 +11,7 @@ import numpy as np
 
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import mean_residual
+from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.conclusions import DIVERGED_FIT, accuracy_in_words, alternatives, has_diverged, manoeuvre
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction
@@ -29,6 +30,7 @@ from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.progress import Progress, silent
+from expdesign.vessel.sensors import GAINS_AND_OFFSETS
 
 DRAWN_STRETCHES = 4  # stretches of data drawn in a diagnosis
 SMALLEST_P_VALUE = 1e-12  # p-values below are printed as this bound in tables
@@ -36,28 +38,7 @@ SMALLEST_P_VALUE = 1e-12  # p-values below are printed as this bound in tables
 
 # Names of causes and estimates in words, in place of "thrust_gain" or "lag_all_s".
 
-TITLES = {
-    "parameters": "Parameter values",
-    "current": "Current",
-    "wind": "Wind",
-    "thrust_gain": "Thrust gain",
-    "thrust_advance_loss": "Thrust loss with advance speed",
-    "thruster_asymmetry": "Asymmetry of thrust or angles",
-    "actuator_lag": "Actuator lag",
-    "actuator_delay": "Actuator dead time",
-    "actuator_slew": "Slew rate of the actuators",
-    "actuator_deadband": "Actuator dead band",
-    "load_change": "Change of load (inertia)",
-    "heading_bias": "Misaligned compass or speed sensor",
-    "lever_arm": "Sensor position",
-    "actuator_scale": "Scale of the rudder angle",
-    "sensor_delay": "Sensor delay",
-    "log_scale": "Scale error of the log",
-    "gyro_scale": "Scale error of the rate gyro",
-    "shallow_water": "Shallow water",
-    "roll_coupling": "Roll, or a similar oscillation",
-    "change_point": "Change during the trial",
-}
+TITLES = {cause.name: cause.title for cause in CAUSES}
 """Cause -> title; other causes have their name as title."""
 NAMES = {
     "north_mps": "velocity to the north",
@@ -71,6 +52,7 @@ NAMES = {
     "velocity_angle_rad": "axis of the velocity sensor, to starboard of the bow",
     "forward_m": "sensor position, forward of amidships",
     "starboard_m": "sensor position, to starboard of amidships",
+    **{fault.key: fault.words for fault in GAINS_AND_OFFSETS if not fault.is_gain},
     "factor": "factor (1: as in the model)",
     "time_s": "time of the change",
     "Y_phi": "sway coupling, per side acceleration that holds the roll angle",
