@@ -79,3 +79,21 @@ def _counted(config: pytest.Config, report):
     if config.getoption("--no-skips") and report.skipped and not hasattr(report, "wasxfail"):
         report.outcome, report.longrepr = "failed", f"skipped, which --no-skips forbids: {report.longrepr}"
     return report
+
+
+@pytest.fixture(scope="session", autouse=True)
+def labels_are_whole() -> Generator[None]:
+    """Every figure that any test draws has all its text inside the picture: none is cut in a page."""
+    from matplotlib.backends.backend_svg import RendererSVG
+
+    draw = RendererSVG.draw_text
+
+    def checked(self, gc, x, y, s, prop, angle, ismath=False, mtext=None):
+        if mtext is not None and s.strip():
+            x0, y0, x1, y1 = mtext.get_window_extent(self).extents
+            assert min(x0, y0, self.width - x1, self.height - y1) > -1.0, f"{s!r} is cut"
+        draw(self, gc, x, y, s, prop, angle, ismath=ismath, mtext=mtext)
+
+    RendererSVG.draw_text = checked
+    yield
+    RendererSVG.draw_text = draw

@@ -17,7 +17,7 @@ from expdesign.export.cards import cards_html
 from expdesign.export.cards.orders import heading_rows, order_rows, orders_notes, starboard_helm
 from expdesign.export.report.chart import chart_legend, deep_from, safety_contour
 from expdesign.export.report.design import short_of_optimum
-from expdesign.export.report.tables import agenda, setting, shown_name, shown_names
+from expdesign.export.report.tables import agenda, setting
 from expdesign.plan.values import Leg
 from expdesign.sea_area import SeaArea, as_multipolygon
 from expdesign.signals import Commands
@@ -59,26 +59,30 @@ def test_a_zigzag_switched_by_heading_is_ordered_by_heading(helm_rad: float, sid
 
 
 def test_names_show_angles_in_degrees_and_nothing_else_changes() -> None:
-    name = "turn-helm-0.349065850399-duration-60"
     settings = {"helm_rad": 0.34906585039886592, "duration_s": 60.0, "heading_rad": 0.2}
-    item = SimpleNamespace(primitive=SimpleNamespace(name=name, settings=settings))
-    assert shown_name(item) == "turn-helm-20\N{DEGREE SIGN}-duration-60"
-    plain = SimpleNamespace(primitive=SimpleNamespace(name="turn-0.2", settings=settings))
-    assert shown_name(plain) == "turn-0.2"
+    for name, said in (
+        ("turn-helm-0.349065850399-duration-60", "turn-helm-20\N{DEGREE SIGN}-duration-60"),
+        ("turn-0.2", "turn-0.2"),
+    ):
+        assert words.names([(name, "turn", settings)]) == {name: said}
 
 
 def test_names_show_speeds_in_knots_and_two_names_are_never_shown_alike() -> None:
-    def item(speed_mps: float) -> SimpleNamespace:
-        name = f"circle-speed-{speed_mps:.12g}"
-        return SimpleNamespace(primitive=SimpleNamespace(name=name, settings={"speed_mps": speed_mps}))
+    of = [(f"circle-speed-{speed:.12g}", "circle", {"speed_mps": speed}) for speed in (5.0, 5.001, 2.5)]
+    assert words.names(of[:1]) == {"circle-speed-5": f"circle-speed-9.7{words.NB}kn"}
+    assert list(words.names(of).values()) == ["circle-speed-5", "circle-speed-5.001", f"circle-speed-4.9{words.NB}kn"]
 
-    assert shown_name(item(5.0)) == f"circle-speed-9.7{words.NB}kn"
-    content = SimpleNamespace(information=(item(5.0), item(5.001), item(2.5)))
-    assert list(shown_names(content).values()) == [
-        "circle-speed-5",
-        "circle-speed-5.001",
-        f"circle-speed-4.9{words.NB}kn",
+
+def test_what_a_search_added_is_called_by_its_family_and_a_letter() -> None:
+    found = [f"added-{number}-{'zigzag' if number % 2 else 'turning-circle'}" for number in range(1, 60)]
+    said = words.names((name, name.split("-", 2)[2].replace("-", "_"), {}) for name in found)
+    assert [said[name] for name in found[:4]] == [
+        f"{family}{words.NB}{letter}" for letter in "AB" for family in ("Zig-zag", "Turning circle")
     ]
+    assert said["added-53-zigzag"] == f"Zig-zag{words.NB}AA"
+    assert len(set(said.values())) == len(found)
+    own = words.names([("added-by-hand", "zigzag", {})])
+    assert own == {"added-by-hand": "added-by-hand"}
 
 
 @pytest.mark.parametrize(

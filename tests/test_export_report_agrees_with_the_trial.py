@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,10 +16,10 @@ from lxml import html as lxml_html
 import export_case as case
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
 from expdesign.export import build_route, words
-from expdesign.export.pages.figures import new_figure, round_ticks
+from expdesign.export.pages.figures import new_figure, report_style, round_ticks, svg
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
-from expdesign.export.report.chart import footprints, nice_step, place_labels
+from expdesign.export.report.chart import draw_position_ticks, footprints, nice_step, place_labels, sea_figure
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.design import chain
@@ -94,7 +95,10 @@ def odd_page(name: str = ODD) -> str:
 def test_the_page_needs_nothing_from_outside() -> None:
     read = Page(page())
     assert all(reference.startswith("#") for reference in read.references)
-    assert not {"script", "link", "iframe", "img"} & set(read.tags)
+    assert not {"link", "iframe", "img"} & set(read.tags)
+    assert read.tags.count("script") == 1  # its own, which zooms the chart
+    assert "fetch" not in page()
+    assert "XMLHttpRequest" not in page()
     assert not re.search(r"url\((?!#)|@import", page())
 
 
@@ -115,7 +119,7 @@ def test_every_figure_is_well_formed_and_has_a_label() -> None:
 def test_odd_names_are_shown_and_never_run() -> None:
     html = odd_page()
     read = Page(html)
-    assert "script" not in read.tags
+    assert read.tags.count("script") == 1
     assert "\x07" not in html
     assert 'x <script>alert(1)</script> & "$\\alpha$" $ \N{REPLACEMENT CHARACTER} \N{SNOWMAN}' in read.text
 
@@ -315,8 +319,8 @@ def test_a_chart_without_depths_is_called_that_before_anything_else(deep: bool) 
     area = case.plan().area
     charted = replace(area, depths=((10.0, area.water),) if deep else ())
     told = Page(report_html(case.report_content(plan=replace(case.plan(), area=charted)))).text
-    assert ("No depths were checked" not in told.partition("Durations")[0]) is deep
-    assert ("depths not checked" not in told) is deep
+    assert ("No depths were checked" not in told) is deep
+    assert ("depths not checked" not in told.partition("What may go wrong")[0]) is deep
 
 
 def test_the_chain_of_proofs_ends_at_the_route_that_was_written() -> None:
@@ -368,3 +372,36 @@ def test_every_stacked_cell_says_what_it_is_as_the_head_of_its_column_would() ->
             assert all(named)
             if len(named) == len(heads):
                 assert [name for name, head in zip(named, heads, strict=True) if head] == [*filter(None, heads)]
+
+
+def test_the_chart_comes_first_and_beside_it_what_to_book_and_what_may_go_wrong() -> None:
+    content = case.report_content()
+    first, _, rest = page().partition("<nav>")
+    told = Page(first).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "<svg" in first
+    assert "</svg>" not in rest[: rest.index('id="agenda"')]
+    for index, leg in enumerate(content.plan.legs):  # under the pointer, the name and the duration of each
+        (title,) = re.findall(rf'<g id="chart-leg-{index}"><title>(.*?)</title>', first)
+        assert content.shown(leg.name) in title
+    assert "Book " in told if content.plan.risk else "As planned" in told
+    assert "What may go wrong" in told
+
+
+def test_what_is_booked_is_enough_in_most_simulated_trials() -> None:
+    plan = case.plan()
+    planned_s = plan.day.planned_s
+    risk = SimpleNamespace(extra_median_s=0.1 * planned_s, extra_most_s=0.4 * planned_s)
+    assert report_page.booking(replace(plan, risk=risk)).value == words.duration(1.4 * planned_s)
+    assert report_page.booking(replace(plan, risk=None)).name == "As planned"
+
+
+@pytest.mark.parametrize("width_in", [3.6, 6.4])
+def test_positions_beside_a_chart_of_any_shape_are_whole(width_in: float) -> None:
+    """That nothing is cut is asserted of every figure that tests draw, in `conftest`."""
+    content = case.report_content()
+    for height in np.linspace(600.0, 1600.0, 11):
+        box = (-500.0, -height / 2, 500.0, height / 2)
+        with report_style():
+            figure, axes = sea_figure(content.plan.area, box, width_in, clearance_m=5.0, vessel=content.vessel)
+            draw_position_ticks(axes, content.plan.area.frame, box)
+            svg(figure, key="shape", label="shape")

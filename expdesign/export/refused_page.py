@@ -16,12 +16,11 @@ from expdesign.export.pages.figures import (
     GREY,
     PURPLE,
     VERMILION,
-    new_figure,
     page_figure,
     report_style,
     svg,
 )
-from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, draw_sea
+from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, sea_figure
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -112,14 +111,8 @@ def refused_html(refusal: Refusal) -> str:
 @page_figure
 def _chart(refusal: Refusal) -> Markup:
     """Start, goal, the track as far as it was planned, and the obstacle."""
-    west, south, east, north = box = _view(refusal)
-    map_width_in = WIDTH_IN - 0.9
-    figure = new_figure(WIDTH_IN, map_width_in * (north - south) / (east - west) + 0.4)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set_xlim(west, east)
-    axes.set_ylim(south, north)
-    draw_sea(axes, refusal.area, box, clearance_m=refusal.clearance_m, draught_m=refusal.vessel.draught_m)
+    box = _view(refusal)
+    figure, axes = sea_figure(refusal.area, box, WIDTH_IN, clearance_m=refusal.clearance_m, vessel=refusal.vessel)
     axes.plot(refusal.track[:, 1], refusal.track[:, 0], color=GREY, linewidth=1.3, linestyle=(0, (4, 2)), zorder=3)
     for pose, sign, colour, size in ((refusal.start, "o", GREEN, 9), (refusal.goal, "*", PURPLE, 15)):
         axes.plot(pose[1], pose[0], sign, color=colour, markersize=size, markeredgecolor="white", zorder=5)

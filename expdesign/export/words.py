@@ -1,8 +1,11 @@
-"""Numbers as text: units, compass names, positions."""
+"""Numbers and names as text: units, compass names, positions, manoeuvres."""
 
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
 import numpy as np
@@ -155,3 +158,56 @@ def _degrees_minutes(degrees: float, width: int, decimals: int) -> str:
 def counted(count: int, one: str) -> str:
     """1 run, 3 runs."""
     return f"{count} {one}{'' if count == 1 else 's'}"
+
+
+IN_NAMES = {
+    "rad": ("\N{DEGREE SIGN}", math.degrees(1.0)),
+    "radps": ("\N{DEGREE SIGN}/s", math.degrees(1.0)),
+    "mps": (f"{NB}kn", KNOTS_PER_MPS),
+}
+"""Ending of a setting's name -> unit that people read in the name of a manoeuvre, and factor to it."""
+ADDED = re.compile(r"added-\d+-.+")
+"""Names that a search gives to the manoeuvres it adds."""
+
+
+def family(name: str) -> str:
+    """A manoeuvre family as people call it: sway zig-zag."""
+    return name.replace("_", " ").replace("zigzag", "zig-zag")
+
+
+def names(primitives: Iterable[tuple[str, str, Mapping[str, float]]]) -> dict[str, str]:
+    """Name in the files -> name as people say it; the same where two would be said alike.
+
+    What a search added is called by its family and a letter, such as Zig-zag B; other names have angles in degrees and
+    speeds in knots, such as circle-speed-4 kn-helm-35\N{DEGREE SIGN}.
+
+    Args:
+        primitives: name, family and settings of each, in order.
+    """
+    counts, said = Counter[str](), dict[str, str]()
+    for name, kind, settings in primitives:
+        if ADDED.fullmatch(name):
+            title, number = family(kind), counts[kind]
+            counts[kind] += 1
+            said[name] = f"{title[:1].upper()}{title[1:]}{NB}{_letters(number)}"
+        else:
+            said[name] = _in_degrees_and_knots(name, settings)
+    twice = {text for text, count in Counter(said.values()).items() if count > 1}
+    return {name: name if text in twice else text for name, text in said.items()}
+
+
+def _letters(number: int) -> str:
+    """A, B, ..., Z, AA, AB, ..."""
+    before = _letters(number // 26 - 1) if number >= 26 else ""
+    return f"{before}{chr(ord('A') + number % 26)}"
+
+
+def _in_degrees_and_knots(name: str, settings: Mapping[str, float]) -> str:
+    for key, value in settings.items():
+        stem, _, ending = key.rpartition("_")
+        unit, factor = IN_NAMES.get(ending, ("", 1.0))
+        stem, number_text = stem.replace("_", "-"), f"{value:.12g}"
+        if unit and f"-{stem}-{number_text}-" in f"{name}-":
+            size = number(value * factor, 1) if ending == "mps" else significant(value * factor)
+            name = f"{name}-".replace(f"-{stem}-{number_text}-", f"-{stem}-{size}{unit}-")[:-1]
+    return name

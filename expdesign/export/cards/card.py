@@ -25,19 +25,19 @@ from expdesign.export.cards.orders import (
     run_orders,
 )
 from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, drawn, new_figure, page_figure, svg
+from expdesign.export.pages.figures import BLACK, GREEN, PRIMITIVE, REPOSITION, drawn, page_figure, svg
 from expdesign.export.report import tables
 from expdesign.export.report.chart import (
     chart,
     chart_legend,
     draw_position_ticks,
     draw_scale_and_north,
-    draw_sea,
     place_labels,
+    sea_figure,
 )
 from expdesign.export.report.checks import day_sentence, day_words, procedure_sentences
 from expdesign.export.report.content import ReportContent, Run, primitive_runs, relative_information
-from expdesign.export.report.tables import settings_sentence, shown_name
+from expdesign.export.report.tables import settings_sentence
 from expdesign.export.routes import require_verified
 from expdesign.plan.values import Leg, Plan
 from expdesign.values import Array
@@ -51,7 +51,7 @@ RUNS_PER_SHEET = 3  # runs on one sheet
 NAMED_PARAMETERS = 4  # parameters named in the purpose of a run
 
 
-WIDTH_IN, HEIGHT_IN = 3.6, 3.6
+WIDTH_IN = 3.6
 
 
 @page_figure
@@ -63,12 +63,7 @@ def run_chart(content: ReportContent, legs: Sequence[Leg], *, numbers: Sequence[
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
     half = max(float(np.ptp(places, axis=0).max()) * 0.75, 3 * content.vessel.length_m, 4 * content.clearance_m)
     box = (*(middle - half), *(middle + half))
-    figure = new_figure(WIDTH_IN, HEIGHT_IN)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set_xlim(box[0], box[2])
-    axes.set_ylim(box[1], box[3])
-    draw_sea(axes, plan.area, box, clearance_m=content.clearance_m, draught_m=content.vessel.draught_m)
+    figure, axes = sea_figure(plan.area, box, WIDTH_IN, clearance_m=content.clearance_m, vessel=content.vessel)
     for leg, track in zip(legs, tracks, strict=True):
         lead = pose[max(leg.first - (leg.last - leg.first), 0) : leg.first + 1]
         axes.plot(lead[:, 1], lead[:, 0], color=REPOSITION, linewidth=1.2)
@@ -80,7 +75,7 @@ def run_chart(content: ReportContent, legs: Sequence[Leg], *, numbers: Sequence[
         _number(axes, np.array([track[0] for track in tracks]), places, numbers, size=0.16 * half)
     draw_position_ticks(axes, plan.area.frame, box, most_lon=2)
     draw_scale_and_north(axes, box)
-    label = f"Chart of run {', '.join(map(str, numbers))}, {legs[0].name}"
+    label = f"Chart of run {', '.join(map(str, numbers))}, {content.shown(legs[0].name)}"
     return svg(figure, key=f"card-{numbers[0]}", label=label)
 
 
@@ -166,9 +161,9 @@ def build_card(content: ReportContent, runs: Sequence[Run]) -> Card:
     heads, rows, missed = _orders(content, runs[0])
     return Card(
         runs=tuple(run.number for run in runs),
-        name=shown_name(item),
+        name=content.shown(legs[0].name),
         chart=run_chart(content, legs, numbers=[run.number for run in runs]),
-        what=f"{item.primitive.family.replace('_', ' ')} of {lasts}; {settings_sentence(item)}",
+        what=f"{words.family(item.primitive.family)} of {lasts}; {settings_sentence(item)}",
         purpose=_purpose(content, names.index(legs[0].name)),
         approach=_together([_approach(content, leg.first) for leg in legs]),
         danger=_together([_danger(danger, leg.first, step) for danger, leg in zip(dangers, legs, strict=True)]),

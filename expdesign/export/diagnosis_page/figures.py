@@ -311,7 +311,7 @@ def _residual_figure(
 
     The limits and sizes of all such figures are the same, so `places` of their axes are found for the first of them.
     """
-    figure = new_figure(2.6, 0.55 + 0.95 * len(outputs), arranged=not places)
+    figure = new_figure(2.6, 0.55 + 0.95 * len(outputs), layout=None if places else "constrained")
     rows = np.atleast_1d(figure.subplots(len(outputs), 1, sharex=True))
     factor = DEGREES if name == "heading" else 1 / 60 if name == "time" else DEGREES if name == "r" else 1.0
     for axes, output, item, limit in zip(rows, outputs, items, limits, strict=True):

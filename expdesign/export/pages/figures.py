@@ -9,7 +9,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
@@ -38,6 +38,7 @@ PIXELS_PER_INCH = 120.0
 LAND, WATER, FORBIDDEN = "#e9d8a6", "#e6f2fa", "#d4d4d4"
 
 LONGEST_NAME = 32
+NO_TITLES: Mapping[str, str] = {}
 Drawn = TypeVar("Drawn")
 Given = ParamSpec("Given")
 
@@ -105,23 +106,30 @@ def page_figure(draw: Callable[Given, Drawn]) -> Callable[Given, Drawn | Markup]
     return drawn_or_said
 
 
-def new_figure(width_in: float, height_in: float, *, arranged: bool = True) -> Figure:
-    """An empty figure that owes nothing to any window system; its axes are arranged, unless they are given places."""
+def new_figure(
+    width_in: float, height_in: float, *, layout: Literal["constrained", "compressed"] | None = "constrained"
+) -> Figure:
+    """An empty figure that owes nothing to any window system.
+
+    Its axes are arranged such that all labels have room: "compressed" for axes with a fixed aspect ratio, None for axes
+    that are given places.
+    """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_in, height_in), layout="constrained" if arranged else None)
+    figure = Figure(figsize=(width_in, height_in), layout=layout)
     FigureCanvasSVG(figure)
     return figure
 
 
-def svg(figure: Figure, *, key: str, label: str) -> Markup:
+def svg(figure: Figure, *, key: str, label: str, titles: Mapping[str, str] = NO_TITLES) -> Markup:
     """The figure as an SVG element for a page.
 
     Args:
         figure: drawn inside `report_style`.
         key: makes the ids of this figure unique in the page.
         label: what it shows, for those who cannot see it.
+        titles: gid of an artist -> text that is shown while the pointer rests on it.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
@@ -131,6 +139,8 @@ def svg(figure: Figure, *, key: str, label: str) -> Markup:
     text = target.getvalue()
     text = text[text.index("<svg") :].strip()
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    for gid, title in titles.items():
+        text = text.replace(f'<g id="{gid}">', f'<g id="{gid}"><title>{escape(plain(title))}</title>')
     text = re.sub(r'(<[^<>]*?\sid=")', rf"\1{key}-", text)
     text = re.sub(r'(\sxlink:href="#|url\(#)', rf"\1{key}-", text)
     text = re.sub(r' d="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)

@@ -34,10 +34,12 @@ from expdesign.plan.runs import dispersion_m
 from expdesign.plan.values import Plan
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
+from expdesign.vessel import Vessel
 from expdesign.vessel.hull import covering_discs, hull_polygons
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
 
 UNCHARTED_SHARE = 1e-6  # share of the allowed water that may be outside the charted depths that bound it
@@ -161,7 +163,8 @@ def _covered(pose: Array, radius: Array, hull_b: Array) -> shapely.Geometry:
     return shapely.union_all(spans)
 
 
-WIDTH_IN = 6.4
+WIDTH_IN, LABELS_IN = 6.4, 0.9
+"""Of a chart, and of it for the labels of latitudes."""
 KINDS = {"reposition": (REPOSITION, 1.3), "primitive": (PRIMITIVE, 2.4)}
 SHALLOW, DEEP, SAFETY = "#a9cfe8", "#ffffff", "#3f4a55"
 """Water within the safety contour, water deep enough for trials in deep water, and the contour itself."""
@@ -172,25 +175,46 @@ Box = tuple[float, float, float, float]
 def chart(content: ReportContent) -> str:
     """The whole trial on the chart, as SVG."""
     plan = content.plan
-    box = view(content)
-    west, south, east, north = box
-    map_width_in = WIDTH_IN - 0.9
-    height_in = map_width_in * (north - south) / (east - west)
-    figure = new_figure(WIDTH_IN, height_in + 0.4)
-    axes = figure.subplots()
-    axes.set_aspect("equal")
-    axes.set_xlim(west, east)
-    axes.set_ylim(south, north)
-    draw_sea(axes, plan.area, box, clearance_m=content.clearance_m, draught_m=content.vessel.draught_m)
+    west, _, east, _ = box = view(content)
+    figure, axes = sea_figure(plan.area, box, WIDTH_IN, clearance_m=content.clearance_m, vessel=content.vessel)
     for covered in footprints(content):
         axes.add_patch(_patch(covered, facecolor=PRIMITIVE, alpha=0.18, edgecolor="none"))
     _draw_track(axes, plan, content.vessel.hull_b, least_length_m=0.022 * (east - west))
     _draw_ends(axes, content)
-    _draw_runs(axes, plan, metres_per_inch=(east - west) / map_width_in)
+    _draw_runs(axes, plan, metres_per_inch=(east - west) / (WIDTH_IN - LABELS_IN))
     draw_position_ticks(axes, plan.area.frame, box)
     draw_scale_and_north(axes, box)
     label = f"Chart of the trial in {plan.area.name}: track, {len(primitive_runs(plan))} numbered runs, start and goal"
-    return svg(figure, key="chart", label=label)
+    return svg(figure, key="chart", label=label, titles=_titles(content))
+
+
+def _titles(content: ReportContent) -> dict[str, str]:
+    """Artist of the chart -> what it is."""
+    plan, numbers = content.plan, {run.leg: run.number for run in primitive_runs(content.plan)}
+    times = [(leg.last - leg.first) * plan.commands.sample_time_s for leg in plan.legs]
+    named = {
+        index: (f"run {numbers[index]}: {content.shown(leg.name)}" if index in numbers else
+                f"repositioning to {content.shown(leg.name)}")
+        for index, leg in enumerate(plan.legs)
+    }  # fmt: skip
+    legs = {f"leg-{index}": f"{text}, {words.duration(times[index])}" for index, text in named.items()}
+    check = plan.verification
+    nearest = f"least clearance: {words.distance(check.clearance_min_m)} at {words.clock(check.clearance_time_s)}"
+    runs = {f"run-{number}": legs[f"leg-{index}"] for index, number in numbers.items()}
+    return {**legs, **runs, "start": "start", "goal": "goal", "nearest": nearest}
+
+
+def sea_figure(area: SeaArea, box: Box, width_in: float, *, clearance_m: float, vessel: Vessel) -> tuple[Figure, Axes]:
+    """A figure of part of the sea, with room for the labels of positions."""
+    west, south, east, north = box
+    height_in = (width_in - LABELS_IN) * (north - south) / (east - west) + 0.4
+    figure = new_figure(width_in, height_in, layout="compressed")
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    axes.set_xlim(west, east)
+    axes.set_ylim(south, north)
+    draw_sea(axes, area, box, clearance_m=clearance_m, draught_m=vessel.draught_m)
+    return figure, axes
 
 
 def view(content: ReportContent) -> Box:
@@ -280,10 +304,10 @@ def _patch(geometry: shapely.Geometry, **style: object) -> PathPatch:
 
 def _draw_track(axes: Axes, plan: Plan, hull_b: Array, *, least_length_m: float) -> None:
     pose = plan.trajectory.pose
-    for leg in sorted(plan.legs, key=lambda leg: leg.kind == "primitive"):
+    for index, leg in sorted(enumerate(plan.legs), key=lambda item: item[1].kind == "primitive"):
         colour, width = KINDS[leg.kind]
         north, east = pose[leg.first : leg.last + 1, :2].T
-        axes.plot(east, north, color=colour, linewidth=width, solid_capstyle="round")
+        axes.plot(east, north, color=colour, linewidth=width, solid_capstyle="round", gid=f"leg-{index}")
     for sample in _heading_marks(pose):
         outline = to_n_frame(_with_bow(hull_b, least_length_m), pose[sample])
         axes.fill(outline[:, 1], outline[:, 0], facecolor="white", edgecolor=BLACK, linewidth=0.7, zorder=3)
@@ -303,12 +327,13 @@ def _heading_marks(pose: Array, count: int = 14) -> list[int]:
 
 
 def _draw_ends(axes: Axes, content: ReportContent) -> None:
-    axes.plot(content.start[1], content.start[0], "o", color=GREEN, markersize=9, markeredgecolor="white", zorder=5)
-    axes.plot(content.goal[1], content.goal[0], "*", color=PURPLE, markersize=15, markeredgecolor="white", zorder=5)
+    ends = ("start", content.start, "o", GREEN, 9), ("goal", content.goal, "*", PURPLE, 15)
+    for gid, pose, sign, colour, size in ends:
+        axes.plot(pose[1], pose[0], sign, color=colour, markersize=size, markeredgecolor="white", zorder=5, gid=gid)
     check = content.plan.verification
     sample = round(check.clearance_time_s / content.plan.trajectory.sample_time_s)
     place = content.plan.trajectory.pose[min(max(sample, 0), len(content.plan.trajectory) - 1)]
-    axes.plot(place[1], place[0], "x", color=BLACK, markersize=9, markeredgewidth=2, zorder=5)
+    axes.plot(place[1], place[0], "x", color=BLACK, markersize=9, markeredgewidth=2, zorder=5, gid="nearest")
 
 
 def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
@@ -320,6 +345,7 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
         axes.plot(*zip(anchor, place, strict=True), color=PRIMITIVE, linewidth=0.7, zorder=4)
         axes.text(
             place[0], place[1], str(run.number), ha="center", va="center", fontsize=9, fontweight="bold", zorder=6,
+            gid=f"run-{run.number}",
             bbox={"boxstyle": "circle,pad=0.2", "facecolor": "white", "edgecolor": PRIMITIVE, "linewidth": 1.2},
         )  # fmt: skip
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from expdesign.durations import DurationDesign, Efficiencies
+from expdesign.export import words
 from expdesign.export.files import Known
 from expdesign.export.routes import Route
 from expdesign.growing import Growth
@@ -46,6 +48,15 @@ class ReportContent:
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        made = (item.primitive for item in self.information)
+        return words.names((one.name, one.family, one.settings) for one in made)
+
+    def shown(self, name: str) -> str:
+        """The name of a manoeuvre as people say it."""
+        return self._names.get(name, name)
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from expdesign.durations import CRITERIA, DurationDesign, limits_kept
 from expdesign.export import words
 from expdesign.export.report.content import ReportContent
-from expdesign.export.report.tables import setting, shown_names
+from expdesign.export.report.tables import setting
 from expdesign.export.routes import DEGREE_DECIMALS
 from expdesign.growing import GrowRound, Growth
 from expdesign.shortest_day import ShortestDay
@@ -89,7 +90,7 @@ def certificate(content: ReportContent) -> str:
         return f"There is no certificate of optimality: {proof.kind.removeprefix('none: ')}."
     best = int(net.argmax())
     price = " minus the price of the limits" if proof.multipliers else ""
-    named = shown_names(content).get(design.problem.names[best], design.problem.names[best])
+    named = content.shown(design.problem.names[best])
     return (
         f"The durations are optimal if no sensitivity{price} exceeds the bound {words.significant(proof.level, 4)}, "
         f"and every used manoeuvre reaches it ({proof.kind}). The largest value is "
@@ -226,17 +227,17 @@ class GrowthRow:
     excites: bool
 
 
-def growth_rows(growth: Growth) -> list[GrowthRow]:
+def growth_rows(growth: Growth, shown: Callable[[str], str]) -> list[GrowthRow]:
     """Additions in order."""
-    return [_row(number, found) for number, found in enumerate(growth.rounds, start=1)]
+    return [_row(number, found, shown) for number, found in enumerate(growth.rounds, start=1)]
 
 
-def _row(number: int, found: GrowRound) -> GrowthRow:
+def _row(number: int, found: GrowRound, shown: Callable[[str], str]) -> GrowthRow:
     settings = ", ".join(setting(name, value) for name, value in found.settings.items())
     return GrowthRow(
         number=number,
-        name=found.name,
-        what=found.family.replace("_", " ") + (f"; {settings}" if settings else ""),
+        name=shown(found.name),
+        what=words.family(found.family) + (f"; {settings}" if settings else ""),
         sensitivity=words.number(found.sensitivity),
         gain=f"+{words.number(found.log_det_gain, 3)}" if found.log_det_gain >= 0 else words.number(found.log_det_gain),
         efficiency=words.percent(found.efficiency),

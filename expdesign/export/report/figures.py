@@ -29,7 +29,6 @@ from expdesign.export.pages.figures import (
 )
 from expdesign.export.report.content import ReportContent, primitive_runs, relative_information
 from expdesign.export.report.parameters import Expected
-from expdesign.export.report.tables import shown_names
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
@@ -50,7 +49,7 @@ NUMBER_GAP = 0.022  # least distance of the numbers of runs, as a share of the f
 def durations_figure(content: ReportContent) -> str:
     """Left: time of each primitive, optimal and in whole runs. Right: its sensitivity against the bound."""
     design = content.design
-    names = [short(name) for name in shown_names(content).values()]
+    names = [short(content.shown(item.primitive.name)) for item in content.information]
     figure = new_figure(6.4, 1.5 + 0.32 * len(names))
     times, sensitivities = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     _draw_times(times, design)
@@ -97,7 +96,7 @@ def _draw_sensitivities(axes: Axes, design: DurationDesign) -> None:
 def information_figure(content: ReportContent) -> str:
     """Heat map: for each parameter, information per minute of each primitive relative to the best one."""
     share = relative_information(content).T
-    names = [short(name) for name in shown_names(content).values()]
+    names = [short(content.shown(item.primitive.name)) for item in content.information]
     figure = new_figure(min(max(2.2 + 0.62 * len(names), 6.4), 14.0), 1.9 + 0.3 * len(content.parameters))
     axes = figure.subplots()
     mesh = axes.pcolormesh(share, cmap="cividis", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
@@ -306,7 +305,7 @@ CURVE_BOXES = tuple((0.655, bottom, 0.33, 0.235) for bottom in (0.735, 0.4425, 0
 @page_figure
 def primitive_figure(primitive: Primitive, hull_b: Array, *, number: int) -> str:
     """Path with hull outlines on the left; u, v and r over time on the right, dashed the desired velocities."""
-    figure = new_figure(*SIZE_IN, arranged=False)  # fixed places: many small figures are drawn much sooner
+    figure = new_figure(*SIZE_IN, layout=None)  # fixed places: many small figures are drawn much sooner
     _draw_path(figure.add_axes(PATH_BOX), primitive.trajectory.pose, hull_b)
     time_s = primitive.trajectory.time_s
     velocity = primitive.trajectory.velocity * (1.0, 1.0, np.degrees(1.0))

@@ -14,7 +14,14 @@ from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import drawn, marked
 from expdesign.export.report import tables
 from expdesign.export.report.chart import chart, chart_legend
-from expdesign.export.report.checks import checks, conditions, day_sentence, procedure_sentences
+from expdesign.export.report.checks import (
+    aborted_words,
+    checks,
+    conditions,
+    day_sentence,
+    left_words,
+    procedure_sentences,
+)
 from expdesign.export.report.content import ReportContent, primitive_runs
 from expdesign.export.report.design import (
     certificate,
@@ -47,7 +54,7 @@ from expdesign.export.report.parameters import (
     unknown_current_sentence,
 )
 from expdesign.plan.legs import through_water
-from expdesign.plan.values import DayLength, LatticeProof
+from expdesign.plan.values import LatticeProof, Plan
 from expdesign.sea_area import UNKNOWN_DEPTH
 
 GLOSSARY: tuple[tuple[str, str], ...] = (
@@ -116,6 +123,8 @@ def report_html(content: ReportContent) -> str:
         verified=content.plan.verified,
         runs=primitive_runs(content.plan),
         summary=summary(content),
+        booking=[booking(content.plan)],
+        risks=risks(content),
         facts=facts(content),
         certificate=certificate(content),
         criterion=criterion_sentence(content),
@@ -137,7 +146,7 @@ def report_html(content: ReportContent) -> str:
         day_rows=[] if content.day is None else tables.day_rows(content, content.day),
         day_sentences=[] if content.day is None else tables.day_sentences(content.day),
         told=((), []) if content.day is None else accuracy_table(content.day),
-        growth=[] if content.growth is None else growth_rows(content.growth),
+        growth=[] if content.growth is None else growth_rows(content.growth, content.shown),
         grown=("", "") if content.growth is None else growth_sentences(content.growth),
         glossary=GLOSSARY,
         figures=_figures(content, after),
@@ -252,11 +261,6 @@ def facts(content: ReportContent) -> list[Fact]:
     realised = plan.design_efficiency_realised
     return [
         Fact(
-            name="Day",
-            value=words.duration(plan.commands.duration_s),
-            remark=f"{_simulated(plan.day)}{words.duration(plan.seconds('primitive'))} in informative runs",
-        ),
-        Fact(
             name="Distance",
             value=words.distance(plan.trajectory.distance_m),
             remark=f"{words.counted(len(plan.legs), 'leg')}, {words.counted(len(primitive_runs(plan)), 'run')}",
@@ -275,6 +279,46 @@ def facts(content: ReportContent) -> list[Fact]:
     ]
 
 
+def booking(plan: Plan) -> Fact:
+    """The time to book: enough in 95 % of the simulated trials, where there are any."""
+    day, runs = plan.day, words.duration(plan.seconds("primitive"))
+    planned = f"{words.duration(day.planned_s)} as planned, of it {runs} in runs"
+    if math.isnan(day.median_s):
+        return Fact(name="As planned", value=words.duration(day.planned_s), remark=f"{runs} in runs; add a reserve")
+    return Fact(
+        name="Book",
+        value=words.duration(max(day.most_s, day.planned_s)),
+        remark=f"enough in 95{words.NB}% of the simulated trials, {words.duration(day.median_s)} in the middle; "
+        f"{planned}",
+    )
+
+
+def risks(content: ReportContent) -> list[Fact]:
+    """What may go wrong, and how likely that is: hull and water, the procedure, and what no simulation knows."""
+    plan, risk, check = content.plan, content.plan.risk, content.plan.verification
+    clearance = words.distance(check.clearance_min_m)
+    nearest = f"at {words.clock(check.clearance_time_s)}; {words.distance(content.clearance_m)} required"
+    if risk is None:
+        chances = [
+            Fact(
+                name="Leaving allowed water",
+                value="unknown",
+                remark="no trials with other ships and weather were simulated",
+            )
+        ]
+    else:
+        chances = [
+            Fact(name="Leaving allowed water", value=left_words(risk), remark=""),
+            Fact(name="Trial aborted", value=aborted_words(risk), remark=""),
+        ]
+    water = (
+        Fact(name="Nearest forbidden water", value=clearance, remark=nearest)
+        if plan.area.depths
+        else Fact(name="Depth", value="not checked", remark=f"the chart shows only land, {clearance} off {nearest}")
+    )
+    return [*chances, water]
+
+
 def _proof(content: ReportContent) -> Fact:
     """How far the trial is from the best: of the day where it was to be short, else of the durations."""
     day, reached = content.day, words.percent(content.design.efficiency_repeats)
@@ -286,14 +330,6 @@ def _proof(content: ReportContent) -> Fact:
     return Fact(
         name="No day is shorter than", value=words.duration(day.bound.day_s), remark=f"proven; {share} of this day"
     )
-
-
-def _simulated(day: DayLength) -> str:
-    """The length of the day in simulated trials; "" without any."""
-    if math.isnan(day.median_s):
-        return ""
-    median, most = words.duration(day.median_s), words.duration(max(day.most_s, day.planned_s))
-    return f"median {median}, 95th percentile {most} of simulated trials; "
 
 
 def _ends(content: ReportContent) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,10 +37,10 @@ class AgendaRow:
 
 def agenda(content: ReportContent) -> list[AgendaRow]:
     """The agenda: time, name, duration, position, heading and speeds of every leg."""
-    plan, names = content.plan, shown_names(content)
+    plan = content.plan
     numbers = {run.leg: run.number for run in primitive_runs(plan)}
     return [
-        _agenda_row(plan, index, leg, numbers.get(index), names.get(leg.name, leg.name))
+        _agenda_row(plan, index, leg, numbers.get(index), content.shown(leg.name))
         for index, leg in enumerate(plan.legs)
     ]
 
@@ -99,8 +98,8 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
     )
     return [
         PrimitiveRow(
-            name=shown_name(item),
-            family=item.primitive.family.replace("_", " "),
+            name=content.shown(item.primitive.name),
+            family=words.family(item.primitive.family),
             settings=settings_sentence(item),
             lasts=words.duration(item.primitive.duration_s),
             entry=motion(item.primitive.entry_velocity),
@@ -124,29 +123,6 @@ UNITS = {
     "fraction": ("of the run", 1.0),
 }
 """Ending of a setting's name -> unit shown and factor to it."""
-
-
-UNITS_IN_NAMES = UNITS | {"mps": (f"{words.NB}kn", KNOTS_PER_MPS)}
-
-
-def shown_names(content: ReportContent) -> dict[str, str]:
-    """Name in the files -> name as people read it; the same where two would be shown alike."""
-    shown = {item.primitive.name: shown_name(item) for item in content.information}
-    twice = {name for name, count in Counter(shown.values()).items() if count > 1}
-    return {name: name if text in twice else text for name, text in shown.items()}
-
-
-def shown_name(item: PrimitiveInformation) -> str:
-    """The name of a primitive with angles in degrees and speeds in knots: circle-speed-4 kn-helm-35\N{DEGREE SIGN}."""
-    name = item.primitive.name
-    for key, value in item.primitive.settings.items():
-        stem, _, ending = key.rpartition("_")
-        unit, factor = UNITS_IN_NAMES.get(ending, ("", 1.0))
-        text = f"{stem.replace('_', '-')}-{value:.12g}"
-        if unit.startswith(("\N{DEGREE SIGN}", words.NB)) and f"{name}-".find(f"-{text}-") >= 0:
-            shown = words.number(value * factor, 1) if ending == "mps" else words.significant(value * factor)
-            name = f"{name}-".replace(f"-{text}-", f"-{text.removesuffix(f'{value:.12g}')}{shown}{unit}-")[:-1]
-    return name
 
 
 def settings_sentence(item: PrimitiveInformation) -> str:
@@ -221,14 +197,13 @@ def excitation_sentence(content: ReportContent) -> str:
 
 def day_rows(content: ReportContent, day: ShortestDay) -> list[tuple[str, ...]]:
     """The days planned in search of the shortest, in order."""
-    names = shown_names(content)
     return [
         (
             str(number),
             words.duration(item.day_s),
             words.duration(item.informative_s),
             words.percent(item.information),
-            ", ".join(f"{count} {names.get(name, name)}" for name, count in item.runs.items()) or "none",
+            ", ".join(f"{count} {content.shown(name)}" for name, count in item.runs.items()) or "none",
         )
         for number, item in enumerate(day.tried, start=1)
     ]
