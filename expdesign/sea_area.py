@@ -17,7 +17,7 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.values import Array
 
-UNKNOWN_DEPTH = "No depths were checked: the chart shows only land. Check the whole track against the official chart."
+UNKNOWN_DEPTH = "No depths were checked: the chart names no depth areas. Check the whole track on the official chart."
 """Of an area without charted depths."""
 DENSE = 10.0
 """Corners per clearance length of shore above which the clearance is eroded in steps."""
@@ -81,6 +81,7 @@ class SeaArea:
     source: str = ""  # chart file and licence notice
     # (charted least depth [m], polygons) from shallow to deep, for drawing; empty where depth is not charted
     depths: tuple[tuple[float, shapely.MultiPolygon], ...] = ()
+    named: tuple[tuple[str, shapely.MultiPolygon], ...] = ()  # (name, no-go zone), for drawing
 
     def safe_water(self, clearance_m: float) -> shapely.MultiPolygon:
         """The water at least `clearance_m` from everything forbidden."""
@@ -162,6 +163,7 @@ class Zones:
     no_go: shapely.Geometry  # the trial stays outside
     deep: shapely.Geometry | None = None  # water known to be deep enough, or None when depth is not checked
     depths: tuple[tuple[float, shapely.Geometry], ...] = ()  # (charted least depth [m], polygons), for drawing
+    named: tuple[tuple[str, shapely.Geometry], ...] = ()  # (name, no-go zone), for drawing
 
 
 def build_sea_area(
@@ -199,6 +201,7 @@ def build_sea_area(
         notes=notes,
         source=source,
         depths=tuple((depth, polygons) for depth, polygons in drawn if not polygons.is_empty),
+        named=tuple((zone, as_multipolygon(polygon.intersection(zones.bounds))) for zone, polygon in zones.named),
     )
 
 

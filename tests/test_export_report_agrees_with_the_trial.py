@@ -19,7 +19,7 @@ from expdesign.export import build_route, words
 from expdesign.export.pages.figures import new_figure, report_style, round_ticks, svg
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
-from expdesign.export.report.chart import draw_position_ticks, footprints, nice_step, place_labels, sea_figure
+from expdesign.export.report.chart import chart, draw_position_ticks, footprints, nice_step, place_labels, sea_figure
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.design import chain
@@ -405,3 +405,15 @@ def test_positions_beside_a_chart_of_any_shape_are_whole(width_in: float) -> Non
             figure, axes = sea_figure(content.plan.area, box, width_in, clearance_m=5.0, vessel=content.vessel)
             draw_position_ticks(axes, content.plan.area.frame, box)
             svg(figure, key="shape", label="shape")
+
+
+def test_zones_are_named_on_the_chart() -> None:
+    content = case.report_content()
+    north, east = content.plan.trajectory.pose[0, :2]
+    zones = {"Firing range": 60.0, "Fish farm": 5.0}
+    named = tuple(
+        (name, shapely.MultiPolygon([shapely.Point(east, north).buffer(size)])) for name, size in zones.items()
+    )
+    area = replace(content.plan.area, named=named)
+    drawn = chart(replace(content, plan=replace(content.plan, area=area)))
+    assert all(name in drawn for name in zones)

@@ -26,6 +26,7 @@ from expdesign.export.pages.figures import (
     WATER,
     new_figure,
     page_figure,
+    short,
     svg,
 )
 from expdesign.export.report.content import ReportContent, primitive_runs
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
 
+LETTER_IN = 0.075  # mean width of the letters of a zone's name
 UNCHARTED_SHARE = 1e-6  # share of the allowed water that may be outside the charted depths that bound it
 FOOTPRINT_SEED = 0  # random seed of the footprint figure; the planner uses other random numbers
 FOOTPRINT_PIECES = 40  # places of the hull along a run that its drawn footprint is made of
@@ -251,9 +253,24 @@ def draw_sea(axes: Axes, area: SeaArea, box: Box, *, clearance_m: float, draught
         axes.add_patch(_patch(line, facecolor="none", edgecolor=SAFETY, linewidth=1.6))
     land = as_multipolygon(shapely.simplify(shapely.intersection(area.land, around), detail))
     axes.add_patch(_patch(land, facecolor=LAND, edgecolor="#8a7440", linewidth=0.5))
+    for name, zone in area.named:
+        _name_zone(axes, name, shapely.intersection(zone, shapely.box(*box)))
     if clearance_m > 0:
         safe = as_multipolygon(shapely.simplify(eroded(near, clearance_m), detail))
         axes.add_patch(_patch(safe, facecolor="none", edgecolor=GREY, linewidth=0.7, linestyle=(0, (2, 2))))
+
+
+def _name_zone(axes: Axes, name: str, seen: shapely.Geometry) -> None:
+    """The name of a zone in the middle of what is seen of it, or beside a small one, towards the chart's middle."""
+    if seen.is_empty:
+        return
+    text, place, (west, east) = short(name), seen.representative_point(), axes.get_xlim()
+    least, most = seen.bounds[0], seen.bounds[2]
+    if most - least > LETTER_IN / (WIDTH_IN - LABELS_IN) * len(text) * (east - west):
+        x, side = (least + most) / 2 if seen.contains(shapely.Point((least + most) / 2, place.y)) else place.x, "center"
+    else:
+        x, side = (least, "right") if place.x > (west + east) / 2 else (most, "left")
+    axes.text(x, place.y, text, ha=side, va="center", fontsize=8, style="italic", color=SAFETY, zorder=4)
 
 
 def _depth_shades(

@@ -268,7 +268,7 @@ def facts(content: ReportContent) -> list[Fact]:
         Fact(
             name="Least clearance",
             value=words.distance(check.clearance_min_m),
-            remark=f"{words.distance(content.clearance_m)} required{'' if plan.area.depths else '; to land only'}",
+            remark=f"{words.distance(content.clearance_m)} required{'' if plan.area.depths else ', on this chart'}",
         ),
         _proof(content),
         Fact(
@@ -314,7 +314,11 @@ def risks(content: ReportContent) -> list[Fact]:
     water = (
         Fact(name="Nearest forbidden water", value=clearance, remark=nearest)
         if plan.area.depths
-        else Fact(name="Depth", value="not checked", remark=f"the chart shows only land, {clearance} off {nearest}")
+        else Fact(
+            name="Depth",
+            value="not checked",
+            remark=f"the chart names no depth areas; forbidden water is {clearance} away {nearest}",
+        )
     )
     return [*chances, water]
 

@@ -49,11 +49,12 @@ def load_area(path: Path | str, *, draught_m: float) -> SeaArea:
     box = _checked_bounds(given, chart, entry.at("bounds"))
     frame = _frame(box)
     found = chart.zones(box, frame)
-    no_go, without_effect = _no_go(file.no_go, box, frame, entry.at("no_go"))
+    named, without_effect = _no_go(file.no_go, box, frame, entry.at("no_go"))
     zones = Zones(
         bounds=in_metres(shapely.box(*box), frame),
         land=found.land,
-        no_go=shapely.union(no_go, found.closed),
+        no_go=shapely.union_all([*(polygon for _, polygon in named), found.closed]),
+        named=named,
         deep=found.deep,
         depths=found.depths,
     )
@@ -125,9 +126,9 @@ def _frame(box: Box) -> LocalFrame:
 
 def _no_go(
     zones: list[NoGoTable], box: Box, frame: LocalFrame, entry: Entry
-) -> tuple[shapely.Geometry, tuple[str, ...]]:
-    """The zones in metres, and one sentence for each that closes nothing."""
-    polygons, notes = [], []
+) -> tuple[tuple[tuple[str, shapely.Geometry], ...], tuple[str, ...]]:
+    """Name and polygon in metres of the zones, and one sentence for each that closes nothing."""
+    named, notes = [], []
     for index, zone in enumerate(zones, start=1):
         place = entry.item(index).at("polygon")
         for number, (lat, lon) in enumerate(zone.polygon, start=1):
@@ -142,11 +143,11 @@ def _no_go(
         if not shapely.is_valid(polygon) or polygon.area == 0:
             raise place.error(f"of {zone.name!r} crosses itself or has no area, expected a simple outline")
         if polygon.intersects(shapely.box(*box)):
-            polygons.append(in_metres(polygon, frame))
+            named.append((zone.name, in_metres(polygon, frame)))
         else:
             off = f"{off_km(polygon, box):.3g} km outside the bounds"
             notes.append(f"no-go zone {zone.name!r} lies {off} and closes nothing")
-    return shapely.union_all(polygons), tuple(notes)
+    return tuple(named), tuple(notes)
 
 
 def _check_near(corners: Array, name: str, box: Box, place: Entry) -> None:
