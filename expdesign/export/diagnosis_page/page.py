@@ -117,7 +117,7 @@ def diagnosis_html(
         outputs=", ".join(found.before.outputs),
         whole=_mean_missing(found),
         tested=[(cause_title(cause), p_value) for cause, p_value in found.screened],
-        accuracy=_accuracy(found),
+        accuracy=accuracy_rows(found),
         data=_data(found),
         roll=roll_sentences(roll),
         notes=diagnosis_notes(found),
@@ -178,7 +178,8 @@ def _stretch(found: Diagnosis, index: int) -> str:
     return windows.names[int(windows.batch[index])] + (f", from {begin:.0f}{words.NB}s" if begin > 0 else "")
 
 
-def _accuracy(found: Diagnosis) -> list[tuple[str, ...]]:
+def accuracy_rows(found: Diagnosis) -> list[tuple[str, ...]]:
+    """By output: fit, root mean square and mean of the error, as the vessel file states and with what was found."""
     rows = []
     for index, name in enumerate(found.before.outputs):
         unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)

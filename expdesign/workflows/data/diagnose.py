@@ -17,6 +17,7 @@ from expdesign.estimation.regression import model_for
 from expdesign.export import Content, write_files
 from expdesign.export.diagnosis_page import (
     RollVerdict,
+    accuracy_rows,
     diagnosis_html,
     diagnosis_json,
     diagnosis_notes,
@@ -152,7 +153,13 @@ def _summary(found: Diagnosis) -> dict[str, object]:
 
 
 def _tables(found: Diagnosis) -> tuple[TextTable, ...]:
+    fits = ("output", "fit, %", "rms error", "mean error", "fit after", "rms error after", "mean error after")
+    accuracy = TextTable(
+        title="Simulation of the vessel file against the data, and after what was found",
+        header=fits,
+        rows=tuple(accuracy_rows(found)),
+    )
     if not found.findings:
-        return ()
+        return (accuracy,)
     header, rows = diagnosis_tables(found)
-    return (TextTable(title="Causes of the simulation error", header=header, rows=tuple(rows)),)
+    return TextTable(title="Causes of the simulation error", header=header, rows=tuple(rows)), accuracy
