@@ -1,0 +1,324 @@
+"""The values of a card fitted, with the regressions as prior; what follows for her trials, and what contradicts.
+
+The unknowns are the logarithms of `FACTORS` by their standard deviations, a priori independent and standard normal.
+The most probable ones minimise
+
+    sum over stated values of (log(simulated / stated) / scatter)^2 + sum of squared unknowns;
+
+the inverse of half its curvature is their covariance. Predictions are linear in them around there, in logarithms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from expdesign.errors import InputError
+from expdesign.particulars.card import SCATTER, Card, Stated, Trial
+from expdesign.particulars.forces import FACTORS, Propeller, design_speed, factors, propellers, resistance
+from expdesign.particulars.nominal import OWN_SCATTER, parameters, vessel_of, with_scatter
+from expdesign.particulars.trials import Fleet
+from expdesign.progress import Progress, silent
+from expdesign.values import Array
+from expdesign.vessel import Vessel
+
+STEP = 0.05
+"""Change of an unknown for its derivative."""
+MOST_FITS = 25
+DOUBTFUL = 3.0
+"""Standard deviations from what all other values say, from which a value contradicts them."""
+NINETY_FIVE = 1.96
+SAME_SPEED = 0.03
+"""Share within which two approach speeds count as one."""
+PITCH = (0.45, 1.55)
+"""Pitch ratios that propellers have."""
+EFFICIENCY = 0.75
+"""Propulsive efficiency that no ship of one hull exceeds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predicted:
+    """A quantity of a trial with its 95 % interval, beside what the card states."""
+
+    trial: Trial
+    quantity: str
+    value: float
+    low: float
+    high: float
+    prior: float  # from particulars alone
+    prior_std_log: float  # of its logarithm
+    stated: tuple[Stated, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """A factor before and after the fit."""
+
+    name: str
+    source: str
+    std_log: float  # before
+    value: float  # after
+    std_log_after: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Nominal:
+    """A vessel out of a card."""
+
+    card: Card
+    driving: tuple[Propeller, ...]
+    vessel: Vessel  # with standard deviations and correlations
+    found: tuple[Found, ...]  # factors that act in this ship
+    predicted: tuple[Predicted, ...]
+    contradictions: tuple[str, ...]  # one sentence each
+
+
+class _Problem:
+    """Simulated values of trials and their derivatives, for unknowns."""
+
+    def __init__(self, card: Card) -> None:
+        self.card, self.driving = card, propellers(card)
+        self.ship = vessel_of(card, self.driving, np.zeros(len(FACTORS)))
+        base = self.ship.model.parameters
+        changed = [self.parameters(unknowns) != base for unknowns in np.eye(len(FACTORS))]
+        self.active = [place for place, differs in enumerate(changed) if differs.any()]
+
+    def parameters(self, unknowns: Array) -> Array:
+        """(p,) for unknowns (f,)."""
+        found = {term.name: value for term, value in parameters(self.card, self.driving, unknowns).items()}
+        return np.array([found[name] for name in self.ship.model.names])
+
+    def slopes(self, unknowns: Array) -> Array:
+        """(p, f) of parameters by active unknowns."""
+        base = self.parameters(unknowns)
+        steps = STEP * np.eye(len(FACTORS))[self.active]
+        return np.array([(self.parameters(unknowns + step) - base) / STEP for step in steps]).T
+
+    def simulated(self, unknowns: Array, trials: Iterable[Trial]) -> dict[tuple[Trial, str], tuple[float, Array]]:
+        """Logarithm of each quantity, with its derivatives by unknowns (f,), then by logarithms of parameters (p,)."""
+        base = self.parameters(unknowns)
+        steps = STEP * np.eye(len(FACTORS))[self.active]
+        own = base * (1 + STEP * np.eye(len(base)))
+        variants = np.array([base, *(self.parameters(unknowns + step) for step in steps), *own])
+        fleet = Fleet(self.ship, variants, fastest_mps=4 * design_speed(self.card))
+        found = {}
+        for trial in trials:
+            for quantity, values in fleet.results(trial).items():
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    logs = np.log(values)
+                slopes = (logs[1:] - logs[0]) / STEP
+                found[trial, quantity] = float(logs[0]), np.where(np.isfinite(slopes), slopes, 0.0)
+        return found
+
+
+class _Residuals:
+    """Residuals and their derivatives at the last unknowns asked for."""
+
+    def __init__(self, problem: _Problem, stated: tuple[Stated, ...]) -> None:
+        self.problem, self.stated = problem, stated
+        self._at: Array | None = None
+
+    def _look(self, unknowns: Array) -> None:
+        if self._at is not None and np.array_equal(self._at, unknowns):
+            return
+        full = _full(unknowns, self.problem.active)
+        found = self.problem.simulated(full, dict.fromkeys(one.trial for one in self.stated))
+        count = len(unknowns)
+        self.values = np.array([found[one.trial, one.quantity][0] for one in self.stated]).reshape(-1)
+        self.slopes = np.array([found[one.trial, one.quantity][1][:count] for one in self.stated]).reshape(-1, count)
+        self._at = unknowns.copy()
+
+    @cached_property
+    def std(self) -> Array:
+        return np.array([one.std_log for one in self.stated])
+
+    def errors(self, unknowns: Array) -> Array:
+        """Of logarithms; a trial that is not completed counts as twice too large."""
+        self._look(unknowns)
+        logs = np.log([one.value for one in self.stated])
+        return np.nan_to_num(self.values - logs, nan=math.log(2), posinf=math.log(2), neginf=-math.log(2))
+
+    def __call__(self, unknowns: Array) -> Array:
+        return np.concatenate([self.errors(unknowns) / self.std, unknowns])
+
+    def jacobian(self, unknowns: Array) -> Array:
+        self._look(unknowns)
+        return np.concatenate([self.slopes / self.std[:, None], np.eye(len(unknowns))])
+
+
+def _full(unknowns: Array, active: list[int]) -> Array:
+    full = np.zeros(len(FACTORS))
+    full[active] = unknowns
+    return full
+
+
+def nominal(card: Card, *, progress: Progress = silent) -> Nominal:
+    """The vessel of a card.
+
+    Args:
+        card: particulars and stated values.
+        progress: of the fit.
+
+    Raises:
+        InputError: nothing drives her.
+    """
+    problem = _Problem(card)
+    count = len(problem.active)
+    stated = _with_top_speed(card)
+    residuals = _Residuals(problem, stated)
+    unknowns, covariance = np.zeros(count), np.eye(count)
+    if stated:
+        progress("fitting the stated values", 0.1)
+        fitted = scipy.optimize.least_squares(
+            residuals, unknowns, jac=residuals.jacobian, method="trf", x_scale=1.0, max_nfev=MOST_FITS, ftol=1e-5,
+            xtol=1e-5, bounds=(-4.0, 4.0),
+        )  # fmt: skip
+        unknowns = fitted.x
+        covariance = np.linalg.inv(residuals.jacobian(unknowns).T @ residuals.jacobian(unknowns))
+    progress("simulating her trials", 0.6)
+    full = _full(unknowns, problem.active)
+    trials = _trials(card, problem.ship, stated)
+    after, before = problem.simulated(full, trials), problem.simulated(np.zeros(len(FACTORS)), trials)
+    progress("comparing", 0.9)
+    return Nominal(
+        card=card,
+        driving=problem.driving,
+        vessel=with_scatter(vessel_of(card, problem.driving, full), problem.slopes(full), covariance),
+        found=_found(problem, full, covariance),
+        predicted=tuple(_predicted(after, before, covariance, stated)),
+        contradictions=(*_impossible(card, problem.driving), *_contradictory(residuals, unknowns, covariance)),
+    )
+
+
+def _with_top_speed(card: Card) -> tuple[Stated, ...]:
+    """What is fitted: the stated values, and the top speed unless a speed at full order is among them."""
+    known = any(one.trial.kind == "speed" and abs(one.trial.order - 1.0) < SAME_SPEED for one in card.stated)
+    if card.top_speed_mps is None or known:
+        return card.stated
+    top = Stated(
+        trial=Trial(kind="speed"), quantity="speed_mps", value=card.top_speed_mps, source="ship.top_speed_kn"
+    )
+    return (top, *card.stated)
+
+
+def _trials(card: Card, ship: Vessel, stated: tuple[Stated, ...]) -> list[Trial]:
+    """What is predicted: all stated trials, and the standard ones where none of these is like them."""
+    known = list(dict.fromkeys(one.trial for one in stated))
+    return [*known, *(one for one in _standard(card, ship) if not any(_alike(one, other) for other in known))]
+
+
+def _standard(card: Card, ship: Vessel) -> Iterator[Trial]:
+    top = design_speed(card)
+    for order in (0.25, 0.5, 0.75, 1.0):
+        yield Trial(kind="speed", order=order)
+    hard = min([math.radians(35.0), *(rudder.angle_max_rad for rudder in card.rudders)])
+    for share in (0.95, 0.65, 0.35):
+        yield Trial(kind="circle", speed_mps=share * top, angle_rad=hard)
+    for degrees in (10.0, 20.0):
+        yield Trial(kind="zigzag", speed_mps=0.95 * top, angle_rad=math.radians(degrees))
+    if all(one.astern_share > 0 for one in card.drives):
+        yield Trial(kind="stop", speed_mps=0.95 * top)
+    if any(one.kind != "propeller" or one.starboard_m for one in card.thrusters):
+        yield Trial(kind="spin")
+    if card.windage is not None:
+        yield Trial(kind="drift", speed_mps=20 * 1852 / 3600)
+
+
+def _alike(one: Trial, other: Trial) -> bool:
+    near = abs(one.speed_mps - other.speed_mps) <= SAME_SPEED * max(one.speed_mps, other.speed_mps)
+    same = abs(one.angle_rad - other.angle_rad) < 0.01 and abs(one.order - other.order) < SAME_SPEED
+    return one.kind == other.kind and near and same
+
+
+def _predicted(
+    after: dict[tuple[Trial, str], tuple[float, Array]],
+    before: dict[tuple[Trial, str], tuple[float, Array]],
+    covariance: Array,
+    stated: tuple[Stated, ...],
+) -> Iterator[Predicted]:
+    for (trial, quantity), (value, slopes) in after.items():
+        if not math.isfinite(value):
+            continue
+        spread = NINETY_FIVE * _std(slopes, covariance, quantity)
+        first, first_slopes = before[trial, quantity]
+        yield Predicted(
+            trial=trial, quantity=quantity, value=math.exp(value), low=math.exp(value - spread),
+            high=math.exp(value + spread), prior=math.exp(first) if math.isfinite(first) else math.nan,
+            prior_std_log=_std(first_slopes, np.eye(len(covariance)), quantity),
+            stated=tuple(one for one in stated if one.trial == trial and one.quantity == quantity),
+        )  # fmt: skip
+
+
+def _std(slopes: Array, covariance: Array, quantity: str) -> float:
+    """Standard deviation of the logarithm of what a trial would show."""
+    by_factors, by_parameters = slopes[: len(covariance)], slopes[len(covariance) :]
+    own = OWN_SCATTER**2 * float(by_parameters @ by_parameters)
+    return math.sqrt(float(by_factors @ covariance @ by_factors) + own + SCATTER[quantity] ** 2)
+
+
+def _found(problem: _Problem, full: Array, covariance: Array) -> tuple[Found, ...]:
+    given, spreads = factors(full), np.sqrt(np.diag(covariance))
+    return tuple(
+        Found(
+            name=FACTORS[place].name, source=FACTORS[place].source, std_log=FACTORS[place].std_log,
+            value=given[FACTORS[place].name], std_log_after=FACTORS[place].std_log * float(spread),
+        )
+        for place, spread in zip(problem.active, spreads, strict=True)
+    )  # fmt: skip
+
+
+def _contradictory(residuals: _Residuals, unknowns: Array, covariance: Array) -> Iterator[str]:
+    """Stated values that are far from what all the others and the particulars say."""
+    if not residuals.stated:
+        return
+    errors = residuals.errors(unknowns)
+    for one, error, slopes in zip(residuals.stated, errors, residuals.slopes, strict=True):
+        left = max(1.0 - float(slopes @ covariance @ slopes) / one.std_log**2, 1e-3)
+        apart = float(error) / (one.std_log * math.sqrt(left))
+        if abs(apart) > DOUBTFUL:
+            others = one.value * math.exp(float(error) / left)
+            yield f"{one.source} is {shown(one.quantity, one.value)}, where all else says about " + (
+                f"{shown(one.quantity, others)}: {abs(apart):.1f} standard deviations apart"
+            )
+
+
+def _impossible(card: Card, driving: tuple[Propeller, ...]) -> Iterator[str]:
+    """Particulars that no ship has together."""
+    if not 0.3 <= card.hull.block <= 0.95:
+        yield (
+            f"ship.displacement_t and the dimensions give a block coefficient of {card.hull.block:.2f}, expected 0.3 "
+            "to 0.95"
+        )
+    if card.top_speed_mps is None:
+        return
+    power = sum(one.power_w for one in card.drives if one.power_w)
+    needed = resistance(card.hull, card.top_speed_mps) * card.top_speed_mps**3
+    if power and needed / power > EFFICIENCY * math.exp(NINETY_FIVE * FACTORS[0].std_log):
+        yield (
+            f"ship.top_speed_kn is {shown('speed_mps', card.top_speed_mps)}, which takes about {needed / 0.65e3:.0f} kW "
+            f"on the shafts, and the thrusters have {power / 1e3:.0f} kW"
+        )
+    for one in driving:
+        if one.thruster.max_rps is not None and one.thruster.diameter_m and not PITCH[0] < one.pitch_ratio < PITCH[1]:
+            yield (
+                f"thrusters[{one.number}]: {60 * one.max_rps:.0f} rpm with {one.diameter_m:g} m at "
+                f"{shown('speed_mps', card.top_speed_mps)} would take a pitch ratio of "
+                f"{'more' if one.pitch_ratio > 1 else 'less'} than {PITCH[int(one.pitch_ratio > 1)]:g}"
+            )
+
+
+UNITS = {"mps": (3600 / 1852, "kn"), "m": (1.0, "m"), "s": (1.0, "s"), "rad": (180 / math.pi, "deg")}
+"""Ending of a quantity -> factor and unit as mariners have it."""
+
+
+def shown(quantity: str, value: float) -> str:
+    """A value with its unit, as on a card."""
+    scale, unit = UNITS[quantity.rpartition("_")[2]]
+    return f"{scale * value:.3g} {unit}"
+
+
