@@ -5,13 +5,13 @@ The most probable ones minimise
 
     sum over stated values of (log(simulated / stated) / scatter)^2 + sum of squared unknowns;
 
-the inverse of half its curvature is their covariance. Predictions are linear in them around there, in logarithms.
+the inverse of half its curvature is their covariance. Intervals are quantiles of simulated trials of drawn ships.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +21,7 @@ import scipy
 from expdesign.errors import InputError
 from expdesign.particulars.card import SCATTER, Card, Stated, Trial
 from expdesign.particulars.forces import FACTORS, Propeller, design_speed, factors, propellers, resistance
-from expdesign.particulars.nominal import OWN_SCATTER, parameters, vessel_of, with_scatter
+from expdesign.particulars.model import OWN_SCATTER, parameters, vessel_of, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
@@ -33,6 +33,8 @@ MOST_FITS = 25
 DOUBTFUL = 3.0
 """Standard deviations from what all other values say, from which a value contradicts them."""
 NINETY_FIVE = 1.96
+DRAWS = 240
+"""Ships that are drawn for the intervals of predictions."""
 SAME_SPEED = 0.03
 """Share within which two approach speeds count as one."""
 PITCH = (0.45, 1.55)
@@ -50,8 +52,7 @@ class Predicted:
     value: float
     low: float
     high: float
-    prior: float  # from particulars alone
-    prior_std_log: float  # of its logarithm
+    prior: float  # from particulars alone, nan where that ship does not come to the end of the trial
     stated: tuple[Stated, ...] = ()
 
 
@@ -99,13 +100,23 @@ class _Problem:
         steps = STEP * np.eye(len(FACTORS))[self.active]
         return np.array([(self.parameters(unknowns + step) - base) / STEP for step in steps]).T
 
+    def drawn(self, unknowns: Array, covariance: Array, rng: np.random.Generator) -> Array:
+        """(n, p) parameters of ships drawn around unknowns (f,), with scatter of their own."""
+        draws = _full(unknowns, self.active) + np.stack(
+            [_full(one, self.active) for one in rng.multivariate_normal(0 * unknowns, covariance, size=DRAWS)]
+        )
+        found = np.array([self.parameters(one) for one in draws])
+        return np.asarray(found * np.exp(OWN_SCATTER * rng.standard_normal(found.shape)))
+
+    def fleet(self, parameters: Array) -> Fleet:
+        """Ships with these parameters (n, p)."""
+        return Fleet(self.ship, parameters, fastest_mps=4 * design_speed(self.card))
+
     def simulated(self, unknowns: Array, trials: Iterable[Trial]) -> dict[tuple[Trial, str], tuple[float, Array]]:
-        """Logarithm of each quantity, with its derivatives by unknowns (f,), then by logarithms of parameters (p,)."""
+        """Logarithm of each quantity, with its derivatives by active unknowns."""
         base = self.parameters(unknowns)
         steps = STEP * np.eye(len(FACTORS))[self.active]
-        own = base * (1 + STEP * np.eye(len(base)))
-        variants = np.array([base, *(self.parameters(unknowns + step) for step in steps), *own])
-        fleet = Fleet(self.ship, variants, fastest_mps=4 * design_speed(self.card))
+        fleet = self.fleet(np.array([base, *(self.parameters(unknowns + step) for step in steps)]))
         found = {}
         for trial in trials:
             for quantity, values in fleet.results(trial).items():
@@ -130,7 +141,7 @@ class _Residuals:
         found = self.problem.simulated(full, dict.fromkeys(one.trial for one in self.stated))
         count = len(unknowns)
         self.values = np.array([found[one.trial, one.quantity][0] for one in self.stated]).reshape(-1)
-        self.slopes = np.array([found[one.trial, one.quantity][1][:count] for one in self.stated]).reshape(-1, count)
+        self.slopes = np.array([found[one.trial, one.quantity][1] for one in self.stated]).reshape(-1, count)
         self._at = unknowns.copy()
 
     @cached_property
@@ -157,11 +168,12 @@ def _full(unknowns: Array, active: list[int]) -> Array:
     return full
 
 
-def nominal(card: Card, *, progress: Progress = silent) -> Nominal:
+def nominal(card: Card, *, seed: int = 0, progress: Progress = silent) -> Nominal:
     """The vessel of a card.
 
     Args:
         card: particulars and stated values.
+        seed: of the ships that are drawn for intervals.
         progress: of the fit.
 
     Raises:
@@ -182,15 +194,17 @@ def nominal(card: Card, *, progress: Progress = silent) -> Nominal:
         covariance = np.linalg.inv(residuals.jacobian(unknowns).T @ residuals.jacobian(unknowns))
     progress("simulating her trials", 0.6)
     full = _full(unknowns, problem.active)
+    rng = np.random.default_rng(seed)
+    named = np.stack([problem.parameters(np.zeros(len(FACTORS))), problem.parameters(full)])
+    fleet = problem.fleet(np.concatenate([named, problem.drawn(unknowns, covariance, rng)]))
     trials = _trials(card, problem.ship, stated)
-    after, before = problem.simulated(full, trials), problem.simulated(np.zeros(len(FACTORS)), trials)
-    progress("comparing", 0.9)
+    predicted = [one for trial in trials for one in _predicted(trial, fleet.results(trial), stated, rng)]
     return Nominal(
         card=card,
         driving=problem.driving,
         vessel=with_scatter(vessel_of(card, problem.driving, full), problem.slopes(full), covariance),
         found=_found(problem, full, covariance),
-        predicted=tuple(_predicted(after, before, covariance, stated)),
+        predicted=tuple(predicted),
         contradictions=(*_impossible(card, problem.driving), *_contradictory(residuals, unknowns, covariance)),
     )
 
@@ -236,29 +250,19 @@ def _alike(one: Trial, other: Trial) -> bool:
 
 
 def _predicted(
-    after: dict[tuple[Trial, str], tuple[float, Array]],
-    before: dict[tuple[Trial, str], tuple[float, Array]],
-    covariance: Array,
-    stated: tuple[Stated, ...],
+    trial: Trial, results: Mapping[str, Array], stated: tuple[Stated, ...], rng: np.random.Generator
 ) -> Iterator[Predicted]:
-    for (trial, quantity), (value, slopes) in after.items():
-        if not math.isfinite(value):
+    """Of the ship from particulars alone, the fitted one, then drawn ones; what these do not reach counts as endless."""
+    for quantity, values in results.items():
+        before, value, *drawn = values.tolist()
+        if not 0 < value < math.inf:
             continue
-        spread = NINETY_FIVE * _std(slopes, covariance, quantity)
-        first, first_slopes = before[trial, quantity]
+        shows = np.nan_to_num(drawn, nan=math.inf) * np.exp(SCATTER[quantity] * rng.standard_normal(len(drawn)))
+        low, high = np.quantile(shows, [0.025, 0.975], method="inverted_cdf").tolist()
         yield Predicted(
-            trial=trial, quantity=quantity, value=math.exp(value), low=math.exp(value - spread),
-            high=math.exp(value + spread), prior=math.exp(first) if math.isfinite(first) else math.nan,
-            prior_std_log=_std(first_slopes, np.eye(len(covariance)), quantity),
+            trial=trial, quantity=quantity, value=value, low=min(low, value), high=max(high, value), prior=before,
             stated=tuple(one for one in stated if one.trial == trial and one.quantity == quantity),
         )  # fmt: skip
-
-
-def _std(slopes: Array, covariance: Array, quantity: str) -> float:
-    """Standard deviation of the logarithm of what a trial would show."""
-    by_factors, by_parameters = slopes[: len(covariance)], slopes[len(covariance) :]
-    own = OWN_SCATTER**2 * float(by_parameters @ by_parameters)
-    return math.sqrt(float(by_factors @ covariance @ by_factors) + own + SCATTER[quantity] ** 2)
 
 
 def _found(problem: _Problem, full: Array, covariance: Array) -> tuple[Found, ...]:

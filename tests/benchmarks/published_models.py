@@ -172,3 +172,172 @@ def kvlcc2() -> Model:
         rudder=(0.0539, -0.5, 2.747, 0.626, 0.50, 1.09, 0.640, 0.395, -0.710, 0.387, 0.312, -0.464),
         t_p=0.220, w_p=0.40, wake=(1.6, 1.1), speed=1.179, helm_rate=math.radians(15.8),
     )  # fmt: skip
+
+
+def seiun_maru() -> Model:
+    """The training ship Seiun Maru (Yoshimura and Masumoto 2012), full scale; speed of a Froude number of 0.26."""
+    return mmg(
+        length=105.0, beam=17.91, draught=5.966, volume=5701.6, gravity=-2.249, rho=1000.0, m_x=0.0167, m_y=0.1576,
+        j_z=0.009, r_0=0.016, hull_x=(-0.0804, -0.072, 0.022, 0.439),
+        hull_y=np.array([-0.317, 0.052, -1.604, -0.75, -0.8599, -0.051]),
+        hull_n=np.array([-0.1136, -0.0795, -0.3095, -0.6257, -0.3143, -0.0502]),
+        propeller=(4.7, -0.5, 0.4, -0.4, 0.0, 2.2),
+        rudder=(13.405, -0.5, 2.88, 0.960, 0.676, 1.033, 0.394, 0.312, -0.947, 0.341, 0.236, -0.40),
+        t_p=0.21, w_p=0.204, speed=8.3, helm_rate=math.radians(2.32),
+    )  # fmt: skip
+
+
+def mariner() -> Model:
+    """The Mariner class at 15 kn: planar motion tests of M. S. Chislett and J. Stroem-Tejsen, HyA Report Hy-5 (1965)."""
+    length, speed = 160.93, 15 * KNOT
+    m, i_z, x_g = 798e-5, 39.2e-5, -0.023
+    left = np.array([[m + 748e-5, m * x_g + 9.354e-5], [m * x_g - 4.646e-5, i_z + 43.8e-5]])
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        start = speed * order
+        swift = math.hypot(x[0], x[1])
+        u, v, r, d = (x[0] - start) / swift, x[1] / swift, x[2] * length / swift, -delta
+        total_x = (
+            -184 * u - 110 * u**2 - 215 * u**3 - 899 * v**2 + 18 * r**2 + 798 * r * v - 95 * d**2 - 190 * u * d**2
+            + 93 * v * d + 93 * u * v * d
+        )  # fmt: skip
+        total_y = (
+            -1160 * v - 499 * r - 8078 * v**3 + 15356 * v**2 * r - 1160 * v * u - 499 * r * u
+            + 278 * d - 90 * d**3 + 556 * u * d + 278 * u**2 * d - 4 * v * d**2 + 1190 * v**2 * d
+            - 4 - 8 * u - 4 * u**2
+        )  # fmt: skip
+        total_n = (
+            -264 * v - 166 * r + 1636 * v**3 - 5483 * v**2 * r - 264 * v * u - 166 * r * u
+            - 139 * d + 45 * d**3 - 278 * u * d - 139 * u**2 * d + 13 * v * d**2 - 489 * v**2 * d
+            + 3 + 6 * u + 3 * u**2
+        )  # fmt: skip
+        dv, dr = np.linalg.solve(left, np.array([total_y, total_n]) * 1e-5)
+        return np.array([total_x * 1e-5 / (m + 42e-5), dv, dr / length]) * swift**2 / length
+
+    return Model(length_m=length, speed_mps=speed, rates=rates, helm_rate_radps=math.radians(2.5))
+
+
+def s175() -> Model:
+    """The container ship S-175 upright: K. Son and K. Nomoto, J. SNAJ 150 (1981); its roll is left out."""
+    length, rho, d_p = 175.0, 1025.0, 6.533
+    m, m_x, m_y, i_z = 0.00792, 0.000238, 0.007049, 0.000456 + 0.000419
+    cubes_y = np.array([-0.0116, 0.00242, -0.109, 0.0214, -0.0405, 0.00177])
+    cubes_n = np.array([-0.0038545, -0.00222, 0.001492, -0.0424, 0.00156, -0.00229])
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        swift = max(math.hypot(x[0], x[1]), 1e-6)
+        u, v, r = x[0] / swift, x[1] / swift, x[2] * length / swift
+        n = max(order * 80.0 / 60.0, 1e-6)
+        v_r = 0.088 * v - 0.156 * r - 0.275 * r**3 + 1.96 * r**2 * v
+        u_p = u * ((1 - 0.184) + 1.09 * (v - 0.526 * r) ** 2)
+        j = max(u_p * swift / (n * d_p), 1e-3)
+        k_t = 0.527 - 0.455 * j
+        u_r = u_p * 0.921 * math.sqrt(1 + 8 * 0.631 * max(k_t, 0.0) / (math.pi * j * j))
+        f_n = -(6.13 * 1.8219 / (1.8219 + 2.25)) * (33.0376 / length**2) * (u_r**2 + v_r**2)
+        f_n *= math.sin(delta + math.atan2(v_r, u_r))
+        thrust = 2 * d_p**4 / (swift * length) ** 2 * k_t * n * n
+        terms = np.array([v, r, v**3, v * v * r, v * r * r, r**3])
+        total_x = -0.0004226 * u**2 + (1 - 0.175) * thrust - 0.00311 * v * r - 0.00386 * v**2 + 0.00020 * r**2
+        total_x += 0.71 * f_n * math.sin(delta) + (m + m_y) * v * r
+        total_y = float(terms @ cubes_y) + (1 + 0.237) * f_n * math.cos(delta) - (m + m_x) * u * r
+        total_n = float(terms @ cubes_n) + (-0.5 - 0.237 * 0.48) * f_n * math.cos(delta)
+        du, dv, dr = total_x / (m + m_x), total_y / (m + m_y), total_n / i_z / length
+        return np.array([du, dv, dr]) * swift**2 / length
+
+    return Model(length_m=length, speed_mps=7.0, rates=rates, helm_rate_radps=math.radians(2.32))
+
+
+def tanker_190k() -> Model:
+    """A tanker of 190 000 dwt in deep water: W. B. van Berlekom and T. A. Goddard, Transactions SNAME 80 (1972)."""
+    length = 304.8
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        u, v, r = x
+        d, n, beta = -delta, order * 80.0 / 60.0, math.atan2(v, u)
+        thrust = -0.00695 * u * u / length - 0.00063 * u * n + length * 0.0000354 * n * n
+        c2 = 0.605 * u * n + 38.2 * n * n
+        side = -c2 * abs(beta) * beta * abs(d)
+        du = (
+            -0.0377 * u * u + length * 2.020 * v * r + 0.3 * v * v - 0.093 * c2 * d * d + 0.152 * c2 * beta * d
+            + length * thrust * (1 - 0.22)
+        ) / length / 1.050  # fmt: skip
+        dv = (
+            -1.205 * u * v - 2.400 * abs(v) * v + 0.208 * c2 * d - 0.752 * length * u * r + 2.16 * side
+            + 0.04 * thrust * length
+        ) / length / 2.020  # fmt: skip
+        dr = (
+            -0.451 * u * v - 0.300 * length * abs(v) * r - 0.098 * c2 * d - 0.231 * length * u * r - 0.688 * side
+            - 0.02 * thrust * length
+        ) / length**2 / 0.1232  # fmt: skip
+        return np.array([du, dv, dr])
+
+    return Model(length_m=length, speed_mps=8.23, rates=rates, helm_rate_radps=math.radians(2.33))
+
+
+def esso_osaka() -> Model:
+    """The 3 m model of Esso Osaka with the unified hull forces for harbour speeds, as Y. Miyauchi, A. Maki, N. Umeda,
+    D. M. Rachman and Y. Akimoto give them, J. Marine Science and Technology 27 (2022), initial parameters."""
+    length, draught, rho, d_p, area = 3.0, 0.20114, 998.0, 0.084, 0.01063
+    unit = rho / 2 * length * draught
+    mass, x_g = 0.27078 * unit * length, 0.03119 * length
+    m_x, m_y, i_zz = 0.0467 * unit * length, 0.2579 * unit * length, 0.0286 * unit * length**3
+    left = np.array([[mass + m_y, mass * x_g], [mass * x_g, i_zz + mass * x_g**2]])
+    strips = np.linspace(-0.5, 0.5, 101)
+    height = math.sqrt(area * 1.539)
+    eta, slope = min(d_p / height, 1.0), 6.13 * 1.539 / (2.25 + 1.539)
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        u, v, r = x
+        swift, n = max(math.hypot(u, v), 1e-6), max(order * 10.0, 1e-6)
+        across, rate = v / swift, r * length
+        side = across - 0.517 * rate / swift
+        wake = float(np.clip(0.614 - 0.871 * abs(side) + 0.359 * side**2, 0.0, 1.0))
+        u_p = u * (1.0 - wake)
+        j = u_p / (n * d_p)
+        k_t = 0.3278 - 0.3323 * j - 0.156 * j * j
+        thrust = (1.0 - 0.22) * rho * d_p**4 * n * n * k_t
+        jet = math.sqrt(max(u_p**2 + 8.0 * k_t * n * n * d_p * d_p / math.pi, 0.0))
+        u_r = 1.42 * math.sqrt(eta * (u_p + 0.288 / 1.42 * (jet - u_p)) ** 2 + (1.0 - eta) * u_p**2)
+        v_r = -(0.3506 if v - length / 2 * r >= 0 else 0.4406) * (v - 1.08 * rate)
+        f_n = rho / 2 * area * (u_r**2 + v_r**2) * slope * math.sin(delta - math.atan2(v_r, u_r))
+        flow_y, flow_n = v + 2.217 * rate * strips, v + 0.8097 * rate * strips
+        drag_y = 0.9665 * float(np.trapezoid(np.abs(flow_y) * flow_y, strips))
+        drag_n = 0.9665 * float(np.trapezoid(np.abs(flow_n) * flow_n * strips, strips))
+        beta = abs(math.atan2(v, u))
+        total_x = unit * ((-0.02139 - 0.0105 * beta / math.pi) * u * swift + 0.4535 * v * rate) + thrust
+        total_x -= (1.0 - 0.19) * f_n * math.sin(delta)
+        total_y = unit * (-0.3728 * v * abs(u) + 0.116 * rate * u - drag_y) - 1.393 * f_n * math.cos(delta)
+        total_n = unit * length * (-0.1458 * v * u - 0.04849 * rate * abs(u) - drag_n)
+        total_n += (0.5 + 0.393 * 0.45) * length * f_n * math.cos(delta)
+        du = (total_x + mass * v * r + mass * x_g * r * r) / (mass + m_x)
+        dv, dr = np.linalg.solve(left, [total_y - (mass + m_x) * u * r, total_n - mass * x_g * u * r])
+        return np.array([du, dv, dr])
+
+    return Model(length_m=length, speed_mps=0.4, rates=rates, helm_rate_radps=math.radians(20.0))
+
+
+def otter() -> Model:
+    """The Otter, a catamaran of 2 m: T. I. Fossen, MSS (2024); helm is the share of thrust that the sides differ by."""
+    length, rho, beam, mass, x_g = 2.0, 1025.0, 0.25, 55.0, 0.2
+    draught = mass / rho / (2 * 0.4 * beam * length)
+    i_z = mass * (0.25 * length) ** 2 + mass * x_g**2
+    added = 2.7 * rho * (mass / rho) ** (5 / 3) / length**2
+    m_y, j_z = 1.5 * mass, 1.7 * i_z
+    left = np.array([[mass + m_y, mass * x_g], [mass * x_g, i_z + j_z]])
+    strips = np.linspace(-length / 2, length / 2, 41)
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        u, v, r = x
+        full, back = 24.4 * 9.81 / 2, 13.6 * 9.81 / 2
+        sides = [float(np.clip(order + side * math.sin(delta), -1, 1)) for side in (1, -1)]  # port, starboard
+        port, starboard = (full * s * s if s > 0 else -back * s * s for s in sides)
+        flow = v + strips * r
+        drag = -rho / 2 * draught * 0.6 * np.abs(flow) * flow
+        total_x = port + starboard - 24.4 * 9.81 / (6 * KNOT) * u + (mass + m_y) * v * r + mass * x_g * r * r
+        total_y = -(mass + m_y) / 1.0 * v + float(np.trapezoid(drag, strips)) - (mass + added) * u * r
+        total_n = 0.395 * (port - starboard) - (i_z + j_z) * (1 + 10 * abs(r)) * r
+        total_n += float(np.trapezoid(drag * strips, strips)) - mass * x_g * u * r - (m_y - added) * u * v
+        dv, dr = np.linalg.solve(left, np.array([total_y, total_n]))
+        return np.array([total_x / (mass + added), dv, dr])
+
+    return Model(length_m=length, speed_mps=4 * KNOT, rates=rates, helm_rate_radps=100.0)

@@ -13,7 +13,7 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 EQUATIONS = {"u": "X", "v": "Y", "r": "N"}
-OWN_SCATTER = 0.05
+OWN_SCATTER = 0.03
 """Standard deviation of each parameter by itself, by its value: what a projection on few terms leaves out."""
 SIGNS = {
     "X_abs_u_u": -1, "Y_uv": -1, "Y_abs_v_v": -1, "N_ur": -1, "N_abs_r_r": -1, "W_wind_u": -1, "W_wind_v": -1,
