@@ -20,7 +20,16 @@ import scipy
 
 from expdesign.errors import InputError
 from expdesign.particulars.card import SCATTER, Card, Stated, Trial
-from expdesign.particulars.forces import FACTORS, Propeller, design_speed, factors, propellers, resistance
+from expdesign.particulars.forces import (
+    EFFICIENCY,
+    FACTORS,
+    Propeller,
+    design_speed,
+    factors,
+    propellers,
+    resistance,
+    scatter,
+)
 from expdesign.particulars.model import OWN_SCATTER, parameters, vessel_of, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.progress import Progress, silent
@@ -37,10 +46,9 @@ DRAWS = 240
 """Ships that are drawn for the intervals of predictions."""
 SAME_SPEED = 0.03
 """Share within which two approach speeds count as one."""
+KINDS = ("speed", "circle", "zigzag", "stop", "spin", "drift")
 PITCH = (0.45, 1.55)
 """Pitch ratios that propellers have."""
-EFFICIENCY = 0.75
-"""Propulsive efficiency that no ship of one hull exceeds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,11 +176,12 @@ def _full(unknowns: Array, active: list[int]) -> Array:
     return full
 
 
-def nominal(card: Card, *, seed: int = 0, progress: Progress = silent) -> Nominal:
+def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress: Progress = silent) -> Nominal:
     """The vessel of a card.
 
     Args:
         card: particulars and stated values.
+        also: trials to predict beside those of the card and the standard ones.
         seed: of the ships that are drawn for intervals.
         progress: of the fit.
 
@@ -197,7 +206,7 @@ def nominal(card: Card, *, seed: int = 0, progress: Progress = silent) -> Nomina
     rng = np.random.default_rng(seed)
     named = np.stack([problem.parameters(np.zeros(len(FACTORS))), problem.parameters(full)])
     fleet = problem.fleet(np.concatenate([named, problem.drawn(unknowns, covariance, rng)]))
-    trials = _trials(card, problem.ship, stated)
+    trials = _trials(card, stated, also)
     predicted = [one for trial in trials for one in _predicted(trial, fleet.results(trial), stated, rng)]
     return Nominal(
         card=card,
@@ -220,13 +229,14 @@ def _with_top_speed(card: Card) -> tuple[Stated, ...]:
     return (top, *card.stated)
 
 
-def _trials(card: Card, ship: Vessel, stated: tuple[Stated, ...]) -> list[Trial]:
-    """What is predicted: all stated trials, and the standard ones where none of these is like them."""
-    known = list(dict.fromkeys(one.trial for one in stated))
-    return [*known, *(one for one in _standard(card, ship) if not any(_alike(one, other) for other in known))]
+def _trials(card: Card, stated: tuple[Stated, ...], also: tuple[Trial, ...]) -> list[Trial]:
+    """What is predicted, kind by kind: all stated trials, and the standard ones where none of these is like them."""
+    known = list(dict.fromkeys([*(one.trial for one in stated), *also]))
+    rest = [one for one in _standard(card) if not any(_alike(one, other) for other in known)]
+    return sorted([*known, *rest], key=lambda one: (KINDS.index(one.kind), one.angle_rad, -one.speed_mps, -one.order))
 
 
-def _standard(card: Card, ship: Vessel) -> Iterator[Trial]:
+def _standard(card: Card) -> Iterator[Trial]:
     top = design_speed(card)
     for order in (0.25, 0.5, 0.75, 1.0):
         yield Trial(kind="speed", order=order)
@@ -266,11 +276,12 @@ def _predicted(
 
 
 def _found(problem: _Problem, full: Array, covariance: Array) -> tuple[Found, ...]:
-    given, spreads = factors(full), np.sqrt(np.diag(covariance))
+    hull = problem.card.hull
+    given, before, spreads = factors(hull, full), scatter(hull).tolist(), np.sqrt(np.diag(covariance)).tolist()
     return tuple(
         Found(
-            name=FACTORS[place].name, source=FACTORS[place].source, std_log=FACTORS[place].std_log,
-            value=given[FACTORS[place].name], std_log_after=FACTORS[place].std_log * float(spread),
+            name=FACTORS[place].name, source=FACTORS[place].source, std_log=before[place],
+            value=given[FACTORS[place].name], std_log_after=before[place] * spread,
         )
         for place, spread in zip(problem.active, spreads, strict=True)
     )  # fmt: skip
@@ -298,22 +309,22 @@ def _impossible(card: Card, driving: tuple[Propeller, ...]) -> Iterator[str]:
             f"ship.displacement_t and the dimensions give a block coefficient of {card.hull.block:.2f}, expected 0.3 "
             "to 0.95"
         )
-    if card.top_speed_mps is None:
-        return
-    power = sum(one.power_w for one in card.drives if one.power_w)
-    needed = resistance(card.hull, card.top_speed_mps) * card.top_speed_mps**3
-    if power and needed / power > EFFICIENCY * math.exp(NINETY_FIVE * FACTORS[0].std_log):
-        yield (
-            f"ship.top_speed_kn is {shown('speed_mps', card.top_speed_mps)}, which takes about {needed / 0.65e3:.0f} kW "
-            f"on the shafts, and the thrusters have {power / 1e3:.0f} kW"
-        )
     for one in driving:
         if one.thruster.max_rps is not None and one.thruster.diameter_m and not PITCH[0] < one.pitch_ratio < PITCH[1]:
             yield (
                 f"thrusters[{one.number}]: {60 * one.max_rps:.0f} rpm with {one.diameter_m:g} m at "
-                f"{shown('speed_mps', card.top_speed_mps)} would take a pitch ratio of "
+                f"{shown('speed_mps', one.design_mps)} would take a pitch ratio of "
                 f"{'more' if one.pitch_ratio > 1 else 'less'} than {PITCH[int(one.pitch_ratio > 1)]:g}"
             )
+    if card.top_speed_mps is None:
+        return
+    power = sum(one.power_w for one in card.drives if one.power_w)
+    needed = resistance(card.hull, card.top_speed_mps) * card.top_speed_mps**3 / EFFICIENCY
+    if power and needed / power > math.exp(DOUBTFUL * float(scatter(card.hull)[0])):
+        yield (
+            f"ship.top_speed_kn is {shown('speed_mps', card.top_speed_mps)}, which takes about {needed / 1e3:.0f} kW "
+            f"on the shafts, and the thrusters have {power / 1e3:.0f} kW"
+        )
 
 
 UNITS = {"mps": (3600 / 1852, "kn"), "m": (1.0, "m"), "s": (1.0, "s"), "rad": (180 / math.pi, "deg")}

@@ -39,6 +39,13 @@ from expdesign.values import Array
 
 VISCOSITY_M2PS = 1.19e-6
 G_MPS2 = 9.81
+EFFICIENCY = 0.6
+"""Resistance times speed by power on the shafts."""
+FROUDE = 0.2
+"""Froude number of a ship of which neither speed nor power is known."""
+USUAL = {"block": (0.48, 0.88), "length by beam": (3.5, 8.5)}
+"""Hulls that the regressions were made from, roughly; others have twice the scatter."""
+BEYOND = 2.0
 
 
 @dataclass(frozen=True)
@@ -51,25 +58,25 @@ class Factor:
 
 
 FACTORS = (
-    Factor("resistance", 0.20, "ITTC-57 friction with form factor and roughness, residual by Froude number"),
+    Factor("resistance", 0.25, "ITTC-57 friction with form factor and roughness, residual by Froude number"),
     Factor("added mass ahead", 0.30, "Soeding 1982, 2.7 rho volume^(5/3) / L^2"),
-    Factor("added mass in sway", 0.15, "Clarke, Gedling and Hine 1983"),
+    Factor("added mass in sway", 0.20, "Clarke, Gedling and Hine 1983"),
     Factor("moment of inertia", 0.12, "radius of gyration L/4, added inertia by Clarke et al. 1983"),
-    Factor("sway force of drift", 0.20, "Yoshimura and Masumoto 2012, Y_v"),
-    Factor("sway force of turning", 0.40, "Yoshimura and Masumoto 2012, Y_r"),
-    Factor("yaw moment of drift", 0.20, "Yoshimura and Masumoto 2012, N_v"),
-    Factor("yaw damping", 0.20, "Yoshimura and Masumoto 2012, N_r"),
-    Factor("nonlinear sway force", 0.30, "Yoshimura and Masumoto 2012, Y_vvv Y_vvr Y_vrr Y_rrr"),
-    Factor("nonlinear yaw moment", 0.30, "Yoshimura and Masumoto 2012, N_vvv N_vvr N_vrr N_rrr"),
-    Factor("cross-flow drag", 0.30, "strips of drag coefficient 0.8, Hooft 1994"),
-    Factor("speed lost in turns", 0.30, "Yoshimura and Masumoto 2012, X_vr + m_y"),
+    Factor("sway force of drift", 0.25, "Yoshimura and Masumoto 2012, Y_v"),
+    Factor("sway force of turning", 0.50, "Yoshimura and Masumoto 2012, Y_r"),
+    Factor("yaw moment of drift", 0.25, "Yoshimura and Masumoto 2012, N_v"),
+    Factor("yaw damping", 0.25, "Yoshimura and Masumoto 2012, N_r"),
+    Factor("nonlinear sway force", 0.35, "Yoshimura and Masumoto 2012, Y_vvv Y_vvr Y_vrr Y_rrr"),
+    Factor("nonlinear yaw moment", 0.35, "Yoshimura and Masumoto 2012, N_vvv N_vvr N_vrr N_rrr"),
+    Factor("cross-flow drag", 0.35, "strips of drag coefficient 0.8, Hooft 1994"),
+    Factor("speed lost in turns", 0.40, "Yoshimura and Masumoto 2012, X_vr + m_y"),
     Factor("thrust at rest", 0.10, "Wageningen B-series, K_T = 0.44 (P/D)^1.15"),
     Factor("loss of thrust with speed", 0.15, "Wageningen B-series, zero thrust at J = 1.08 P/D"),
     Factor("thrust astern", 0.35, "six tenths of that ahead, Harvald 1976"),
-    Factor("rudder force", 0.15, "Fujii 1961, with a_H of Quadvlieg 2013"),
-    Factor("slipstream at the rudder", 0.30, "MMG standard method 2015, kappa of Yoshimura and Masumoto 2012"),
-    Factor("straightened flow", 0.30, "Yoshimura and Masumoto 2012, gamma_R"),
-    Factor("rudder drag", 0.30, "Yoshimura and Masumoto 2012, 1 - t_R = 0.61"),
+    Factor("rudder force", 0.20, "Fujii 1961, with a_H of Quadvlieg 2013"),
+    Factor("slipstream at the rudder", 0.35, "MMG standard method 2015, kappa of Yoshimura and Masumoto 2012"),
+    Factor("straightened flow", 0.35, "Yoshimura and Masumoto 2012, gamma_R"),
+    Factor("rudder drag", 0.40, "Yoshimura and Masumoto 2012, 1 - t_R = 0.61"),
     Factor("side force of pods", 0.50, "strut as a rudder of 0.4 D^2"),
     Factor("tunnel thrust", 0.25, "bollard pull of momentum theory, lost by Chislett and Bjoerheden 1966"),
     Factor("wind ahead", 0.25, "Blendermann 1994, 0.65"),
@@ -78,12 +85,29 @@ FACTORS = (
 )
 """Scatter as the regressions' own figures and the ships of `tests/benchmarks/particulars.py` show it."""
 NAMES = tuple(factor.name for factor in FACTORS)
-STDS = np.array([factor.std_log for factor in FACTORS])
+HULL = (
+    "resistance", "added mass in sway", "moment of inertia", "sway force of drift", "sway force of turning",
+    "yaw moment of drift", "yaw damping", "nonlinear sway force", "nonlinear yaw moment", "cross-flow drag",
+    "speed lost in turns",
+)  # fmt: skip
+"""Factors of the hull's form."""
 
 
-def factors(deviations: Array) -> dict[str, float]:
-    """The factors, from their logarithms by standard deviation (f,)."""
-    return dict(zip(NAMES, np.exp(deviations * STDS).tolist(), strict=True))
+def is_usual(hull: Hull) -> bool:
+    """Whether the regressions were made for such hulls: not for catamarans, barges or very fine forms."""
+    values = {"block": hull.block, "length by beam": hull.length_m / hull.beam_m}
+    return hull.hulls == 1 and all(low <= values[name] <= high for name, (low, high) in USUAL.items())
+
+
+def scatter(hull: Hull) -> Array:
+    """(f,) standard deviations of the factors' logarithms for a hull."""
+    beyond = 1.0 if is_usual(hull) else BEYOND
+    return np.array([one.std_log * (beyond if one.name in HULL else 1.0) for one in FACTORS])
+
+
+def factors(hull: Hull, deviations: Array) -> dict[str, float]:
+    """The factors of a hull, from their logarithms by standard deviation (f,)."""
+    return dict(zip(NAMES, np.exp(deviations * scatter(hull)).tolist(), strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,16 +177,23 @@ def resistance(hull: Hull, speed_mps: float) -> float:
     reynolds = max(speed_mps * hull.length_m / VISCOSITY_M2PS, 1e5)
     friction = 0.075 / (math.log10(reynolds) - 2.0) ** 2 * (1.05 + 0.2 * hull.block)
     froude = min(speed_mps / math.sqrt(G_MPS2 * hull.length_m), 0.45)
-    rest = (0.0004 if hull.length_m > 20 else 0.0) + 0.0004 + 0.003 * (froude / 0.4) ** 4
+    bulk = (5.5 * (hull.mass_kg / WATER_KGPM3 / hull.hulls) ** (1 / 3) / hull.length_m) ** 2  # 1 for usual ships
+    rest = (0.0004 if hull.length_m > 20 else 0.0) + 0.0004 + 0.003 * bulk * (froude / 0.4) ** 4
     return WATER_KGPM3 / 2 * hull.wetted_m2 * (friction + rest)
 
 
 def design_speed(card: Card) -> float:
-    """Speed at full order [m/s]: stated, or that of the fastest trial, or a Froude number of 0.2."""
-    fastest = max((one.trial.speed_mps for one in card.stated if one.trial.kind != "drift"), default=0.0)
-    reached = max((one.value for one in card.stated if one.quantity == "speed_mps"), default=0.0)
-    own = card.top_speed_mps or 0.0
-    return own or max(fastest, reached) or 0.2 * math.sqrt(G_MPS2 * card.hull.length_m)
+    """Speed at full order [m/s]: stated, or that which the power gives, or of the fastest trial, or a Froude number."""
+    if card.top_speed_mps:
+        return card.top_speed_mps
+    reached = [one.value / one.trial.order for one in card.stated if one.quantity == "speed_mps"]
+    if reached:
+        return max(reached)
+    if all(one.power_w for one in card.drives):
+        power = EFFICIENCY * sum(one.power_w or 0.0 for one in card.drives)
+        return bisected(lambda speed: resistance(card.hull, speed) * speed**3 - power, 0.1, 50.0)
+    fastest = [one.trial.speed_mps for one in card.stated if one.trial.kind != "drift"]
+    return max(fastest, default=0.0) or FROUDE * math.sqrt(G_MPS2 * card.hull.length_m)
 
 
 def propellers(card: Card) -> tuple[Propeller, ...]:
@@ -354,7 +385,7 @@ def _thrust(propeller: Propeller, given: Mapping[str, float]) -> Iterator[Force]
     yield Force(name=f"u{n}", expression=f"u*abs({n})*cos({a})*cos({a})", x_n=-loss)
     thrust = f"(abs({n})*{n}-{nominal:.6g}*u*abs({n})*cos({a}))"
     yield Force(name=f"side_{n}", expression=f"{thrust}*sin({a})", y_n=gain)
-    lever = f"({one.forward_m:.6g}*sin({a})-{one.starboard_m:.6g}*cos({a}))"
+    lever = f"({one.forward_m:.6g}*sin({a}){-one.starboard_m:+.6g}*cos({a}))" if one.starboard_m else f"{one.forward_m:.6g}*sin({a})"
     yield Force(name=f"turn_{n}", expression=f"{thrust}*{lever}", n_nm=gain)
     if one.forward_m < 0:
         side = _pod(propeller) * given["side force of pods"]

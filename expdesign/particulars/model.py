@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.particulars.card import Card, Thruster
-from expdesign.particulars.forces import Force, Propeller, design_speed, factors, forces, masses, propellers, tunnel
+from expdesign.particulars.forces import Force, Propeller, design_speed, factors, forces, masses, tunnel
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
@@ -19,7 +19,6 @@ SIGNS = {
     "X_abs_u_u": -1, "Y_uv": -1, "Y_abs_v_v": -1, "N_ur": -1, "N_abs_r_r": -1, "W_wind_u": -1, "W_wind_v": -1,
 }  # fmt: skip
 """Parameters whose sign physics gives: a hull that is driven by its own drag runs away."""
-FREE_RPS2 = 0.0
 
 
 def parameters(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> dict[Term, float]:
@@ -28,7 +27,7 @@ def parameters(card: Card, driving: tuple[Propeller, ...], deviations: Array) ->
     Sway and yaw are coupled where the centre of gravity is not amidships; the inverse of the mass matrix goes into the
     parameters, as both equations have the same terms.
     """
-    given = factors(deviations)
+    given = factors(card.hull, deviations)
     mass = masses(card.hull, given)
     inverse = np.linalg.inv([[mass.sway_kg, mass.coupling_kgm], [mass.coupling_kgm, mass.yaw_kgm2]])
     found: dict[Term, float] = {}
@@ -66,7 +65,7 @@ def actuators(card: Card, driving: tuple[Propeller, ...]) -> tuple[Actuator, ...
 
 def _thruster(thruster: Thruster, number: int, rps: float) -> Actuator:
     astern = rps if thruster.kind == "tunnel" else rps * thruster.astern_share
-    limits = [Limit(low=-astern, high=rps)]
+    limits = [Limit(low=0.0 - astern, high=rps)]
     responses = [Response(rate=rps / thruster.full_order_s)]
     if thruster.kind in ("azimuth", "podded"):
         most = math.inf if thruster.angle_max_rad is None else thruster.angle_max_rad
@@ -112,8 +111,3 @@ def with_scatter(vessel: Vessel, slopes: Array, covariance: Array) -> Vessel:
     model = vessel.model
     own = np.diag((OWN_SCATTER * model.parameters) ** 2)
     return replace(vessel, model=model.with_covariance(model.names, slopes @ covariance @ slopes.T + own))
-
-
-def completed(card: Card) -> tuple[Propeller, ...]:
-    """Thrusters that drive ahead, with what the card does not say."""
-    return propellers(card)

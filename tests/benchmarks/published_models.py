@@ -161,17 +161,23 @@ def mmg(
     return Model(length_m=length, speed_mps=speed, rates=rates, helm_rate_radps=helm_rate)
 
 
-def kvlcc2() -> Model:
+def kvlcc2(scale: float = 1.0, wake: float = 0.40) -> Model:
     """The 7 m model of KVLCC2 (Yasukawa and Yoshimura 2015, tables 1 to 3); 1.179 m/s as 15.5 kn of the ship."""
+    speed = 1.179 * math.sqrt(scale)
     return mmg(
-        length=7.0, beam=1.27, draught=0.455, volume=3.27, gravity=0.244, rho=1000.0, m_x=0.022, m_y=0.223, j_z=0.011,
-        r_0=0.022, hull_x=(-0.040, 0.002, 0.011, 0.771),
+        length=7.0 * scale, beam=1.27 * scale, draught=0.455 * scale, volume=3.27 * scale**3, gravity=0.244 * scale,
+        rho=1000.0, m_x=0.022, m_y=0.223, j_z=0.011, r_0=0.022, hull_x=(-0.040, 0.002, 0.011, 0.771),
         hull_y=np.array([-0.315, 0.083, -1.607, 0.379, -0.391, 0.008]),
         hull_n=np.array([-0.137, -0.049, -0.030, -0.294, 0.055, -0.013]),
-        propeller=(0.216, -0.48, 0.2931, -0.2753, -0.1385, 10.4),
-        rudder=(0.0539, -0.5, 2.747, 0.626, 0.50, 1.09, 0.640, 0.395, -0.710, 0.387, 0.312, -0.464),
-        t_p=0.220, w_p=0.40, wake=(1.6, 1.1), speed=1.179, helm_rate=math.radians(15.8),
+        propeller=(0.216 * scale, -0.48, 0.2931, -0.2753, -0.1385, 10.4 / math.sqrt(scale)),
+        rudder=(0.0539 * scale**2, -0.5, 2.747, 0.626, 0.50, 1.09, 0.640, 0.395, -0.710, 0.387, 0.312, -0.464),
+        t_p=0.220, w_p=wake, wake=(1.6, 1.1), speed=speed, helm_rate=math.radians(15.8) / math.sqrt(scale),
     )  # fmt: skip
+
+
+def kvlcc2_ship() -> Model:
+    """KVLCC2 of 320 m, with the wake of the ship, 0.35, in place of the model's; no such ship was built."""
+    return kvlcc2(320.0 / 7.0, 0.35)
 
 
 def seiun_maru() -> Model:
@@ -317,7 +323,10 @@ def esso_osaka() -> Model:
 
 
 def otter() -> Model:
-    """The Otter, a catamaran of 2 m: T. I. Fossen, MSS (2024); helm is the share of thrust that the sides differ by."""
+    """The Otter, a catamaran of 2 m: T. I. Fossen, MSS (2024); helm is the sine by which the sides' orders differ.
+
+    Its surge damping is linear and stated for the top speed, near which it is therefore compared.
+    """
     length, rho, beam, mass, x_g = 2.0, 1025.0, 0.25, 55.0, 0.2
     draught = mass / rho / (2 * 0.4 * beam * length)
     i_z = mass * (0.25 * length) ** 2 + mass * x_g**2
@@ -340,4 +349,4 @@ def otter() -> Model:
         dv, dr = np.linalg.solve(left, np.array([total_y, total_n]))
         return np.array([total_x / (mass + added), dv, dr])
 
-    return Model(length_m=length, speed_mps=4 * KNOT, rates=rates, helm_rate_radps=100.0)
+    return Model(length_m=length, speed_mps=5.5 * KNOT, rates=rates, helm_rate_radps=100.0)
