@@ -1,4 +1,4 @@
-"""A vessel out of a card: tables of her trials and of the sources, JSON, vessel file and a page, in a mariner's units."""
+"""A vessel out of a card, in a mariner's units: tables of her trials and of the sources, JSON, vessel file, page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from expdesign.export.files import finite, strict_json, vessel_toml
 from expdesign.export.pages import page_template
-from expdesign.particulars import Nominal, Predicted, Trial, shown
+from expdesign.particulars import Nominal, Predicted, Trial, is_usual, shown
 
 TRIAL_HEADER = ("trial", "result", "predicted", "95 % from", "to", "stated", "from particulars alone")
 FACTOR_HEADER = ("part of the forces", "source", "scatter before", "times", "scatter after")
@@ -43,6 +43,13 @@ SPEEDS = (
     "are not in them."
 )
 
+UNUSUAL = (
+    "The regressions were made from single hulls with a block coefficient of 0.48 to 0.88 and a length of 3.5 to 8.5 "
+    "beams. Hers is another, so the scatter of her hull's forces is doubled."
+)
+PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
+HUMP = 0.45
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NominalContent:
@@ -59,8 +66,11 @@ class NominalContent:
         found = self.nominal
         measured = any(one.trial.kind != "speed" for one in found.card.stated)
         calm = "Without [windage] no term reads the wind: simulated wind does not move her."
+        froude = found.driving[0].design_mps / math.sqrt(9.81 * found.card.hull.length_m)
+        forms = () if is_usual(found.card.hull) else (UNUSUAL,)
+        planes = (f"At full order her Froude number is {froude:.2f}: {PLANING}",) if froude > HUMP else ()
         windless = () if found.card.windage else (calm,)
-        return (*found.contradictions, *(() if measured else (NO_TRIAL,)), SIDES, SPEEDS, *windless)
+        return (*found.contradictions, *(() if measured else (NO_TRIAL,)), *forms, *planes, SIDES, SPEEDS, *windless)
 
 
 def trial_words(trial: Trial) -> str:

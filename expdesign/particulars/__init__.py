@@ -17,6 +17,6 @@ if TYPE_CHECKING:
         Windage,
     )
     from expdesign.particulars.fit import Found, Nominal, Predicted, nominal, shown
-    from expdesign.particulars.forces import FACTORS
+    from expdesign.particulars.hull import FACTORS, is_usual
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

@@ -18,18 +18,9 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from expdesign.errors import InputError
 from expdesign.particulars.card import SCATTER, Card, Stated, Trial
-from expdesign.particulars.forces import (
-    EFFICIENCY,
-    FACTORS,
-    Propeller,
-    design_speed,
-    factors,
-    propellers,
-    resistance,
-    scatter,
-)
+from expdesign.particulars.forces import EFFICIENCY, Propeller, design_speed, propellers
+from expdesign.particulars.hull import FACTORS, factors, resistance, scatter
 from expdesign.particulars.model import OWN_SCATTER, parameters, vessel_of, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.progress import Progress, silent
@@ -87,7 +78,7 @@ class Nominal:
     contradictions: tuple[str, ...]  # one sentence each
 
 
-class _Problem:
+class Problem:
     """Simulated values of trials and their derivatives, for unknowns."""
 
     def __init__(self, card: Card) -> None:
@@ -138,7 +129,7 @@ class _Problem:
 class _Residuals:
     """Residuals and their derivatives at the last unknowns asked for."""
 
-    def __init__(self, problem: _Problem, stated: tuple[Stated, ...]) -> None:
+    def __init__(self, problem: Problem, stated: tuple[Stated, ...]) -> None:
         self.problem, self.stated = problem, stated
         self._at: Array | None = None
 
@@ -160,20 +151,56 @@ class _Residuals:
         """Of logarithms; a trial that is not completed counts as twice too large."""
         self._look(unknowns)
         logs = np.log([one.value for one in self.stated])
-        return np.nan_to_num(self.values - logs, nan=math.log(2), posinf=math.log(2), neginf=-math.log(2))
+        return np.asarray(np.nan_to_num(self.values - logs, nan=math.log(2), posinf=math.log(2), neginf=-math.log(2)))
 
     def __call__(self, unknowns: Array) -> Array:
         return np.concatenate([self.errors(unknowns) / self.std, unknowns])
 
     def jacobian(self, unknowns: Array) -> Array:
         self._look(unknowns)
-        return np.concatenate([self.slopes / self.std[:, None], np.eye(len(unknowns))])
+        return np.asarray(np.concatenate([self.slopes / self.std[:, None], np.eye(len(unknowns))]))
 
 
 def _full(unknowns: Array, active: list[int]) -> Array:
     full = np.zeros(len(FACTORS))
     full[active] = unknowns
     return full
+
+
+def fitted(problem: Problem, stated: tuple[Stated, ...]) -> tuple[Array, Array]:
+    """The most probable unknowns (f,) and their covariance (f, f), of those factors that act in the ship."""
+    residuals = _Residuals(problem, stated)
+    count = len(problem.active)
+    if not stated:
+        return np.zeros(count), np.eye(count)
+    best = scipy.optimize.least_squares(
+        residuals, np.zeros(count), jac=residuals.jacobian, max_nfev=MOST_FITS, ftol=1e-5, xtol=1e-5, bounds=(-4.0, 4.0)
+    ).x
+    slopes = residuals.jacobian(best)
+    return np.asarray(best), np.asarray(np.linalg.inv(slopes.T @ slopes))
+
+
+def consistent(problem: Problem, stated: tuple[Stated, ...]) -> tuple[Array, Array, tuple[str, ...]]:
+    """As `fitted`, without values that contradict all others and the particulars, worst first; a sentence on each."""
+    kept, said = stated, list[str]()
+    while True:
+        unknowns, covariance = fitted(problem, kept)
+        if not kept:
+            return unknowns, covariance, tuple(said)
+        residuals = _Residuals(problem, kept)
+        errors, std = residuals.errors(unknowns), residuals.std
+        # of a value that is fitted with the others, from what the others alone would say
+        left = np.maximum(1.0 - np.einsum("if,fg,ig->i", residuals.slopes, covariance, residuals.slopes) / std**2, 1e-3)
+        apart = np.abs(errors) / (std * np.sqrt(left))
+        worst = int(np.argmax(apart))
+        if apart[worst] <= DOUBTFUL:
+            return unknowns, covariance, tuple(said)
+        one, kept = kept[worst], (*kept[:worst], *kept[worst + 1 :])
+        others = shown(one.quantity, one.value * math.exp(float(errors[worst] / left[worst])))
+        said.append(
+            f"{one.source} is {shown(one.quantity, one.value)}, where all else says about {others}: {apart[worst]:.1f} "
+            "standard deviations apart, it is left out of the fit"
+        )
 
 
 def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress: Progress = silent) -> Nominal:
@@ -188,19 +215,9 @@ def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress
     Raises:
         InputError: nothing drives her.
     """
-    problem = _Problem(card)
-    count = len(problem.active)
-    stated = _with_top_speed(card)
-    residuals = _Residuals(problem, stated)
-    unknowns, covariance = np.zeros(count), np.eye(count)
-    if stated:
-        progress("fitting the stated values", 0.1)
-        fitted = scipy.optimize.least_squares(
-            residuals, unknowns, jac=residuals.jacobian, method="trf", x_scale=1.0, max_nfev=MOST_FITS, ftol=1e-5,
-            xtol=1e-5, bounds=(-4.0, 4.0),
-        )  # fmt: skip
-        unknowns = fitted.x
-        covariance = np.linalg.inv(residuals.jacobian(unknowns).T @ residuals.jacobian(unknowns))
+    problem, stated = Problem(card), _with_top_speed(card)
+    progress("fitting the stated values", 0.1)
+    unknowns, covariance, contradictions = consistent(problem, stated)
     progress("simulating her trials", 0.6)
     full = _full(unknowns, problem.active)
     rng = np.random.default_rng(seed)
@@ -214,7 +231,7 @@ def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress
         vessel=with_scatter(vessel_of(card, problem.driving, full), problem.slopes(full), covariance),
         found=_found(problem, full, covariance),
         predicted=tuple(predicted),
-        contradictions=(*_impossible(card, problem.driving), *_contradictory(residuals, unknowns, covariance)),
+        contradictions=(*_impossible(card, problem.driving), *contradictions),
     )
 
 
@@ -223,9 +240,7 @@ def _with_top_speed(card: Card) -> tuple[Stated, ...]:
     known = any(one.trial.kind == "speed" and abs(one.trial.order - 1.0) < SAME_SPEED for one in card.stated)
     if card.top_speed_mps is None or known:
         return card.stated
-    top = Stated(
-        trial=Trial(kind="speed"), quantity="speed_mps", value=card.top_speed_mps, source="ship.top_speed_kn"
-    )
+    top = Stated(trial=Trial(kind="speed"), quantity="speed_mps", value=card.top_speed_mps, source="ship.top_speed_kn")
     return (top, *card.stated)
 
 
@@ -262,7 +277,7 @@ def _alike(one: Trial, other: Trial) -> bool:
 def _predicted(
     trial: Trial, results: Mapping[str, Array], stated: tuple[Stated, ...], rng: np.random.Generator
 ) -> Iterator[Predicted]:
-    """Of the ship from particulars alone, the fitted one, then drawn ones; what these do not reach counts as endless."""
+    """Of the ship from particulars alone, the fitted one, then drawn ones; a trial without end counts as endless."""
     for quantity, values in results.items():
         before, value, *drawn = values.tolist()
         if not 0 < value < math.inf:
@@ -275,7 +290,7 @@ def _predicted(
         )  # fmt: skip
 
 
-def _found(problem: _Problem, full: Array, covariance: Array) -> tuple[Found, ...]:
+def _found(problem: Problem, full: Array, covariance: Array) -> tuple[Found, ...]:
     hull = problem.card.hull
     given, before, spreads = factors(hull, full), scatter(hull).tolist(), np.sqrt(np.diag(covariance)).tolist()
     return tuple(
@@ -285,21 +300,6 @@ def _found(problem: _Problem, full: Array, covariance: Array) -> tuple[Found, ..
         )
         for place, spread in zip(problem.active, spreads, strict=True)
     )  # fmt: skip
-
-
-def _contradictory(residuals: _Residuals, unknowns: Array, covariance: Array) -> Iterator[str]:
-    """Stated values that are far from what all the others and the particulars say."""
-    if not residuals.stated:
-        return
-    errors = residuals.errors(unknowns)
-    for one, error, slopes in zip(residuals.stated, errors, residuals.slopes, strict=True):
-        left = max(1.0 - float(slopes @ covariance @ slopes) / one.std_log**2, 1e-3)
-        apart = float(error) / (one.std_log * math.sqrt(left))
-        if abs(apart) > DOUBTFUL:
-            others = one.value * math.exp(float(error) / left)
-            yield f"{one.source} is {shown(one.quantity, one.value)}, where all else says about " + (
-                f"{shown(one.quantity, others)}: {abs(apart):.1f} standard deviations apart"
-            )
 
 
 def _impossible(card: Card, driving: tuple[Propeller, ...]) -> Iterator[str]:
@@ -335,5 +335,3 @@ def shown(quantity: str, value: float) -> str:
     """A value with its unit, as on a card."""
     scale, unit = UNITS[quantity.rpartition("_")[2]]
     return f"{scale * value:.3g} {unit}"
-
-

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.particulars.card import Card, Thruster
-from expdesign.particulars.forces import Force, Propeller, design_speed, factors, forces, masses, tunnel
+from expdesign.particulars.forces import Propeller, design_speed, forces, tunnel
+from expdesign.particulars.hull import Force, factors, masses
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 

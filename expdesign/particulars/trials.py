@@ -65,7 +65,7 @@ class Fleet:
         return np.array(self._program.rates((state,))[0][3:6])
 
     def _gain(self, speed: Array, drive: Array) -> Array:
-        return self._rates((speed, self._zero, self._zero), self._helm.rows(drive, self._zero))[0]
+        return np.asarray(self._rates((speed, self._zero, self._zero), self._helm.rows(drive, self._zero))[0])
 
     def _speed(self, trial: Trial) -> Results:
         """Steady speed at an engine order."""
@@ -97,7 +97,9 @@ class Fleet:
             before, angle = angle, _toward(angle, helm, rate * step_s)
             return self._helm.rows(drive, (before + angle) / 2)
 
-        times, states = self._sail(speed, orders, trial.speed_mps, lambda state: np.all(state[2] > math.radians(183)))
+        times, states = self._sail(
+            speed, orders, trial.speed_mps, lambda state: bool(np.all(state[2] > math.radians(183)))
+        )
         turned, swift = states[:, 2], np.hypot(states[:, 3], states[:, 4])
         quarter, half = (_first(turned, math.radians(degrees)) for degrees in (90.0, 180.0))
         clock = np.broadcast_to(times[:, None], turned.shape)
@@ -153,9 +155,13 @@ class Fleet:
             return self._helm.rows((before + drive) / 2, self._zero)
 
         rest = 0.0 if trial.order else 0.2 * trial.speed_mps
-        times, states = self._sail(speed, orders, trial.speed_mps, lambda state: np.all(state[3] <= rest), LONGEST * 3)
+        times, states = self._sail(
+            speed, orders, trial.speed_mps, lambda state: bool(np.all(state[3] <= rest)), LONGEST * 3
+        )
         stopped = _first(-states[:, 3], -rest)
-        way = np.concatenate([[self._zero], np.cumsum(np.hypot(*np.diff(states[:, :2], axis=0).swapaxes(0, 1)), axis=0)])
+        way = np.concatenate(
+            [[self._zero], np.cumsum(np.hypot(*np.diff(states[:, :2], axis=0).swapaxes(0, 1)), axis=0)]
+        )
         return {"reach_m": _at(way, stopped), "time_s": _at(np.broadcast_to(times[:, None], way.shape), stopped)}
 
     def _spin(self, _trial: Trial) -> Results:
@@ -165,16 +171,16 @@ class Fleet:
         yaw = np.maximum(self._rates((self._zero, self._zero, self._zero), orders)[2], 1e-9)
         slow = math.sqrt(math.pi / float(yaw[0]))  # time to turn by 90 degrees without damping
         rise = max(one.limits[0].high / one.responses[0].rate for one in self.vessel.actuators if one.kind != "rudder")
-        age = 0.0
+        shafts, age = [name.startswith("n") for name in self.vessel.model.inputs], 0.0
 
         def started(_state: Array, step_s: float) -> Array:
             nonlocal age
             share, age = min((age + step_s / 2) / rise, 1.0), age + step_s
-            return np.where([name.startswith("n") for name in self.vessel.model.inputs], share, 1.0) * orders
+            return np.asarray(np.where(shafts, share, 1.0) * orders)
 
         speed = self.vessel.length_m / (slow + rise)
         times, states = self._sail(
-            self._zero, started, speed, lambda state: np.all(state[2] > math.radians(91)), LONGEST / 3
+            self._zero, started, speed, lambda state: bool(np.all(state[2] > math.radians(91))), LONGEST / 3
         )
         quarter = _first(states[:, 2], math.radians(90))
         return {"turn_90_s": _at(np.broadcast_to(times[:, None], states[:, 2].shape), quarter)}
@@ -184,7 +190,7 @@ class Fleet:
         inputs = np.zeros((self.count, len(self.vessel.model.inputs)))
 
         def slowing(sway: Array) -> Array:
-            return -self._rates((self._zero, sway, self._zero), inputs, trial.speed_mps)[1]
+            return np.asarray(-self._rates((self._zero, sway, self._zero), inputs, trial.speed_mps)[1])
 
         return {"drift_mps": _root(slowing, self._zero, np.full(self.count, trial.speed_mps))}
 
@@ -209,7 +215,7 @@ class Fleet:
                 program.select(0)
                 state = program.rk4(state, step_s)
                 states.append(state)
-        return step_s * np.arange(len(states)), np.array(states)
+        return np.asarray(step_s * np.arange(len(states)), dtype=float), np.array(states)
 
 
 def _turning(actuator: Actuator) -> Iterable[float]:
@@ -255,5 +261,3 @@ def _at(curves: Array, when: tuple[Array, Array]) -> Array:
     index, share = when
     runs = np.arange(curves.shape[1])
     return np.asarray(curves[index, runs] * (1 - share) + curves[index + 1, runs] * share)
-
-

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -178,11 +179,10 @@ def load_card(path: Path | str) -> Card:
     entry = Entry(Path(path))
     file = check_table(CardFile, read_toml(entry.path), entry)
     ship, length = file.ship, file.ship.length_m
-    for kind, many in (("thrusters", file.thrusters), ("rudders", file.rudders)):
-        for number, one in enumerate(many, start=1):  # type: ignore[var-annotated, arg-type]
-            if abs(one.forward_m) > 0.6 * length:
-                found = f"is {one.forward_m:g}, expected {-0.6 * length:g} to {0.6 * length:g}, counted from midships"
-                raise entry.at(kind).item(number).at("forward_m").error(found)
+    for number, one in enumerate(file.thrusters, start=1):
+        _check_place(one.forward_m, length, entry.at("thrusters").item(number))
+    for number, rudder in enumerate(file.rudders, start=1):
+        _check_place(rudder.forward_m, length, entry.at("rudders").item(number))
     rudders = (_rudder(one, ship, entry.at("rudders").item(n)) for n, one in enumerate(file.rudders, start=1))
     windage = file.windage
     card = Card(
@@ -198,7 +198,14 @@ def load_card(path: Path | str) -> Card:
     )  # fmt: skip
     if not card.drives:
         raise entry.at("thrusters").error("has only tunnel thrusters, expected one that drives her ahead")
-    return Card(**{**vars(card), "stated": tuple(_stated(file, entry))})
+    return replace(card, stated=tuple(_stated(file, entry)))
+
+
+def _check_place(forward_m: float, length_m: float, entry: Entry) -> None:
+    most = 0.6 * length_m
+    if abs(forward_m) > most:
+        allowed = f"{-most:g} to {most:g}, counted from midships"
+        raise entry.at("forward_m").error(f"is {forward_m:g}, expected {allowed}")
 
 
 def _mass(ship: ShipTable, entry: Entry) -> float:
@@ -292,5 +299,3 @@ def _values(table: Table, trial: Trial, entry: Entry, keys: tuple[str, ...]) -> 
             trial=trial, quantity=f"{stem}_{SI_NAMES.get(unit, unit)}", value=value * UNITS[unit],
             source=entry.at(key).key,
         )  # fmt: skip
-
-

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import published_models as published
 
+import published_models as published
 from expdesign.particulars import Card, Nominal, Stated, Trial, nominal
 from expdesign.scenario import load_card
 
@@ -71,7 +71,9 @@ def known_of(one: Case) -> tuple[Stated, ...]:
     """Advance and tactical diameter of one circle."""
     first = next((value.trial for value in one.values if value.trial.kind == "circle"), None)
     wanted = ("advance_m", "tactical_diameter_m")
-    picked = {value.quantity: value for value in reversed(one.values) if value.trial == first and value.quantity in wanted}
+    picked = {
+        value.quantity: value for value in reversed(one.values) if value.trial == first and value.quantity in wanted
+    }
     return tuple(picked.values())
 
 
@@ -133,36 +135,47 @@ def speed_scaling() -> list[tuple[str, float, float, float]]:
         also = tuple(Trial(kind="circle", speed_mps=share * model.speed_mps, angle_rad=HARD) for share in shares)
         found = nominal(replace(one.card, stated=known_of(one)), also=also)
         for share, trial in zip(shares, also, strict=True):
-            truth = [published.circle(model, speed=trial.speed_mps, helm_deg=h)["tactical_diameter_m"] for h in (35, -35)]
+            truth = [
+                published.circle(model, speed=trial.speed_mps, helm_deg=h)["tactical_diameter_m"] for h in (35, -35)
+            ]
             mine = next(p.value for p in found.predicted if p.trial == trial and p.quantity == "tactical_diameter_m")
             rows.append((name, share, math.sqrt(truth[0] * truth[1]) / model.length_m, mine / model.length_m))
     return rows
 
 
+HEADS = (
+    "ship", "values", "within 95 %", "median error", "after one circle and one speed: values", "within 95 %",
+    "median error", "compared with",
+)  # fmt: skip
+
+
+def head(*names: str) -> None:
+    print(f"\n| {' | '.join(names)} |\n|{'---|' * len(names)}")
+
+
 def main() -> None:
     began = time.time()
     result = studied()
-    print(f"## particulars\n\n{(__doc__ or '').splitlines()[0]}\n")
-    print("`python tests/benchmarks/particulars.py`; cards and sources in `ships/`, published models in `published_models.py`.\n")
-    print("| ship | values | within 95 % | median error | after one circle and one speed: values | within 95 % | median error | compared with |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(f"## particulars\n\n{(__doc__ or '').strip().replace('    python', '`python').rstrip()}`")
+    head(*HEADS)
     for name, (one, alone, after) in result.items():
         print(f"| {name} | {cells(alone)} | {cells(after)} | {one.source} |")
     every = [row for _, alone, _ in result.values() for row in alone]
     rest = [row for _, _, after in result.values() for row in after]
     print(f"| all | {cells(every)} | {cells(rest)} | |")
-    z = np.array(scaled_by_others(result))
-    print(f"\nMean square of the deviations by their standard deviation: {np.mean([r[2]**2 for r in every if math.isfinite(r[2])]):.2f}; "
-          f"with intervals scaled by what the other ships show, {np.mean(np.abs(z) <= 1.96):.0%} are within 95 %.\n")
-    print("| quantity | values | within 95 % | median error | bias |\n|---|---|---|---|---|")
+    square = np.mean([row[2] ** 2 for row in every if math.isfinite(row[2])])
+    share = np.mean(np.abs(scaled_by_others(result)) <= 1.96)
+    print(f"\nMean square of deviations by their standard deviation: {square:.2f}. With intervals scaled by what the")
+    print(f"other ships show, {share:.0%} of the values are within 95 %.")
+    head("quantity", "values", "within 95 %", "median error", "bias")
     for quantity in dict.fromkeys(value.quantity for value, _, _ in every):
         rows = [row for row in every if row[0].quantity == quantity]
         bias = float(np.median([error for _, error, _ in rows]))
         print(f"| {quantity} | {cells(rows)} | {100 * math.expm1(bias):+.0f} % |")
-    print("\nTactical diameter by length, from her MMG model and from the vessel fitted to one circle at full speed:\n")
-    print("| ship | share of full speed | MMG | vessel | apart |\n|---|---|---|---|---|")
-    for name, share, truth, mine in speed_scaling():
-        print(f"| {name} | {share:.0%} | {truth:.2f} | {mine:.2f} | {mine / truth - 1:+.0%} |")
+    print("\nTactical diameter by length, of her MMG model and of the vessel fitted to one circle at full speed:")
+    head("ship", "share of full speed", "MMG", "vessel", "apart")
+    for name, part, truth, mine in speed_scaling():
+        print(f"| {name} | {part:.0%} | {truth:.2f} | {mine:.2f} | {mine / truth - 1:+.0%} |")
     print(f"\n{time.time() - began:.0f} s.")
 
 

@@ -64,9 +64,7 @@ def order_for(model: Model, speed: float) -> float:
 def circle(model: Model, *, speed: float, helm_deg: float) -> dict[str, float]:
     """Advance, transfer, tactical diameter [m], times to 90 and 180 degrees [s], speeds there [m/s]."""
     angle = math.radians(helm_deg)
-    times, x = run(
-        model, speed, lambda _t, _x: angle, order_for(model, speed), lambda s: abs(s[5]) > math.radians(181)
-    )
+    times, x = run(model, speed, lambda _t, _x: angle, order_for(model, speed), lambda s: abs(s[5]) > math.radians(181))
     psi, sign = np.abs(x[:, 5]), math.copysign(1.0, helm_deg)
     if psi[-1] < math.pi:
         return {}
@@ -134,8 +132,13 @@ def mmg(
         n = max(order * rps, 1e-6)
         force, k_t = thrust(u, w, n)
         j = max(u * (1.0 - w) / (n * d_p), 1e-3)
-        u_r = epsilon * u * (1.0 - w) * math.sqrt(
-            eta * (1.0 + kappa * (math.sqrt(1.0 + 8.0 * max(k_t, 0.0) / (math.pi * j * j)) - 1.0)) ** 2 + 1.0 - eta
+        u_r = (
+            epsilon
+            * u
+            * (1.0 - w)
+            * math.sqrt(
+                eta * (1.0 + kappa * (math.sqrt(1.0 + 8.0 * max(k_t, 0.0) / (math.pi * j * j)) - 1.0)) ** 2 + 1.0 - eta
+            )
         )
         beta_r = beta - l_r * rate
         gamma = gamma_plus if beta_r > 0 else gamma_minus
@@ -194,7 +197,7 @@ def seiun_maru() -> Model:
 
 
 def mariner() -> Model:
-    """The Mariner class at 15 kn: planar motion tests of M. S. Chislett and J. Stroem-Tejsen, HyA Report Hy-5 (1965)."""
+    """The Mariner class at 15 kn: tests of M. S. Chislett and J. Stroem-Tejsen, HyA Report Hy-5 (1965)."""
     length, speed = 160.93, 15 * KNOT
     m, i_z, x_g = 798e-5, 39.2e-5, -0.023
     left = np.array([[m + 748e-5, m * x_g + 9.354e-5], [m * x_g - 4.646e-5, i_z + 43.8e-5]])
@@ -225,7 +228,7 @@ def mariner() -> Model:
 
 def s175() -> Model:
     """The container ship S-175 upright: K. Son and K. Nomoto, J. SNAJ 150 (1981); its roll is left out."""
-    length, rho, d_p = 175.0, 1025.0, 6.533
+    length, d_p = 175.0, 6.533
     m, m_x, m_y, i_z = 0.00792, 0.000238, 0.007049, 0.000456 + 0.000419
     cubes_y = np.array([-0.0116, 0.00242, -0.109, 0.0214, -0.0405, 0.00177])
     cubes_n = np.array([-0.0038545, -0.00222, 0.001492, -0.0424, 0.00156, -0.00229])

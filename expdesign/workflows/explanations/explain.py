@@ -31,6 +31,7 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
 MANUAL = {
     "conventions": "frames, signs, units, models: read this first",
     "commands": "which command, which method, when",
+    "pilot-card": "from particulars and a pilot card to a vessel file",
     "first-plan": "your first plan, in half an hour",
     "first-estimate": "from your data to a model, in ten minutes",
     "information": "how long to run what: information, durations, certificates",

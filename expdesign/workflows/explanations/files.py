@@ -42,9 +42,9 @@ LOADS = (
     "reads such a file as candidates; it needs m and z_m of an unknown load under [start], roughly."
 )
 CARDS = (
-    "What a pilot card, a wheelhouse poster or an old trial sheet states, in their units; expdesign nominal makes a vessel "
-    "file of it. Only [ship] and one of [[thrusters]] are required. Trial values are fitted; one turning circle tells more "
-    "than all particulars. Forward and starboard are positive, counted from midships."
+    "What a pilot card, a wheelhouse poster or an old trial sheet states, in their units; expdesign nominal makes a "
+    "vessel file of it. Only [ship] and one of [[thrusters]] are required. Trial values are fitted; one turning circle "
+    "tells more than all particulars. Forward and starboard are positive, counted from midships."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
