@@ -44,7 +44,7 @@ def test_friction_is_the_line_of_1957() -> None:
 
 
 def test_added_masses_of_kvlcc2_are_within_their_scatter() -> None:
-    """Measured, Yasukawa and Yoshimura 2015: m_x' = 0.022, m_y' = 0.223, J_z' = 0.011 by rho/2 L^2 T and rho/2 L^4 T."""
+    """Measured, Yasukawa and Yoshimura 2015: m_x' 0.022, m_y' 0.223, J_z' 0.011, by rho/2 L^2 T and rho/2 L^4 T."""
     found, unit = masses(KVLCC2, factors(KVLCC2, NONE)), 0.5 * 1025 * 320**2 * 20.8
     own = KVLCC2.mass_kg * ((320 / 4) ** 2 + 11.2**2)
     assert (found.sway_kg - KVLCC2.mass_kg) / unit == pytest.approx(0.223, rel=0.15)
@@ -74,7 +74,7 @@ def test_modulus_terms_give_the_cubics_in_turns_and_cross_flow_at_rest(hull: Hul
 
 
 def test_a_tug_has_the_bollard_pull_that_its_builder_states() -> None:
-    """53 t of two thrusters in nozzles of 1566 kW and 2.16 m, pitch ratio 0.96: booklet of a tug, Transas Marine 2006."""
+    """53 t of two thrusters in nozzles, 1566 kW and 2.16 m, pitch ratio 0.96: booklet of a tug, Transas Marine 2006."""
     screw = Thruster(kind="azimuth", forward_m=-9.0, diameter_m=2.16, power_w=1566e3, pitch_ratio=0.96)
     hull = Hull(length_m=23.2, beam_m=10.4, draught_m=3.3, mass_kg=366e3)
     card = Card(name="tug", hull=hull, thrusters=(screw, replace(screw, starboard_m=3.0)))

@@ -57,7 +57,7 @@ def test_a_planted_ship_is_found_again() -> None:
     found = nominal(replace(COASTER, stated=stated), also=(slow,))
     by_key = {(one.trial, one.quantity): one for one in found.predicted}
     for one in stated:
-        assert by_key[one.trial, one.quantity].value == pytest.approx(one.value, rel=1.5 * one.std_log)
+        assert by_key[one.trial, one.quantity].value == pytest.approx(one.value, rel=1.5 * SCATTER[one.quantity])
     truth = Fleet(problem.ship, problem.parameters(planted)[None], fastest_mps=30.0).results(slow)
     unseen = [one for one in found.predicted if one.trial == slow]
     assert len(unseen) == 7
@@ -152,6 +152,12 @@ def test_particulars_that_no_ship_has_together_are_named() -> None:
     (screw,) = COASTER.thrusters
     weak = replace(COASTER, thrusters=(replace(screw, power_w=50e3),), top_speed_mps=10.0)
     assert any("kW" in said and "ship.top_speed_kn" in said for said in nominal(weak).contradictions)
+    fast = Stated(
+        trial=replace(CIRCLE, speed_mps=8.0), quantity="advance_m", value=330.0, source="circles[1].advance_m"
+    )
+    assert any(
+        said.startswith("circles[1].speed_kn") for said in nominal(replace(COASTER, stated=(fast,))).contradictions
+    )
     slow = replace(COASTER, thrusters=(replace(screw, max_rps=0.9),))
     assert any("pitch ratio of more than" in said for said in nominal(slow).contradictions)
 

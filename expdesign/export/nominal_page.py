@@ -45,7 +45,7 @@ SPEEDS = (
 
 UNUSUAL = (
     "The regressions were made from single hulls with a block coefficient of 0.48 to 0.88 and a length of 3.5 to 8.5 "
-    "beams. Hers is another, so the scatter of her hull's forces is doubled."
+    "beams. Hers is another, so the scatter of her hull's forces and of her trials is doubled."
 )
 PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
 HUMP = 0.45
@@ -166,8 +166,7 @@ def _head(content: NominalContent) -> Iterator[str]:
     yield "Forces from particulars by published formulas; each part times what the card's trial values make of it:"
     for one in content.nominal.found:
         yield f"  {one.name}: times {one.value:.3f}, {100 * one.std_log_after:.0f} %; {one.source}"
-    for note in content.notes:
-        yield note
+    yield from content.notes
 
 
 def nominal_html(content: NominalContent) -> str:

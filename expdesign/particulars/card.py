@@ -114,11 +114,6 @@ class Stated:
     value: float  # positive, SI
     source: str  # the key in the card
 
-    @property
-    def std_log(self) -> float:
-        """Standard deviation of its logarithm."""
-        return SCATTER[self.quantity]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Card:

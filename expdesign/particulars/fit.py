@@ -11,7 +11,7 @@ the inverse of half its curvature is their covariance. Intervals are quantiles o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ import scipy
 
 from expdesign.particulars.card import SCATTER, Card, Stated, Trial
 from expdesign.particulars.forces import EFFICIENCY, Propeller, design_speed, propellers
-from expdesign.particulars.hull import FACTORS, factors, resistance, scatter
+from expdesign.particulars.hull import BEYOND, FACTORS, factors, is_usual, resistance, scatter
 from expdesign.particulars.model import OWN_SCATTER, parameters, vessel_of, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.progress import Progress, silent
@@ -38,6 +38,7 @@ DRAWS = 240
 SAME_SPEED = 0.03
 """Share within which two approach speeds count as one."""
 KINDS = ("speed", "circle", "zigzag", "stop", "spin", "drift")
+APPROACHED = ("circle", "zigzag", "stop")
 PITCH = (0.45, 1.55)
 """Pitch ratios that propellers have."""
 
@@ -93,6 +94,10 @@ class Problem:
         found = {term.name: value for term, value in parameters(self.card, self.driving, unknowns).items()}
         return np.array([found[name] for name in self.ship.model.names])
 
+    def scatter_of(self, quantity: str) -> float:
+        """Standard deviation of a result's logarithm beside what parameters explain."""
+        return SCATTER[quantity] * (1.0 if is_usual(self.card.hull) else BEYOND)
+
     def slopes(self, unknowns: Array) -> Array:
         """(p, f) of parameters by active unknowns."""
         base = self.parameters(unknowns)
@@ -145,7 +150,7 @@ class _Residuals:
 
     @cached_property
     def std(self) -> Array:
-        return np.array([one.std_log for one in self.stated])
+        return np.array([self.problem.scatter_of(one.quantity) for one in self.stated])
 
     def errors(self, unknowns: Array) -> Array:
         """Of logarithms; a trial that is not completed counts as twice too large."""
@@ -224,7 +229,7 @@ def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress
     named = np.stack([problem.parameters(np.zeros(len(FACTORS))), problem.parameters(full)])
     fleet = problem.fleet(np.concatenate([named, problem.drawn(unknowns, covariance, rng)]))
     trials = _trials(card, stated, also)
-    predicted = [one for trial in trials for one in _predicted(trial, fleet.results(trial), stated, rng)]
+    predicted = [one for trial in trials for one in _predicted(problem, trial, fleet, stated, rng)]
     return Nominal(
         card=card,
         driving=problem.driving,
@@ -255,17 +260,25 @@ def _standard(card: Card) -> Iterator[Trial]:
     top = design_speed(card)
     for order in (0.25, 0.5, 0.75, 1.0):
         yield Trial(kind="speed", order=order)
-    hard = min([math.radians(35.0), *(rudder.angle_max_rad for rudder in card.rudders)])
-    for share in (0.95, 0.65, 0.35):
-        yield Trial(kind="circle", speed_mps=share * top, angle_rad=hard)
-    for degrees in (10.0, 20.0):
-        yield Trial(kind="zigzag", speed_mps=0.95 * top, angle_rad=math.radians(degrees))
     if all(one.astern_share > 0 for one in card.drives):
         yield Trial(kind="stop", speed_mps=0.95 * top)
     if any(one.kind != "propeller" or one.starboard_m for one in card.thrusters):
         yield Trial(kind="spin")
     if card.windage is not None:
         yield Trial(kind="drift", speed_mps=20 * 1852 / 3600)
+    if not _steers(card):
+        return
+    hard = min([math.radians(35.0), *(rudder.angle_max_rad for rudder in card.rudders)])
+    for share in (0.95, 0.65, 0.35):
+        yield Trial(kind="circle", speed_mps=share * top, angle_rad=hard)
+    for degrees in (10.0, 20.0):
+        yield Trial(kind="zigzag", speed_mps=0.95 * top, angle_rad=math.radians(degrees))
+
+
+def _steers(card: Card) -> bool:
+    """Whether she has rudders, azimuth thrusters, or propellers on both sides."""
+    sides = {math.copysign(1.0, one.starboard_m) for one in card.drives if one.starboard_m}
+    return bool(card.rudders) or any(one.kind != "propeller" for one in card.drives) or len(sides) == 2
 
 
 def _alike(one: Trial, other: Trial) -> bool:
@@ -275,14 +288,15 @@ def _alike(one: Trial, other: Trial) -> bool:
 
 
 def _predicted(
-    trial: Trial, results: Mapping[str, Array], stated: tuple[Stated, ...], rng: np.random.Generator
+    problem: Problem, trial: Trial, fleet: Fleet, stated: tuple[Stated, ...], rng: np.random.Generator
 ) -> Iterator[Predicted]:
     """Of the ship from particulars alone, the fitted one, then drawn ones; a trial without end counts as endless."""
-    for quantity, values in results.items():
+    for quantity, values in fleet.results(trial).items():
         before, value, *drawn = values.tolist()
         if not 0 < value < math.inf:
             continue
-        shows = np.nan_to_num(drawn, nan=math.inf) * np.exp(SCATTER[quantity] * rng.standard_normal(len(drawn)))
+        noise = problem.scatter_of(quantity) * rng.standard_normal(len(drawn))
+        shows = np.nan_to_num(drawn, nan=math.inf) * np.exp(noise)
         low, high = np.quantile(shows, [0.025, 0.975], method="inverted_cdf").tolist()
         yield Predicted(
             trial=trial, quantity=quantity, value=value, low=min(low, value), high=max(high, value), prior=before,
@@ -316,13 +330,23 @@ def _impossible(card: Card, driving: tuple[Propeller, ...]) -> Iterator[str]:
                 f"{shown('speed_mps', one.design_mps)} would take a pitch ratio of "
                 f"{'more' if one.pitch_ratio > 1 else 'less'} than {PITCH[int(one.pitch_ratio > 1)]:g}"
             )
-    if card.top_speed_mps is None:
+    top = card.top_speed_mps
+    if top is None:
         return
+    fastest = max(
+        (one for one in card.stated if one.trial.kind in APPROACHED), key=lambda one: one.trial.speed_mps, default=None
+    )
+    if fastest is not None and fastest.trial.speed_mps > (1 + SAME_SPEED) * top:
+        where = fastest.source.rpartition(".")[0]
+        yield (
+            f"{where}.speed_kn is {shown('speed_mps', fastest.trial.speed_mps)}, more than ship.top_speed_kn, "
+            f"{shown('speed_mps', top)}"
+        )
     power = sum(one.power_w for one in card.drives if one.power_w)
-    needed = resistance(card.hull, card.top_speed_mps) * card.top_speed_mps**3 / EFFICIENCY
+    needed = resistance(card.hull, top) * top**3 / EFFICIENCY
     if power and needed / power > math.exp(DOUBTFUL * float(scatter(card.hull)[0])):
         yield (
-            f"ship.top_speed_kn is {shown('speed_mps', card.top_speed_mps)}, which takes about {needed / 1e3:.0f} kW "
+            f"ship.top_speed_kn is {shown('speed_mps', top)}, which takes about {needed / 1e3:.0f} kW "
             f"on the shafts, and the thrusters have {power / 1e3:.0f} kW"
         )
 
@@ -334,4 +358,6 @@ UNITS = {"mps": (3600 / 1852, "kn"), "m": (1.0, "m"), "s": (1.0, "s"), "rad": (1
 def shown(quantity: str, value: float) -> str:
     """A value with its unit, as on a card."""
     scale, unit = UNITS[quantity.rpartition("_")[2]]
-    return f"{scale * value:.3g} {unit}"
+    number = scale * value
+    decimals = max(2 - math.floor(math.log10(abs(number))), 0) if number else 0
+    return f"{round(number, decimals):.{decimals}f} {unit}"
