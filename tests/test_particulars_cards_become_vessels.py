@@ -162,6 +162,19 @@ def test_particulars_that_no_ship_has_together_are_named() -> None:
     assert any("pitch ratio of more than" in said for said in nominal(slow).contradictions)
 
 
+def test_a_trial_without_end_is_shown_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A craft with a fin at the bow instead of the stern: heavy astern, she turns for ever in a zig-zag."""
+    craft = '[ship]\nname = "s"\nlength_m = 12.0\nbeam_m = 3.5\ndraught_m = 1.6\nblock_coefficient = 0.6\n'
+    craft += 'gravity_forward_m = -2.5\ntop_speed_kn = 9.0\n[[thrusters]]\nkind = "azimuth"\nforward_m = -3.0\n'
+    card = tmp_path / "card.toml"
+    card.write_text(craft)
+    assert main(["nominal", str(card), "--out", str(tmp_path / "out")]) == 0
+    assert "no end" in capsys.readouterr().out
+    rows = json.loads((tmp_path / "out" / "nominal.json").read_text())["trials"]
+    assert any(row["high_95"] is None for row in rows)
+    assert load_vessel(tmp_path / "out" / "vessel.toml").name == "s"
+
+
 SHIP = '[ship]\nname = "s"\nlength_m = 80.0\nbeam_m = 13.0\ndraught_m = 5.0\n'
 SCREW = '[[thrusters]]\nkind = "propeller"\nforward_m = -38.0\n'
 WRONG = {

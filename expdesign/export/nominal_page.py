@@ -138,7 +138,7 @@ def nominal_json(content: NominalContent) -> str:
                 {
                     "trial": one.trial.kind, "words": trial_words(one.trial), "speed_mps": one.trial.speed_mps,
                     "angle_rad": one.trial.angle_rad, "order": one.trial.order, "quantity": one.quantity,
-                    "value": one.value, "low_95": finite(one.low), "high_95": finite(one.high),
+                    "value": finite(one.value), "low_95": finite(one.low), "high_95": finite(one.high),
                     "from_particulars_alone": finite(one.prior), "stated": [item.value for item in one.stated],
                 }
                 for one in found.predicted

@@ -49,10 +49,10 @@ class Predicted:
 
     trial: Trial
     quantity: str
-    value: float
+    value: float  # infinite, as the others, where the trial has no end
     low: float
     high: float
-    prior: float  # from particulars alone, nan where that ship does not come to the end of the trial
+    prior: float  # from particulars alone
     stated: tuple[Stated, ...] = ()
 
 
@@ -292,11 +292,9 @@ def _predicted(
 ) -> Iterator[Predicted]:
     """Of the ship from particulars alone, the fitted one, then drawn ones; a trial without end counts as endless."""
     for quantity, values in fleet.results(trial).items():
-        before, value, *drawn = values.tolist()
-        if not 0 < value < math.inf:
-            continue
+        before, value, *drawn = np.nan_to_num(values, nan=math.inf).tolist()
         noise = problem.scatter_of(quantity) * rng.standard_normal(len(drawn))
-        shows = np.nan_to_num(drawn, nan=math.inf) * np.exp(noise)
+        shows = drawn * np.exp(noise)
         low, high = np.quantile(shows, [0.025, 0.975], method="inverted_cdf").tolist()
         yield Predicted(
             trial=trial, quantity=quantity, value=value, low=min(low, value), high=max(high, value), prior=before,

@@ -86,6 +86,9 @@ def compared(found: Nominal, values: tuple[Stated, ...]) -> list[tuple[Stated, f
         if one is None:
             rows.append((value, math.inf, math.inf))
             continue
+        if not math.isfinite(one.value):  # she does not come to the end of it, as some of the drawn ships
+            rows.append((value, math.inf, 0.0 if one.low <= value.value else math.inf))
+            continue
         error = math.log(one.value / value.value)
         end = one.low if error > 0 else one.high
         half = abs(math.log(one.value / end)) if math.isfinite(end) else math.inf
@@ -156,7 +159,6 @@ def head(*names: str) -> None:
 def main() -> None:
     began = time.time()
     result = studied()
-    print(f"## particulars\n\n{(__doc__ or '').strip().replace('    python', '`python').rstrip()}`")
     head(*HEADS)
     for name, (one, alone, after) in result.items():
         print(f"| {name} | {cells(alone)} | {cells(after)} | {one.source} |")
