@@ -134,6 +134,30 @@ def test_the_vessel_file_states_honest_scatter(made: Path) -> None:
     assert model.parameter_correlation_matrix[sway, yaw] < -0.7  # one rudder, behind midships
 
 
+def test_ships_drawn_from_the_file_sail_as_the_table_says(made: Path) -> None:
+    """The normal prior of a vessel file stands for the ships of the table, whose factors are drawn and simulated."""
+    vessel = load_vessel(made / "vessel.toml")
+    rows = json.loads((made / "nominal.json").read_text())["trials"]
+    drawn = vessel.model.drawn_parameters(200, np.random.default_rng(3))
+    fleet = Fleet(vessel, drawn, fastest_mps=30.0)
+    circle = next(row for row in rows if row["trial"] == "circle")
+    for row in (one for one in rows if (one["trial"], one["speed_mps"]) == ("circle", circle["speed_mps"])):
+        trial = Trial(kind="circle", speed_mps=row["speed_mps"], angle_rad=row["angle_rad"])
+        low, middle, high = np.quantile(fleet.results(trial)[row["quantity"]], [0.025, 0.5, 0.975])
+        assert middle == pytest.approx(row["value"], rel=0.08)
+        width = math.log(high / low) / math.log(row["high_95"] / row["low_95"])
+        assert 0.6 < width < 1.5, row["quantity"]
+
+
+def test_parameters_keep_the_signs_that_physics_gives(made: Path) -> None:
+    model = load_vessel(made / "vessel.toml").model
+    ranges = model.parameter_range
+    assert {"X_abs_u_u", "N_ur", "X_n1", "X_n1_astern", "X_un1", "Y_urudder1", "Y_n1rudder1"} <= set(ranges)
+    for name, value in zip(model.names, model.parameters, strict=True):
+        low, high = ranges.get(name, (-math.inf, math.inf))
+        assert low <= value <= high
+
+
 def test_values_that_contradict_are_named() -> None:
     known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
     wrong = tuple(

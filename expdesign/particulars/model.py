@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +17,11 @@ from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselMode
 EQUATIONS = {"u": "X", "v": "Y", "r": "N"}
 OWN_SCATTER = 0.03
 """Standard deviation of each parameter by itself, by its value: what a projection on few terms leaves out."""
-SIGNS = {
-    "X_abs_u_u": -1, "Y_uv": -1, "Y_abs_v_v": -1, "N_ur": -1, "N_abs_r_r": -1, "W_wind_u": -1, "W_wind_v": -1,
-}  # fmt: skip
+RANGES = (
+    (re.compile(r"X_abs_u_u|Y_uv|Y_abs_v_v|N_ur|N_abs_r_r|W_wind_[uv]"), (-math.inf, 0.0)),  # damping and drag
+    (re.compile(r"X_un\d+|X_drag_\w+|Y_(u|n\d+)rudder\d+"), (-math.inf, 0.0)),  # loss of thrust, rudders
+    (re.compile(r"X_n\d+(_astern)?|Y_(side_)?n\d+"), (0.0, math.inf)),  # thrust
+)
 """Parameters whose sign physics gives: a hull that is driven by its own drag runs away."""
 
 
@@ -93,7 +96,9 @@ def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> 
     model = VesselModel(
         terms=tuple(found), parameters=np.array([*found.values()]), parameter_std=np.zeros(len(found)),
         form="continuous", sample_time_s=step, actuators=actuators(card, driving),
-        parameter_range={name: (-math.inf, 0.0) for term in found if (name := term.name) in SIGNS},
+        parameter_range={
+            term.name: ends for term in found for names, ends in RANGES if names.fullmatch(term.name)
+        },
     )  # fmt: skip
     return Vessel(
         name=card.name, length_m=hull.length_m, beam_m=hull.beam_m, draught_m=hull.draught_m, sample_time_s=step,

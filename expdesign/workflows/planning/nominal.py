@@ -60,7 +60,7 @@ def nominal(card: Path, out: Path | None, *, seed: int = 0, progress: Progress =
         summary={
             "vessel": found.vessel.name,
             "parameters": len(found.vessel.model.names),
-            "values_fitted": len(found.card.stated),
+            "stated_values": sum(len(one.stated) for one in found.predicted),
             "contradictions": list(found.contradictions),
         },
         tables=tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables),
