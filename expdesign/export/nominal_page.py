@@ -100,7 +100,7 @@ def _trial_row(one: Predicted) -> tuple[str, ...]:
     def text(value: float) -> str:
         return shown(one.quantity, value) if math.isfinite(value) else "no end"
 
-    stated = ", ".join(shown(one.quantity, item.value) for item in one.stated)
+    stated = ", ".join(f"{shown(one.quantity, item.value)} {item.side}".rstrip() for item in one.stated)
     return (
         trial_words(one.trial), RESULTS[one.quantity], text(one.value), text(one.low), text(one.high), stated or "-",
         text(one.prior),

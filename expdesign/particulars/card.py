@@ -113,6 +113,7 @@ class Stated:
     quantity: str  # a key of `SCATTER`
     value: float  # positive, SI
     source: str  # the key in the card
+    side: str = ""  # to which she turned, "starboard" or "port"; the model is the same to both
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -36,7 +36,9 @@ NINETY_FIVE = 1.96
 DRAWS = 240
 """Ships that are drawn for the intervals of predictions."""
 SAME_SPEED = 0.03
-"""Share within which two approach speeds count as one."""
+"""Share within which two speeds or orders count as one."""
+NEAR_SPEED = 0.10
+"""Share within which a standard trial is left out beside a stated one."""
 KINDS = ("speed", "circle", "zigzag", "stop", "spin", "drift")
 APPROACHED = ("circle", "zigzag", "stop")
 PITCH = (0.45, 1.55)
@@ -282,7 +284,7 @@ def _steers(card: Card) -> bool:
 
 
 def _alike(one: Trial, other: Trial) -> bool:
-    near = abs(one.speed_mps - other.speed_mps) <= SAME_SPEED * max(one.speed_mps, other.speed_mps)
+    near = abs(one.speed_mps - other.speed_mps) <= NEAR_SPEED * max(one.speed_mps, other.speed_mps)
     same = abs(one.angle_rad - other.angle_rad) < 0.01 and abs(one.order - other.order) < SAME_SPEED
     return one.kind == other.kind and near and same
 

@@ -17,6 +17,9 @@ KNOT_MPS = 1852.0 / 3600.0
 SAME_DISPLACEMENT = 0.05
 """Share by which a displacement may differ from that of a stated block coefficient."""
 LARGEST_DEG = 90.0
+SHIP_M = 20.0
+SOLAS_DEGPS, SMALL_DEGPS = 2.32, 10.0
+"""Usual rates of rudders, of ships of `SHIP_M` and more, and of smaller craft."""
 
 
 class ShipTable(Table):
@@ -56,7 +59,10 @@ class ThrusterTable(Table):
     astern_percent: float = Field(
         default=70.0, ge=0.0, le=100.0, description="the shaft speed at full astern, of that ahead [%]"
     )
-    full_order_s: Positive = Field(default=20.0, description="the time from stop to full ahead [s]")
+    full_order_s: Positive | None = Field(
+        default=None,
+        description="the time from stop to full ahead [s]; a quarter of the length in metres when not given",
+    )
     turn_max_deg: Positive | None = Field(
         default=None, description="the largest angle of an azimuth thruster to each side [deg]; free when not given"
     )
@@ -74,7 +80,9 @@ class RudderTable(Table):
     )
     aspect_ratio: Positive = Field(default=1.6, description="height squared by area")
     max_deg: float = Field(default=35.0, gt=0, le=LARGEST_DEG, description="the largest angle [deg]")
-    rate_degps: Positive = Field(default=2.32, description="how fast it turns [deg/s]; SOLAS wants 2.32")
+    rate_degps: Positive | None = Field(
+        default=None, description="how fast it turns [deg/s]; 2.32 as SOLAS wants when not given, 10 below 20 m"
+    )
 
 
 class WindageTable(Table):
@@ -104,7 +112,7 @@ class ApproachTable(Table):
 class CircleTable(ApproachTable):
     """One of `[[circles]]`."""
 
-    side: Literal["starboard", "port"] = Field(default="starboard", description="to which she turned; for the table")
+    side: Literal["starboard", "port"] = Field(default="starboard", description="to which she turned")
     helm_deg: float = Field(default=35.0, gt=0, le=LARGEST_DEG, description="the helm [deg]")
     advance_m: Positive | None = Field(default=None, description="the advance to 90 degrees [m]")
     transfer_m: Positive | None = Field(default=None, description="the transfer to 90 degrees [m]")
@@ -191,7 +199,7 @@ def load_card(path: Path | str) -> Card:
             length_m=length, beam_m=ship.beam_m, draught_m=ship.draught_m, mass_kg=_mass(ship, entry.at("ship")),
             gravity_forward_m=ship.gravity_forward_m, hulls=ship.hulls,
         ),
-        thrusters=tuple(map(_thruster, file.thrusters)),
+        thrusters=tuple(_thruster(one, length) for one in file.thrusters),
         rudders=tuple(rudders),
         windage=None if windage is None else Windage(**windage.model_dump()),
         top_speed_mps=None if ship.top_speed_kn is None else KNOT_MPS * ship.top_speed_kn,
@@ -229,12 +237,12 @@ def _mass(ship: ShipTable, entry: Entry) -> float:
     return 1e3 * ship.displacement_t
 
 
-def _thruster(table: ThrusterTable) -> Thruster:
+def _thruster(table: ThrusterTable, length_m: float) -> Thruster:
     return Thruster(
         kind=table.kind, forward_m=table.forward_m, starboard_m=table.starboard_m, diameter_m=table.diameter_m,
         power_w=None if table.power_kw is None else 1e3 * table.power_kw,
         max_rps=None if table.max_rpm is None else table.max_rpm / 60.0, pitch_ratio=table.pitch_ratio,
-        astern_share=table.astern_percent / 100.0, full_order_s=table.full_order_s,
+        astern_share=table.astern_percent / 100.0, full_order_s=table.full_order_s or length_m / 4.0,
         angle_max_rad=None if table.turn_max_deg is None else math.radians(table.turn_max_deg),
         angle_rate_radps=math.radians(table.turn_degps),
     )  # fmt: skip
@@ -244,10 +252,11 @@ def _rudder(table: RudderTable, ship: ShipTable, entry: Entry) -> Rudder:
     if (table.area_m2 is None) == (table.area_percent is None):
         both = "both are given" if table.area_m2 else "neither is given"
         raise entry.at("area_m2").error(f"and area_percent: {both}, expected one of them")
+    rate = table.rate_degps or (SOLAS_DEGPS if ship.length_m >= SHIP_M else SMALL_DEGPS)
     area = table.area_m2 or ship.length_m * ship.draught_m * (table.area_percent or 0.0) / 100.0
     return Rudder(
         area_m2=area, forward_m=table.forward_m, starboard_m=table.starboard_m, aspect_ratio=table.aspect_ratio,
-        angle_max_rad=math.radians(table.max_deg), angle_rate_radps=math.radians(table.rate_degps),
+        angle_max_rad=math.radians(table.max_deg), angle_rate_radps=math.radians(rate),
     )  # fmt: skip
 
 
@@ -273,7 +282,8 @@ def _stated(file: CardFile, entry: Entry) -> Iterator[Stated]:
     for number, circle in enumerate(file.circles, start=1):
         trial = Trial(kind="circle", speed_mps=KNOT_MPS * circle.speed_kn, angle_rad=math.radians(circle.helm_deg))
         keys = tuple(key for key in CircleTable.model_fields if key not in ("speed_kn", "side", "helm_deg"))
-        yield from _values(circle, trial, entry.at("circles").item(number), keys)
+        found = _values(circle, trial, entry.at("circles").item(number), keys)
+        yield from (replace(one, side=circle.side) for one in found)
     for number, zigzag in enumerate(file.zigzags, start=1):
         trial = Trial(kind="zigzag", speed_mps=KNOT_MPS * zigzag.speed_kn, angle_rad=math.radians(zigzag.angle_deg))
         yield from _values(zigzag, trial, entry.at("zigzags").item(number), ("overshoot_1_deg", "overshoot_2_deg"))
