@@ -10,7 +10,7 @@ import pytest
 
 import published_models as published
 from expdesign.particulars import FACTORS, Card, Hull, Rudder, Thruster, Trial, Windage
-from expdesign.particulars.forces import bollard_n, forces, propellers, tunnel
+from expdesign.particulars.forces import bollard_n, forces, open_water, propellers, tunnel
 from expdesign.particulars.hull import derivatives, factors, ittc_57, masses, modulus, resistance
 from expdesign.particulars.model import parameters, vessel_of
 from expdesign.particulars.trials import Fleet
@@ -81,6 +81,17 @@ def test_a_tug_has_the_bollard_pull_that_its_builder_states() -> None:
     pull = sum(one.at_rest / (1 - one.deduction) * one.max_rps**2 for one in propellers(card))
     assert pull == pytest.approx(53e3 * 9.81, rel=0.2)
     assert 2 * bollard_n(1566e3, 2.16) == pytest.approx(53e3 * 9.81, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("pitch_ratio", "k_t"),
+    [(0.721, (0.2931, -0.2753, -0.1385)), (0.7151, (0.3278, -0.3323, -0.156))],
+    ids=["KVLCC2, Yasukawa and Yoshimura 2015", "Esso Osaka, Miyauchi et al. 2022"],
+)
+def test_propellers_are_near_published_open_water_curves(pitch_ratio: float, k_t: tuple[float, float, float]) -> None:
+    at_rest, loss = open_water(pitch_ratio)
+    assert at_rest == pytest.approx(k_t[0], rel=0.10)
+    assert at_rest / loss == pytest.approx(max(np.roots(k_t[::-1])), rel=0.06)  # advance coefficient without thrust
 
 
 def test_thrust_at_full_order_is_the_resistance_at_the_top_speed() -> None:

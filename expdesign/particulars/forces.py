@@ -29,6 +29,8 @@ from expdesign.particulars.hull import G_MPS2, Fin, Force, hull_forces, resistan
 
 EFFICIENCY = 0.6
 """Resistance times speed by power on the shafts."""
+USUAL_PITCH = 0.9
+"""Pitch by diameter of a propeller of which only the power or the top speed is known."""
 FROUDE = 0.2
 """Froude number of a ship of which neither speed nor power is known."""
 
@@ -59,12 +61,24 @@ class Propeller:
     @property
     def k_0(self) -> float:
         """Thrust coefficient at rest."""
-        return float(0.44 * self.pitch_ratio**1.15)
+        return open_water(self.pitch_ratio)[0]
 
     @property
     def k_1(self) -> float:
         """Its loss with the advance coefficient."""
-        return self.k_0 / (1.08 * self.pitch_ratio)
+        return open_water(self.pitch_ratio)[1]
+
+
+def open_water(pitch_ratio: float) -> tuple[float, float]:
+    """Thrust coefficient at rest and its loss with the advance coefficient, four blades of the B-series."""
+    at_rest = float(0.44 * pitch_ratio**1.15)
+    return at_rest, at_rest / (1.08 * pitch_ratio)
+
+
+def full_rps(power_w: float, diameter_m: float, pitch_ratio: float) -> float:
+    """Shaft speed of a power under way, with a torque coefficient of three quarters of that at rest."""
+    torque = 0.045 * pitch_ratio**1.7
+    return float((power_w / (2 * math.pi * WATER_KGPM3 * diameter_m**5 * torque)) ** (1 / 3))
 
 
 def design_speed(card: Card) -> float:
@@ -110,16 +124,15 @@ def _completed(card: Card, number: int, *, needed: float, speed: float, wake: fl
 
     def missing(rps: float, ratio: float) -> float:
         """Thrust less what is needed at the design speed."""
-        k = 0.44 * ratio**1.15 * (1.0 - inflow / (rps * diameter) / (1.08 * ratio))
-        return float(WATER_KGPM3 * rps**2 * diameter**4 * k - needed)
+        k_0, k_1 = open_water(ratio)
+        return WATER_KGPM3 * rps**2 * diameter**4 * (k_0 - k_1 * inflow / (rps * diameter)) - needed
 
     rps = thruster.max_rps
     if rps is None and thruster.power_w is not None:
-        ratio = pitch or 0.9
-        rps = (thruster.power_w / (2 * math.pi * WATER_KGPM3 * diameter**5 * 0.045 * ratio**1.7)) ** (1 / 3)
+        rps = full_rps(thruster.power_w, diameter, pitch or USUAL_PITCH)
     if rps is None:
         low, high = 0.01 * inflow / diameter, 20.0 * inflow / diameter
-        rps = bisected(lambda value: missing(value, pitch or 0.9), low, high)
+        rps = bisected(lambda value: missing(value, pitch or USUAL_PITCH), low, high)
     if pitch is None:
         pitch = bisected(lambda ratio: missing(rps, ratio), 0.4, 1.6)
     return Propeller(
@@ -261,7 +274,7 @@ def _rudder(
 
 
 def _rudder_fins(card: Card, driving: tuple[Propeller, ...], given: Mapping[str, float]) -> Iterator[Fin]:
-    """Rudders amidships: the hull straightens the flow that meets them."""
+    """Rudders at zero helm: the hull straightens the flow that meets them."""
     gamma = 2.06 * card.hull.block * card.hull.beam_m / card.hull.length_m + 0.14
     for rudder in card.rudders:
         flow = _inflow(card, rudder, _ahead_of(rudder, driving), given)
