@@ -69,7 +69,8 @@ FACTORS = (
     Factor("wind on the beam", 0.15, "Blendermann 1994, 0.9"),
     Factor("moment of wind", 0.40, "Blendermann 1994, from the centre of the lateral area"),
 )
-"""Scatter as the regressions' own figures and the ships of `tests/benchmarks/particulars.py` show it."""
+"""The standard deviations are judgements, scaled so that predictions of the published ships of
+`tests/benchmarks/particulars.py` deviate by one of their own standard deviations in the mean square."""
 NAMES = tuple(factor.name for factor in FACTORS)
 HULL = (
     "resistance", "added mass in sway", "moment of inertia", "sway force of drift", "sway force of turning",
