@@ -24,6 +24,7 @@ from expdesign.scenario import load_card
 SHIPS = Path(__file__).parent / "ships"
 MODELS: dict[str, Callable[[], published.Model]] = {
     "kvlcc2": published.kvlcc2_ship,
+    "kcs": published.kcs,
     "seiun-maru": published.seiun_maru,
     "mariner": published.mariner,
     "s175": published.s175,

@@ -183,6 +183,26 @@ def kvlcc2_ship() -> Model:
     return kvlcc2(320.0 / 7.0, 0.35)
 
 
+def kcs() -> Model:
+    """KCS, full scale: Y. Yoshimura et al., Analysis of steady hydrodynamic force components and prediction of
+    manoeuvering ship motion with KVLCC1, KVLCC2 and KCS, SIMMAN 2008; the wake does not change in turns."""
+    length, draught = 230.0, 10.8
+    unit = 0.5 * length**2 * draught
+    m_x, m_y = 1790.85 / unit, 44324.18 / unit
+    return mmg(
+        length=length, beam=32.2, draught=draught, volume=0.651 * length * 32.2 * draught, gravity=-3.404, rho=1025.0,
+        m_x=m_x, m_y=m_y, j_z=140067300 / unit / length**2, r_0=None,
+        hull_x=(-0.0549, 0.1084 - m_y, -0.0120, -0.0417),
+        hull_y=np.array([-0.2252, 0.0398 + m_x, -1.7179, -0.4832, -0.8341, -0.0050]),
+        hull_n=np.array([-0.1111, -0.0465, -0.1752, -0.6168, -0.0512, -0.0387]),
+        propeller=(7.9, -0.4565, 0.5228, -0.4390, -0.0609, 1.925),
+        rudder=(
+            length * draught / 54.86, -0.5, 3.005, 0.7979, 0.633, 0.956, 0.492, 0.338, -0.755, 0.258, 0.361, -0.436,
+        ),
+        t_p=0.207, w_p=0.355, speed=12.35, helm_rate=math.radians(2.32),
+    )  # fmt: skip
+
+
 def seiun_maru() -> Model:
     """The training ship Seiun Maru (Yoshimura and Masumoto 2012), full scale; speed of a Froude number of 0.26."""
     return mmg(
