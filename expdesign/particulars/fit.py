@@ -32,7 +32,6 @@ STEP = 0.05
 MOST_FITS = 25
 DOUBTFUL = 3.0
 """Standard deviations from what all other values say, from which a value contradicts them."""
-NINETY_FIVE = 1.96
 DRAWS = 240
 """Ships that are drawn for the intervals of predictions."""
 SAME_SPEED = 0.03
