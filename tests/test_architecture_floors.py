@@ -22,7 +22,7 @@ FLOORS = {
         ("simulation", "records"),
         ("reduction",),
         ("dictionary", "estimation", "indices", "step_trials"),
-        ("information", "diagnosis", "assessment", "roll", "kinematics"),
+        ("information", "diagnosis", "assessment", "roll", "kinematics", "particulars"),
         ("durations",),
         ("growing", "rehearsal", "plan", "monitoring", "loading"),
         ("shortest_day", "foresight"),

@@ -51,6 +51,12 @@ def test_what_the_tutorials_ask_before_a_plan_runs(tmp_path: Path, monkeypatch: 
     carried_out(commands, tmp_path, monkeypatch)
 
 
+def test_a_card_becomes_a_vessel_as_its_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    commands = tutorial("pilot-card")
+    assert [command[0] for command in commands] == ["explain", "nominal", "nominal", "indices"]
+    carried_out(commands, tmp_path, monkeypatch)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["first-plan", "first-estimate"])
 def test_a_tutorial_runs_from_its_first_command_to_its_last(

@@ -97,6 +97,7 @@ Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]
 OutBesidePlan = Annotated[Path | None, out_option("the folder of the plan")]
 OutByData = Annotated[Path | None, out_option("runs/<first data file>")]
 OutByVessel = Annotated[Path | None, out_option("runs/<vessel>-indices")]
+OutByCard = Annotated[Path | None, out_option("runs/<card>-nominal")]
 OutInclined = Annotated[Path | None, out_option("runs/<vessel>-incline")]
 OutWhatIf = Annotated[Path | None, out_option("runs/<scenario>-whatif")]
 

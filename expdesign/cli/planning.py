@@ -15,6 +15,7 @@ from expdesign.cli.options import (
     OtherVessel,
     Out,
     OutBesidePlan,
+    OutByCard,
     OutWhatIf,
     PlanFile,
     ScenarioFile,
@@ -57,6 +58,25 @@ def run(
         cache=not no_cache,
         seed=seed,
     )
+
+
+@command("nominal")
+def nominal(
+    card: Annotated[
+        Path,
+        typer.Argument(metavar="CARD.toml", help="Particulars and trial values; see expdesign explain card."),
+    ],
+    out: OutByCard = None,
+    seed: Seed = 0,
+) -> Asked:
+    """Make a vessel file from a ship's particulars and what her pilot card states of trials.
+
+    Writes vessel.toml, with standard deviations and correlations; nominal.json and nominal.html: her trials predicted
+    with 95 % intervals beside what the card states, the source of every number, and what on the card contradicts.
+
+    Example: expdesign nominal scenarios/cards/offshore-45m.toml
+    """
+    return ask("nominal", card, out, seed=seed)
 
 
 @command("score")

@@ -6,6 +6,7 @@ out is in metres and radians. Everything wrong in a file becomes one `FileError`
 a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and what would be right.
 """
 
+from expdesign.scenario.card_file import load_card
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.durations_file import load_repeats

@@ -14,6 +14,7 @@ from expdesign.workflows.explanations.values import Explained, Section, Topic
 TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
     "scenario": ("keys of a scenario file: design, start, goal, environment, plan", files.scenario_topic),
     "vessel": ("keys of a vessel file: particulars, actuators, model, sensors", files.vessel_topic),
+    "card": ("keys of a pilot card, from which expdesign nominal makes a vessel file", files.card_topic),
     "dictionary": ("keys of a dictionary file", files.dictionary_topic),
     "families": ("manoeuvre families and their settings", plug_ins.families_topic),
     "area": ("keys of an area file: chart, bounds, depth, no-go zones", files.area_topic),
@@ -30,6 +31,7 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
 MANUAL = {
     "conventions": "frames, signs, units, models: read this first",
     "commands": "which command, which method, when",
+    "pilot-card": "from particulars and a pilot card to a vessel file",
     "first-plan": "your first plan, in half an hour",
     "first-estimate": "from your data to a model, in ten minutes",
     "information": "how long to run what: information, durations, certificates",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
 
+from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
 from expdesign.scenario.keys import Key, keys_of
@@ -40,6 +41,11 @@ LOADS = (
     "anywhere. [ship] is left out where --vessel names a file with [roll], which says the same. expdesign roll-plan "
     "reads such a file as candidates; it needs m and z_m of an unknown load under [start], roughly."
 )
+CARDS = (
+    "What a pilot card, a wheelhouse poster or an old trial sheet states, in their units; expdesign nominal makes a "
+    "vessel file of it. Only [ship] and one of [[thrusters]] are required. Trial values are fitted; one turning circle "
+    "tells more than all particulars. Forward and starboard are positive, counted from midships."
+)
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
     "the way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no "
@@ -64,6 +70,11 @@ def vessel_topic() -> Topic:
     ]
     kinds = [_kind(names, table) for table, names in _kinds().items()]
     return Topic(name="vessel", title="Vessel files", text=VESSELS, sections=(*sections[:2], *kinds, *sections[2:]))
+
+
+def card_topic() -> Topic:
+    """Keys of a pilot card."""
+    return Topic(name="card", title="Pilot cards", text=CARDS, sections=_by_table(CardFile))
 
 
 def loads_topic() -> Topic:

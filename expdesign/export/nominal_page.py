@@ -1,0 +1,182 @@
+"""A vessel out of a card, in a mariner's units: tables of her trials and of the sources, JSON, vessel file, page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from expdesign.export.files import finite, strict_json, vessel_toml
+from expdesign.export.pages import page_template
+from expdesign.particulars import Nominal, Predicted, Trial, is_usual, shown
+
+TRIAL_HEADER = ("trial", "result", "predicted", "95 % from", "to", "stated", "from particulars alone")
+FACTOR_HEADER = ("part of the forces", "source", "scatter before", "times", "scatter after")
+TAKEN_HEADER = ("thruster", "diameter", "full order", "pitch ratio", "wake", "thrust deduction")
+RESULTS = {
+    "speed_mps": "speed",
+    "advance_m": "advance",
+    "transfer_m": "transfer",
+    "tactical_diameter_m": "tactical diameter",
+    "time_90_s": "time to 90 deg",
+    "time_180_s": "time to 180 deg",
+    "speed_90_mps": "speed at 90 deg",
+    "speed_180_mps": "speed at 180 deg",
+    "overshoot_1_rad": "first overshoot",
+    "overshoot_2_rad": "second overshoot",
+    "reach_m": "track reach",
+    "time_s": "time",
+    "turn_90_s": "time to 90 deg",
+    "drift_mps": "drift",
+}
+"""Quantity -> its words."""
+NO_TRIAL = (
+    "Nothing of a trial is stated: intervals are those of the regressions alone. One turning circle, with the speed of "
+    "its approach, narrows them most."
+)
+SIDES = (
+    "Circles and zig-zags are the same to both sides: the model is symmetric, and values of both sides are fitted "
+    "together. A wind of the beam meets a ship whose heading is held."
+)
+SPEEDS = (
+    "Second-order terms hold from rest to the stated top speed; wave resistance beyond it, planing, and shallow water "
+    "are not in them."
+)
+
+UNUSUAL = (
+    "The regressions were made from single hulls with a block coefficient of 0.48 to 0.88 and a length of 3.5 to 8.5 "
+    "beams. Hers is another, so the scatter of her hull's forces and of her trials is doubled."
+)
+PLANING = "wave-making and planing are not in the regressions, state speeds at several orders."
+HUMP = 0.45
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NominalContent:
+    """The values that page and files show."""
+
+    nominal: Nominal
+    # command, version: to reproduce it
+    command: str
+    version: str
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What contradicts, and what to bear in mind."""
+        found = self.nominal
+        measured = any(one.trial.kind != "speed" for one in found.card.stated)
+        calm = "Without [windage] no term reads the wind: simulated wind does not move her."
+        froude = found.driving[0].design_mps / math.sqrt(9.81 * found.card.hull.length_m)
+        forms = () if is_usual(found.card.hull) else (UNUSUAL,)
+        planes = (f"At full order her Froude number is {froude:.2f}: {PLANING}",) if froude > HUMP else ()
+        windless = () if found.card.windage else (calm,)
+        return (*found.contradictions, *(() if measured else (NO_TRIAL,)), *forms, *planes, SIDES, SPEEDS, *windless)
+
+
+def trial_words(trial: Trial) -> str:
+    """A trial as a mariner names it."""
+    speed, angle = shown("speed_mps", trial.speed_mps), f"{math.degrees(trial.angle_rad):.3g}"
+    match trial.kind:
+        case "speed":
+            return f"ahead at {100 * trial.order:.3g} %"
+        case "circle":
+            return f"circle from {speed}, helm {angle} deg"
+        case "zigzag":
+            return f"zig-zag {angle}/{angle} at {speed}"
+        case "stop":
+            how = f"{100 * trial.order:.3g} % astern" if trial.order else "engines stopped, to a fifth of the speed"
+            return f"stop from {speed}, {how}"
+        case "spin":
+            return "turn on the spot"
+    return f"drift in {speed} of wind on the beam"
+
+
+def trial_rows(content: NominalContent) -> list[tuple[str, ...]]:
+    """One for each predicted result."""
+    return [_trial_row(one) for one in content.nominal.predicted]
+
+
+def _trial_row(one: Predicted) -> tuple[str, ...]:
+    def text(value: float) -> str:
+        return shown(one.quantity, value) if math.isfinite(value) else "no end"
+
+    stated = ", ".join(f"{shown(one.quantity, item.value)} {item.side}".rstrip() for item in one.stated)
+    return (
+        trial_words(one.trial), RESULTS[one.quantity], text(one.value), text(one.low), text(one.high), stated or "-",
+        text(one.prior),
+    )  # fmt: skip
+
+
+def factor_rows(content: NominalContent) -> list[tuple[str, ...]]:
+    """One for each part of the forces, with the source of its value."""
+    return [
+        (one.name, one.source, f"{100 * one.std_log:.0f} %", f"{one.value:.2f}", f"{100 * one.std_log_after:.0f} %")
+        for one in content.nominal.found
+    ]
+
+
+def taken_rows(content: NominalContent) -> list[tuple[str, ...]]:
+    """One for each thruster that drives her, with what the card leaves open."""
+    return [
+        (
+            f"n{one.number}, {one.thruster.kind}", f"{one.diameter_m:.3g} m", f"{60 * one.max_rps:.4g} rpm",
+            f"{one.pitch_ratio:.2f}", f"{one.wake:.2f}", f"{one.deduction:.2f}",
+        )
+        for one in content.nominal.driving
+    ]  # fmt: skip
+
+
+def nominal_json(content: NominalContent) -> str:
+    """All results as JSON, SI."""
+    found = content.nominal
+    return strict_json(
+        {
+            "command": content.command,
+            "version": content.version,
+            "vessel": found.vessel.name,
+            "trials": [
+                {
+                    "trial": one.trial.kind, "words": trial_words(one.trial), "speed_mps": one.trial.speed_mps,
+                    "angle_rad": one.trial.angle_rad, "order": one.trial.order, "quantity": one.quantity,
+                    "value": finite(one.value), "low_95": finite(one.low), "high_95": finite(one.high),
+                    "from_particulars_alone": finite(one.prior), "stated": [item.value for item in one.stated],
+                }
+                for one in found.predicted
+            ],
+            "factors": {
+                one.name: {
+                    "source": one.source, "std_log_before": one.std_log, "value": one.value,
+                    "std_log_after": one.std_log_after,
+                }
+                for one in found.found
+            },
+            "contradictions": list(found.contradictions),
+            "notes": list(content.notes),
+        }
+    )  # fmt: skip
+
+
+def nominal_toml(content: NominalContent) -> str:
+    """The vessel file; its head says where the numbers come from."""
+    return vessel_toml(content.nominal.vessel, comments=tuple(_head(content)))
+
+
+def _head(content: NominalContent) -> Iterator[str]:
+    yield f"{content.nominal.vessel.name}, made by: {content.command}"
+    yield "Forces from particulars by published formulas; each part times what the card's trial values make of it:"
+    for one in content.nominal.found:
+        yield f"  {one.name}: times {one.value:.3f}, {100 * one.std_log_after:.0f} %; {one.source}"
+    yield from content.notes
+
+
+def nominal_html(content: NominalContent) -> str:
+    """One HTML page without any outside reference."""
+    return page_template("nominal.html").render(
+        content=content,
+        trial_header=[name.capitalize() for name in TRIAL_HEADER],
+        trial_rows=trial_rows(content),
+        factor_header=[name.capitalize() for name in FACTOR_HEADER],
+        factor_rows=factor_rows(content),
+        taken_header=[name.capitalize() for name in TAKEN_HEADER],
+        taken_rows=taken_rows(content),
+    )

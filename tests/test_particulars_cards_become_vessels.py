@@ -1,0 +1,245 @@
+"""`expdesign nominal`: stated trials are fitted, intervals hold, contradictions are named, wrong cards are refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from expdesign.indices import standard_results
+from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
+from expdesign.particulars.fit import Problem, fitted
+from expdesign.particulars.trials import Fleet
+from expdesign.scenario import load_card, load_vessel
+
+CARDS = Path(__file__).parents[1] / "scenarios" / "cards"
+COASTER = Card(
+    name="coaster",
+    hull=Hull(length_m=80.0, beam_m=13.0, draught_m=5.0, mass_kg=0.7 * 1025 * 80 * 13 * 5.0),
+    thrusters=(Thruster(kind="propeller", forward_m=-38.0, diameter_m=3.0, max_rps=3.4, full_order_s=34.0),),
+    rudders=(Rudder(area_m2=8.0, forward_m=-40.0),),
+    top_speed_mps=6.7,
+)
+CIRCLE = Trial(kind="circle", speed_mps=6.0, angle_rad=math.radians(35.0))
+ZIGZAG = Trial(kind="zigzag", speed_mps=6.0, angle_rad=math.radians(20.0))
+SPEEDS = tuple(Trial(kind="speed", order=order) for order in (0.5, 1.0))
+
+
+def values_of(
+    problem: Problem,
+    unknowns: np.ndarray,
+    rng: np.random.Generator | None,
+    trials: tuple[Trial, ...] = (*SPEEDS, CIRCLE, ZIGZAG),
+) -> tuple[Stated, ...]:
+    """What a card of the ship with these factors would state, with the scatter of trials."""
+    fleet = Fleet(problem.ship, problem.parameters(unknowns)[None], fastest_mps=30.0)
+    found = []
+    for trial in trials:
+        for quantity, value in fleet.results(trial).items():
+            noise = 0.0 if rng is None else SCATTER[quantity] * rng.standard_normal()
+            found.append(
+                Stated(trial=trial, quantity=quantity, value=float(value[0]) * math.exp(noise), source=quantity)
+            )
+    return tuple(one for one in found if math.isfinite(one.value))
+
+
+def test_a_planted_ship_is_found_again() -> None:
+    problem = Problem(COASTER)
+    planted = np.zeros(len(FACTORS))
+    planted[problem.active] = 0.8 * np.random.default_rng(5).standard_normal(len(problem.active))
+    stated = values_of(problem, planted, None)
+    slow = Trial(kind="circle", speed_mps=3.0, angle_rad=math.radians(20.0))
+    found = nominal(replace(COASTER, stated=stated), also=(slow,))
+    by_key = {(one.trial, one.quantity): one for one in found.predicted}
+    for one in stated:
+        assert by_key[one.trial, one.quantity].value == pytest.approx(one.value, rel=1.5 * SCATTER[one.quantity])
+    truth = Fleet(problem.ship, problem.parameters(planted)[None], fastest_mps=30.0).results(slow)
+    unseen = [one for one in found.predicted if one.trial == slow]
+    assert len(unseen) == 7
+    for one in unseen:
+        assert one.low <= truth[one.quantity][0] <= one.high
+        assert one.value == pytest.approx(truth[one.quantity][0], rel=0.15)
+    assert found.contradictions == ()
+
+
+def test_planted_factors_lie_within_the_stated_covariance() -> None:
+    """Of ships drawn from the prior, (estimate - truth)' C^-1 (estimate - truth) has the mean of chi square."""
+    problem = Problem(COASTER)
+    count, ships = len(problem.active), 5
+    rng = np.random.default_rng(11)
+    distances = []
+    for _ in range(ships):
+        planted = np.zeros(len(FACTORS))
+        planted[problem.active] = 0.7 * rng.standard_normal(count)
+        unknowns, covariance = fitted(problem, values_of(problem, planted, rng, (*SPEEDS, CIRCLE)))
+        apart = unknowns - planted[problem.active]
+        distances.append(apart @ np.linalg.solve(covariance, apart) / count)
+    spread = 4 * math.sqrt(2 / count / ships)
+    # directions that no value tells of keep the prior, from which these ships are drawn with seven tenths of its spread
+    assert 0.49 - spread < np.mean(distances) < 1 + spread
+
+
+def test_a_stated_circle_narrows_the_intervals() -> None:
+    alone = nominal(COASTER, also=(CIRCLE, ZIGZAG)).predicted
+    known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
+    circle = tuple(one for one in known if one.trial == CIRCLE)
+    after = nominal(replace(COASTER, stated=circle), also=(CIRCLE, ZIGZAG)).predicted
+
+    def width(rows: tuple, trial: Trial, quantity: str) -> float:
+        return next(math.log(one.high / one.low) for one in rows if (one.trial, one.quantity) == (trial, quantity))
+
+    assert width(after, CIRCLE, "tactical_diameter_m") < 0.5 * width(alone, CIRCLE, "tactical_diameter_m")
+    assert width(after, ZIGZAG, "overshoot_1_rad") < width(alone, ZIGZAG, "overshoot_1_rad")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("nominal")
+    assert main(["nominal", str(CARDS / "coaster-80m.toml"), "--out", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def test_the_vessel_file_does_what_the_table_says(made: Path) -> None:
+    vessel = load_vessel(made / "vessel.toml")
+    rows = json.loads((made / "nominal.json").read_text())["trials"]
+    speed = next(row["speed_mps"] for row in rows if row["trial"] == "zigzag")
+    results = standard_results(vessel, speed_mps=speed, sides=("starboard",))
+    by_key = {
+        (row["trial"], round(row["speed_mps"], 6), round(row["angle_rad"], 3), row["quantity"]): row for row in rows
+    }
+
+    def told(kind: str, degrees: float, quantity: str) -> float:
+        return by_key[kind, round(speed, 6), round(math.radians(degrees), 3), quantity]["value"]
+
+    (circle,), (ten, twenty), (stop,) = results.circles, results.zigzags, results.stops
+    assert circle.advance_m == pytest.approx(told("circle", 35, "advance_m"), rel=0.02)
+    assert circle.tactical_diameter_m == pytest.approx(told("circle", 35, "tactical_diameter_m"), rel=0.02)
+    assert ten.overshoots_rad == pytest.approx([told("zigzag", 10, f"overshoot_{n}_rad") for n in (1, 2)], rel=0.04)
+    assert twenty.overshoots_rad[0] == pytest.approx(told("zigzag", 20, "overshoot_1_rad"), rel=0.03)
+    assert stop.track_reach_m == pytest.approx(told("stop", 0, "reach_m"), rel=0.02)
+
+
+def test_the_vessel_file_states_honest_scatter(made: Path) -> None:
+    model = load_vessel(made / "vessel.toml").model
+    assert (model.parameter_std > 0.02 * np.abs(model.parameters)).all()
+    assert np.linalg.eigvalsh(model.parameter_correlation_matrix)[0] > 1e-6
+    assert model.share_in_range() > 0.5
+    names = list(model.names)
+    sway, yaw = names.index("Y_urudder1"), names.index("N_urudder1")
+    assert model.parameter_correlation_matrix[sway, yaw] < -0.7  # one rudder, behind midships
+
+
+def test_ships_drawn_from_the_file_sail_as_the_table_says(made: Path) -> None:
+    """The normal prior of a vessel file stands for the ships of the table, whose factors are drawn and simulated."""
+    vessel = load_vessel(made / "vessel.toml")
+    rows = json.loads((made / "nominal.json").read_text())["trials"]
+    drawn = vessel.model.drawn_parameters(200, np.random.default_rng(3))
+    fleet = Fleet(vessel, drawn, fastest_mps=30.0)
+    circle = next(row for row in rows if row["trial"] == "circle")
+    for row in (one for one in rows if (one["trial"], one["speed_mps"]) == ("circle", circle["speed_mps"])):
+        trial = Trial(kind="circle", speed_mps=row["speed_mps"], angle_rad=row["angle_rad"])
+        low, middle, high = np.quantile(fleet.results(trial)[row["quantity"]], [0.025, 0.5, 0.975])
+        assert middle == pytest.approx(row["value"], rel=0.08)
+        width = math.log(high / low) / math.log(row["high_95"] / row["low_95"])
+        assert 0.6 < width < 1.5, row["quantity"]
+
+
+def test_parameters_keep_the_signs_that_physics_gives(made: Path) -> None:
+    model = load_vessel(made / "vessel.toml").model
+    ranges = model.parameter_range
+    assert {"X_abs_u_u", "N_ur", "X_n1", "X_n1_astern", "X_un1", "Y_urudder1", "Y_n1rudder1"} <= set(ranges)
+    for name, value in zip(model.names, model.parameters, strict=True):
+        low, high = ranges.get(name, (-math.inf, math.inf))
+        assert low <= value <= high
+
+
+def test_values_that_contradict_are_named() -> None:
+    known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
+    wrong = tuple(
+        replace(one, value=2.5 * one.value, source="circles[1].tactical_diameter_m")
+        if (one.trial, one.quantity) == (CIRCLE, "tactical_diameter_m")
+        else one
+        for one in known
+    )
+    (said,) = nominal(replace(COASTER, stated=wrong)).contradictions
+    assert said.startswith("circles[1].tactical_diameter_m is ")
+    assert "left out" in said
+    assert nominal(replace(COASTER, stated=known)).contradictions == ()
+
+
+def test_particulars_that_no_ship_has_together_are_named() -> None:
+    (screw,) = COASTER.thrusters
+    weak = replace(COASTER, thrusters=(replace(screw, power_w=50e3),), top_speed_mps=10.0)
+    assert any("kW" in said and "ship.top_speed_kn" in said for said in nominal(weak).contradictions)
+    fast = Stated(
+        trial=replace(CIRCLE, speed_mps=8.0), quantity="advance_m", value=330.0, source="circles[1].advance_m"
+    )
+    assert any(
+        said.startswith("circles[1].speed_kn") for said in nominal(replace(COASTER, stated=(fast,))).contradictions
+    )
+    slow = replace(COASTER, thrusters=(replace(screw, max_rps=0.9),))
+    assert any("pitch ratio of more than" in said for said in nominal(slow).contradictions)
+
+
+def test_a_trial_without_end_is_shown_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A craft with a fin at the bow instead of the stern: heavy astern, she turns for ever in a zig-zag."""
+    craft = '[ship]\nname = "s"\nlength_m = 12.0\nbeam_m = 3.5\ndraught_m = 1.6\nblock_coefficient = 0.6\n'
+    craft += 'gravity_forward_m = -2.5\ntop_speed_kn = 9.0\n[[thrusters]]\nkind = "azimuth"\nforward_m = -3.0\n'
+    card = tmp_path / "card.toml"
+    card.write_text(craft)
+    assert main(["nominal", str(card), "--out", str(tmp_path / "out")]) == 0
+    assert "no end" in capsys.readouterr().out
+    rows = json.loads((tmp_path / "out" / "nominal.json").read_text())["trials"]
+    assert any(row["high_95"] is None for row in rows)
+    assert load_vessel(tmp_path / "out" / "vessel.toml").name == "s"
+
+
+SHIP = '[ship]\nname = "s"\nlength_m = 80.0\nbeam_m = 13.0\ndraught_m = 5.0\n'
+SCREW = '[[thrusters]]\nkind = "propeller"\nforward_m = -38.0\n'
+WRONG = {
+    "no displacement": (SHIP + SCREW, "ship.displacement_t"),
+    "two displacements": (SHIP + "displacement_t = 2000.0\nblock_coefficient = 0.7\n" + SCREW, "block_coefficient"),
+    "too heavy": (SHIP + "displacement_t = 9000.0\n" + SCREW, "ship.displacement_t"),
+    "unknown key": (SHIP + "block_coefficient = 0.7\nlenght_m = 3.0\n" + SCREW, "lenght_m"),
+    "no thruster": (SHIP + "block_coefficient = 0.7\n", "thrusters"),
+    "only tunnels": (SHIP + "block_coefficient = 0.7\n" + SCREW.replace("propeller", "tunnel"), "drives"),
+    "out of the ship": (SHIP + "block_coefficient = 0.7\n" + SCREW.replace("-38", "-380"), "thrusters[1].forward_m"),
+    "rudder without area": (SHIP + "block_coefficient = 0.7\n" + SCREW + "[[rudders]]\nforward_m = -40.0\n", "area"),
+    "circle without result": (
+        SHIP + "block_coefficient = 0.7\n" + SCREW + "[[circles]]\nspeed_kn = 12.0\n", "circles[1]",
+    ),
+    "rpm without max": (
+        SHIP + "block_coefficient = 0.7\n" + SCREW + "[[speeds]]\nrpm = 90.0\nspeed_kn = 9.0\n", "speeds[1].rpm",
+    ),
+    "drift without windage": (
+        SHIP + "block_coefficient = 0.7\n" + SCREW + "[drift]\nwind_kn = 20.0\ndrift_kn = 1.0\n", "windage",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_cards_are_refused_in_one_line(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, key = WRONG[name]
+    card = tmp_path / "card.toml"
+    card.write_text(text)
+    assert main(["nominal", str(card), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert key in said[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_units_of_a_card_are_a_mariners() -> None:
+    card = load_card(CARDS / "offshore-45m.toml")
+    assert card.top_speed_mps == pytest.approx(13 * 1852 / 3600)
+    by_source = {one.source: one for one in card.stated}
+    assert by_source["circles[1].time_90_s"].value == 28.0
+    assert by_source["circles[1].advance_m"].trial.speed_mps == pytest.approx(10 * 1852 / 3600)
+    assert by_source["speeds[1].speed_kn"].value == pytest.approx(6.8 * 1852 / 3600)
+    assert by_source["speeds[1].speed_kn"].trial.order == 0.5
+    assert card.drives[0].angle_rate_radps == pytest.approx(math.radians(12.0))
