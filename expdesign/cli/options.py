@@ -96,6 +96,7 @@ def out_option(default: str) -> object:
 Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]
 OutBesidePlan = Annotated[Path | None, out_option("the folder of the plan")]
 OutByData = Annotated[Path | None, out_option("runs/<first data file>")]
+OutByLog = Annotated[Path | None, out_option("runs/<first log>-runs")]
 OutByVessel = Annotated[Path | None, out_option("runs/<vessel>-indices")]
 OutInclined = Annotated[Path | None, out_option("runs/<vessel>-incline")]
 OutWhatIf = Annotated[Path | None, out_option("runs/<scenario>-whatif")]
