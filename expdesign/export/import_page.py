@@ -170,6 +170,7 @@ def import_json(content: ImportContent) -> str:
             "command": content.command,
             "version": content.version,
             "begins": moment(content, content.origin_s) if content.dated else None,
+            "begins_s": content.origin_s,
             "sample_time_s": content.sampled.sample_time_s,
             "logs": [
                 {"name": log.source, "clock": log.clock, "channels": len(log.channels), "unused": list(log.unused)}

@@ -48,19 +48,19 @@ RULES = (
     ("heading_rad", 0, r"\b(heading t|headt|true heading|hdt|ths|gyro heading)\b"),
     ("heading_rad", 1, r"\b(att|attitude) (yaw|heading)\b|\b(heading|hdg|psi|kurs|hdg t)\b"),
     ("heading_rad", 2, r"\b(yaw|compass|gyro)\b"),
-    (COG, 0, r"\b(cogt|cog|course over ground|course|track|tmg|ctmg|gcrs)\b"),
+    (COG, 0, r"\b(cogt|cog|course over ground|course|track|tmg|ctmg|g crs)\b"),
     (NORTHWARD, 0, r"\b(vn|vel n|v north|velocity north)\b|\blocal position ned vx\b|global position int vx"),
     (EASTWARD, 0, r"\b(ve|vel e|v east|velocity east)\b|\blocal position ned vy\b|global position int vy"),
     (SOG, 0, r"\b(sogn|sog|speed over ground|ground ?speed|gps speed|gps spd|rmc spd)\b"),
     (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit)$"),
-    ("u_mps", 0, r"\b(u|surge|longgroundspd|surge speed)$"),
-    ("v_mps", 0, r"\b(v|sway|transgroundspd|sway speed)$"),
+    ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge speed)$"),
+    ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway speed)$"),
     ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth|tiefe)\b"),
     ("north_m", 2, r"\b(north|northing|pn)\b"),
     ("east_m", 2, r"\b(east|easting|pe)\b"),
     ("rudder", 0, r"\b(rudder\d*|rsa|rud|helm|steering|ruder|nozzle|roer)\b"),
     ("a", 0, r"\b(azi|azimuth|azim|pod angle|thruster angle|azi angle)\b"),
-    ("n", 0, r"\b(rpm\d*|rps|revs|revolutions|shaft speed|prop(eller)? speed|n)\b"),
+    ("n", 0, r"\b(rpm\d*|rps|revs|revolutions|shaft speed|prop(eller)? speed)\b|(^|\s)n( ?\d+)?$"),
     ("throttle", 0, r"\b(throttle|thrust|engine order|power lever|lever)\b"),
 )
 """Column, or kind of actuator signal, and rank of the pattern among those of a column; the first that fits counts. The
@@ -74,6 +74,10 @@ BOW = r"\b(bow|bt|tunnel|thr bow|fwd|forward)\b"
 RADIANS = {"heading_rad": 6.4, MAGNETIC: 6.4, COG: 6.4, "roll_rad": 1.6, "rudder": 1.6, "a": 13.0, VARIATION: 0.6,
            "wind_angle_rad": 6.4}  # fmt: skip
 """Largest size of an angle in radians, by column or kind."""
+BESIDE = ("roll_rad", "roll_rate_radps", "depth_m", "wind_speed_mps", "wind_angle_rad", "imu_lateral_mps2")
+"""Columns that a record does without: one that is the same in all rows is no reading."""
+FINE_DEG, MOSTLY = 1e-3, 0.5
+"""Usual change of a coordinate below which it is in degrees; share of negative ones among heights."""
 DECIMALS = 2  # most decimals of an angle that is taken for degrees
 SURE = 0.9  # share that a comparison must explain before it questions a unit that is stated
 FIT = 0.3  # share that a comparison must explain before it tells a unit
@@ -213,7 +217,21 @@ def _marked(channel: Channel) -> _Mark:
     column, rank = _rule(name, RULES) or _rule(whole, RULES) or ("", 9)
     if column == "" and re.search(ORDER, name):
         column, rank = _rule(whole, ACTUATOR_RULES) or ("", 9)
+    if name in ("x", "y", "z"):
+        column, rank = _coordinate(name, channel.values), 3
+    if column in BESIDE and np.ptp(channel.values) == 0:
+        column = ""
     return _Mark(column=column, rank=rank, unit=unit_word(unit), name=name)
+
+
+def _coordinate(name: str, values: Array) -> str:
+    """What x, y, z are: degrees of latitude and longitude, which change by little; heights of the bottom, negative."""
+    if name == "z":
+        return "depth_m" if np.mean(values < 0) > MOSTLY else ""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0]
+    fine = len(steps) > 10 and float(np.median(steps)) < FINE_DEG and float(np.abs(values).max()) <= 180.0
+    return ("lat_deg" if name == "x" else "lon_deg") if fine else ""
 
 
 def _rule(name: str, rules: Sequence[tuple[str, int, str]]) -> tuple[str, int] | None:
@@ -237,8 +255,9 @@ def _best(channels: Sequence[Channel], marks: Sequence[_Mark]) -> dict[tuple[str
             if mark.column == second and _family(channel) == _family(one):
                 found[mark.key] = channel
                 break
-    if ("heading_rad", "", "", "", "") in found:
-        found.pop((MAGNETIC, "", "", "", ""), None)
+    for better, worse in (("heading_rad", MAGNETIC), ("lat_deg", "north_m"), ("lat_deg", "east_m")):
+        if (better, "", "", "", "") in found:
+            found.pop((worse, "", "", "", ""), None)
     return found
 
 
@@ -249,7 +268,9 @@ def _family(channel: Channel) -> tuple[str, str]:
 
 def _unused(channel: Channel, mark: _Mark, chosen: dict[tuple[str, ...], Channel]) -> Use:
     better = chosen.get(mark.key)
+    instead = {MAGNETIC: "the true heading", "north_m": "latitude", "east_m": "longitude"}.get(mark.column, "")
     why = f"{better.name} is used" if better is not None else "no quantity that is read"
+    why = f"{instead} is used" if instead and better is None else why
     return Use(file=channel.source, channel=channel.name, why=why)
 
 
@@ -375,9 +396,8 @@ def _common(one: Channel, other: Channel) -> tuple[Array | None, int]:
     step_s = max(one.interval_s, other.interval_s)
     if not np.isfinite(step_s) or not last - first > 4 * WINDOW * step_s:
         return None, 0
-    window = max(WINDOW, int(np.ceil(WINDOW_S / step_s)))
     times = np.arange(first, last, step_s)
-    return (times, window) if len(times) > 2 * window else (None, 0)
+    return times, max(WINDOW, min(int(np.ceil(WINDOW_S / step_s)), len(times) // 4))
 
 
 def _steps(values: np.ndarray, window: int) -> np.ndarray:
@@ -402,7 +422,8 @@ def _numbered(
     own = [(use, mark) for use, mark in used if mark.is_actuator]
     table = {(c.source, c.name): c for c in channels}
     shares = any(use.unit in SHARES for use, _ in own)
-    as_forces = shares and not actuators and not any(mark.column in ("n", "a") for _, mark in own)
+    forces = not actuators or any(one.kind == "force" for one in actuators)
+    as_forces = shares and forces and not any(mark.column in ("n", "a") for _, mark in own)
     machines = sorted({mark.machine for _, mark in own if mark.column != "rudder"}, key=_as_listed)
     rudders = sorted({mark.machine for _, mark in own if mark.column == "rudder"}, key=_as_listed)
     turning = {mark.machine for _, mark in own if mark.column == "a"}

@@ -56,6 +56,7 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     if not last - first > 10 * step_s:
         return None
     times = np.arange(first, last, step_s)
+    order_step_s = max(order.interval_s, step_s)
     wanted = order.values if not turning else np.unwrap(order.values)
     seen = reached.values if not turning else np.unwrap(reached.values)
     orders = wanted[np.maximum(np.searchsorted(order.time_s, times + 1e-9, side="right") - 1, 0)]
@@ -83,7 +84,9 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     start = {"rate": math.log(fastest), "lag": max(step_s, 0.3), "delay": step_s}
     fits = {}
     for free in (("rate", "lag", "delay"), ("lag", "delay")):
-        low = [math.log(fastest) - 2.0 if part == "rate" else 0.0 for part in free]
+        # an order is seen up to a step after it was given, so that positions may be sooner than it
+        least = {"rate": math.log(fastest) - 2.0, "lag": 0.0, "delay": -order_step_s}
+        low = [least[part] for part in free]
         high = [math.log(fastest) + 3.0 if part == "rate" else LONGEST_S for part in free]
         fits[free] = scipy.optimize.least_squares(
             left, [start[part] for part in free], bounds=(low, high), args=(free,), diff_step=1e-3,
@@ -119,7 +122,7 @@ def simulated(orders: Array, step_s: float, rate: float, lag_s: float, delay_s: 
         slewed[k] = position
         way = order - position
         position = order if abs(way) <= reach else position + math.copysign(reach, way)
-    if delay_s:
+    if delay_s:  # also one that is negative
         times = step_s * np.arange(len(orders))
         slewed = np.interp(times - delay_s, times, slewed)
     if lag_s > 0:

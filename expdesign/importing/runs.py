@@ -267,7 +267,7 @@ def _actuators(names: Sequence[str], sizes: Mapping[str, float], length_m: float
 def family(ship: Vessel, batch: Batch) -> str:
     """What a run is, in words, as the indices read it; else which inputs change."""
     try:
-        found = measured_trial(ship, batch)
+        found = measured_trial(*_with_helm(ship, batch))
     except Exception:  # a label is no reason to stop
         found = NotStandard(name=batch.name, reason="")
     match found:
@@ -287,6 +287,18 @@ def family(ship: Vessel, batch: Batch) -> str:
     if not helm:
         return "changes of speed"
     return "helm" if len(helm) == len(moved) else "helm and speed"
+
+
+def _with_helm(ship: Vessel, batch: Batch) -> tuple[Vessel, Batch]:
+    """The same where inputs are forces: their moment taken for a rudder of 35 degrees at most."""
+    if "tau_psi" not in batch.input_names:
+        return ship, batch
+    ahead, moment = (batch.inputs[:, batch.input_names.index(name)] for name in ("tau_x", "tau_psi"))
+    helm = math.radians(35.0) * moment / max(float(np.abs(moment).max()), 1e-9)
+    names = ("n1_rps", "rudder1_rad")
+    stretch = Stretch(time_s=batch.time_s, columns=dict(zip(names, (ahead, helm), strict=True)))
+    like = presumed([stretch], length_m=ship.length_m, sample_time_s=batch.sample_time_s, bow=())
+    return like, replace(batch, input_names=("n1", "rudder1"), inputs=np.stack([ahead, helm], axis=1), reached=())
 
 
 def file_name(number: int, run: Run) -> str:

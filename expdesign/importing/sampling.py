@@ -20,13 +20,14 @@ from expdesign.records.file import input_name, is_input
 from expdesign.records.file import PLANNED, REACHED, STEERED
 from expdesign.values import Array
 
+FORCES = ("tau_x", "tau_y", "tau_psi")
 MAIN = ("lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", NORTHWARD, EASTWARD, "r_radps")
 PLACES = {"lat_deg", "lon_deg", "north_m", "east_m"}
 LONGEST_STEP_S, SHORTEST_STEP_S = 1.0, 0.01
 SAME = 1.5  # ratio of intervals within which two rates are the same
 GAP = 3.5  # intervals without a reading that are a gap
 LEAST_GAP_S = 1.5
-SHORTEST = 20  # samples of a stretch
+SHORTEST = 10  # samples of a stretch
 COVERED = 0.98  # share of a stretch that a column beside the main ones must cover
 EARLY = 0.25  # share of a step by which a stamp may be late and the reading still belongs to that step
 FAST = 20.0  # degrees between readings from which a way through north may be an average
@@ -180,6 +181,11 @@ def _true_heading(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[str
 def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
     """Velocity north and east from speed and course, unless it is measured in the ship's axes."""
     speed, course = table.pop(SOG, None), table.pop(COG, None)
+    if len({"u_mps", "v_mps"} & set(table)) == 1 and (NORTHWARD in table or (speed is not None and course is not None)):
+        (alone,) = {"u_mps", "v_mps"} & set(table)
+        del table[alone]
+        table, notes = _ground_velocity({**table, **({} if speed is None or course is None else {SOG: speed, COG: course})})
+        return table, [f"{alone} alone is no velocity, and is left out", *notes]
     if {"u_mps", "v_mps"} <= set(table):
         for name in (NORTHWARD, EASTWARD):
             table.pop(name, None)
@@ -290,6 +296,8 @@ def _finished(columns: dict[str, Array], mapping: Mapping, found: Table[str, Cha
         north, east = columns.pop(NORTHWARD), columns.pop(EASTWARD)
         c, s = np.cos(columns["heading_rad"]), np.sin(columns["heading_rad"])
         columns |= {"u_mps": c * north + s * east, "v_mps": c * east - s * north}
+    if forces := [name for name in FORCES if name in columns]:
+        columns |= {name: np.zeros(len(columns[forces[0]])) for name in FORCES if name not in columns}
     ahead, beside = mapping.antenna_forward_m, mapping.antenna_starboard_m
     if not (ahead or beside) or "heading_rad" not in columns:
         return columns

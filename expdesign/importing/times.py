@@ -24,6 +24,7 @@ SCALES = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "us"), (1e11, 1e-3, "ms"), (5e8, 1.0,
 """Least size of a number that is a time since 1970 in a unit, factor to seconds, unit."""
 UNITS = {"s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "millis": 1e-3, "us": 1e-6, "micros": 1e-6,
          "ns": 1e-9, "nanos": 1e-9, "min": 60.0, "h": 3600.0}  # fmt: skip
+UNIT_WORDS = {1.0: "in s", 1e-3: "in ms", 1e-6: "in us", 1e-9: "in ns", 60.0: "in min", 3600.0: "in h"}
 LATEST = 4.2e9
 """Seconds since 1970 beyond which a number is no time."""
 EXCEL_DAY, MATLAB_DAY = 25569.0, 719529.0
@@ -117,7 +118,7 @@ def read_numbers(values: Array, name: str, *, unit: str = "") -> tuple[Array, st
         if size > least and factor * size < LATEST and (not said or said == factor):
             return factor * values, COMPUTER, f"{word} since 1970"
     if said:
-        return said * values, OWN, f"units of {said:g} s"
+        return said * values, OWN, UNIT_WORDS.get(said, f"units of {said:g} s")
     if _is_hhmmss(known) and step >= 0.01:
         clock = np.floor(values / 1e4) * 3600 + np.floor(values / 100 % 100) * 60 + values % 100
         return over_midnight(clock), GNSS if "utc" in name else OWN, "hhmmss"

@@ -46,6 +46,11 @@ def split_unit(name: str) -> tuple[str, str]:
     return name, ""
 
 
+def counted(count: int, what: str) -> str:
+    """`1 line`, `2 lines`."""
+    return f"{count} {what}{'s' if count != 1 else ''}"
+
+
 def unit_word(text: str) -> str:
     """The one word for a unit."""
     unit = text.strip().lower()

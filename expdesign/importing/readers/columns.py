@@ -30,11 +30,14 @@ def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: f
         if times is None and sample_time_s > 0:
             times, clock = np.arange(len(next(iter(own.values())))) * sample_time_s, OWN
             how = f"{', '.join(own)}: count as {sample_time_s:g} s apart, as the mapping says"
+        elif times is None:
+            times, clock = np.arange(len(next(iter(own.values()))), dtype=float), NONE
+            how = (
+                f"{', '.join(own)}: no clock, expected sample_time_s under [[file]] in the mapping, where rows are "
+                "evenly spaced"
+            )
         texts = [key for key, values in own.items() if values.dtype.kind not in "biuf" and key != name]
         numbers = {key: np.asarray(v, dtype=float) for key, v in own.items() if key != name and key not in texts}
-        if times is None:
-            unused += [f"{', '.join(numbers)} ({len(next(iter(own.values())))} rows without a clock)"] if numbers else []
-            continue
         units = {key: split_unit(key)[1] for key in numbers}
         found, more = channels_of(numbers, times, source=source, units=units, what=name)
         channels += found

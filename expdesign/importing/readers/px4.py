@@ -17,8 +17,8 @@ READ = {
     "vehicle_attitude": {},
     "vehicle_angular_velocity": {"xyz[0]": "radps", "xyz[2]": "radps"},
     "vehicle_rates": {"rollspeed": "radps", "yawspeed": "radps"},
-    "actuator_motors": {f"control[{k}]": "share" for k in range(4)},
-    "actuator_servos": {f"control[{k}]": "share" for k in range(4)},
+    "actuator_motors": {f"control[{k}]": "share" for k in range(2)},
+    "actuator_servos": {f"control[{k}]": "share" for k in range(2)},
     "actuator_outputs": {f"output[{k}]": "pwm" for k in range(8)},
     "rpm": {"indicated_frequency_rpm": "rpm"},
     "distance_sensor": {"current_distance": "m"},
@@ -52,7 +52,9 @@ def read_px4(path: Path, sample_time_s: float) -> Log:
             own["roll"] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
             units |= {f"{topic}.heading": "rad", f"{topic}.roll": "rad"}
         times = np.asarray(data.data["timestamp"], dtype=float) * 1e-6 + late_s
-        named = {f"{topic}.{key}": values for key, values in own.items()}
+        what = {"actuator_motors": " throttle", "actuator_servos": " steering"}.get(data.name, "")
+        named = {f"{topic}.{key}{what}": values for key, values in own.items()}
+        units = {f"{key}{what}": unit for key, unit in units.items()}
         found, more = channels_of(named, times, source=path.name, units=units, what=topic)
         channels, notes = channels + found, notes + more
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=tuple(unused))

@@ -19,7 +19,7 @@ from expdesign.errors import FileError
 from expdesign.importing.channels import COMPUTER, DAY_S, GNSS, NONE, OWN, Blocks, Log, channels_of, spread
 from expdesign.importing.readers.nmea import Sentences
 from expdesign.importing.times import TIME_NAME, over_midnight, read_numbers, read_stamps, tells_month_first
-from expdesign.importing.units import split_unit, words
+from expdesign.importing.units import counted, split_unit, words
 from expdesign.records.file import MISSING
 from expdesign.values import Array
 
@@ -116,23 +116,27 @@ def _joined(path: Path, sentences: Sentences, table: _Table | None, other: int, 
         columns, times, own_clock, table_notes = table.columns(stamps, at, sample_time_s)
         clock = clock if clock == GNSS and own_clock in (GNSS, NONE) else own_clock
         notes += table_notes
-        if times is None:
-            unused += columns
-        else:
-            found, clock_notes = channels_of(columns, times, source=path.name, units=table.units, what=table.time_name)
-            channels, notes, unused = [*channels, *found], [*notes, *clock_notes], [*unused, *table.texts()]
+        outside = int((~np.isfinite(times)).sum()) if own_clock == GNSS and table.time_name == "time" else 0
+        if outside:
+            notes.append(f"{counted(outside, 'row')} before the first satellite time are left out")
+            known = np.isfinite(times)
+            columns, times = {name: values[known] for name, values in columns.items()}, times[known]
+        found, clock_notes = channels_of(columns, times, source=path.name, units=table.units, what=table.time_name)
+        channels, notes, unused = [*channels, *found], [*notes, *clock_notes], [*unused, *table.texts()]
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=tuple(unused))
 
 
 def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
     if sentences.broken:
-        yield f"{sentences.broken} sentences have a wrong checksum and are left out"
+        yield f"left out {counted(sentences.broken, 'sentence')} with a wrong checksum"
     if sentences.garbled:
-        yield f"{sentences.garbled} lines with a $ are no whole sentence and are left out"
+        yield f"left out {counted(sentences.garbled, 'line')} with a $ but no whole sentence"
     if sentences.unchecked:
-        yield f"{sentences.unchecked} sentences have no checksum; they are used"
+        yield f"used {counted(sentences.unchecked, 'sentence')} without a checksum"
     if other:
-        yield f"{other} lines are no sentences and are left out"
+        yield f"left out {counted(other, 'line')} that is no sentence" if other == 1 else (
+            f"left out {other} lines that are no sentences"
+        )
 
 
 def _encoding(path: Path) -> str:
@@ -287,13 +291,13 @@ class _Table:
 
     def columns(
         self, stamps: Array, at: Array, sample_time_s: float
-    ) -> tuple[dict[str, Array], Array | None, str, list[str]]:
-        """Numbers by name, times of the rows, kind of clock, notes; no times where nothing tells any."""
+    ) -> tuple[dict[str, Array], Array, str, list[str]]:
+        """Numbers by name, times of the rows, kind of clock, notes; rows are counted where nothing tells times."""
         names, notes = self.dialect.names, []
         if self.broken:
-            notes.append(f"{self.broken} lines are no rows of {len(names)} cells and are left out")
-        for column, count in self.strange.items():
-            notes.append(f"{names[column]}: {count} cells are no numbers and are left out")
+            notes.append(f"left out {counted(self.broken, 'line')} without the {len(names)} cells of a row")
+        for column, count in (+self.strange).items():
+            notes.append(f"left out {counted(count, 'cell')} of {names[column]} without a number")
         taken, times, clock, how = self._times()
         place = self.blocks.joined("place")
         if times is None and len(stamps) > 1:
@@ -307,9 +311,11 @@ class _Table:
                 f"{len(place)} rows have no clock (no column with times, no satellite time between them): expected "
                 "sample_time_s under [[file]] in the mapping, where rows are evenly spaced"
             )
+            times = np.arange(len(place), dtype=float)
+            clock = NONE
         notes.append(how)
         values = {names[k]: self.blocks.joined(f"{k}") for k in self._of("number") if k not in taken}
-        return values, times, clock if times is not None else NONE, notes
+        return values, times, clock, notes
 
     def _times(self) -> tuple[set[int], Array | None, str, str]:
         """Columns that are times, the times, kind of clock, and how they were read."""

@@ -74,6 +74,7 @@ PRESUMED = (
     (", or a sign wrong in [model.parameters]?", "?"),
 )
 """Words about a vessel file, and what is said where there is none."""
+OF_FRAMES = ("north_m and east_m are metres from",)
 FIRST = ("time_s", "lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps")
 
 
@@ -147,6 +148,11 @@ def import_logs(
     progress("checking the runs", 0.75)
     texts, kept, rejected, more = _tried(runs, found, ship, mapping, size_m, within(progress, 0.75, 0.95))
     notes += more
+    if not kept:
+        why = "; ".join(f"{where}: {reason}" for where, reason in rejected) or "no helm or engine order acts in it"
+        none = NothingToWrite(f"no run of the record can be used. {why}")
+        _leave_mapping(none, folder, mapping, read, notes, command)
+        raise none
     content = ImportContent(
         logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts), rejected=tuple(rejected),
         followed=followed(table), sensors=sensor_keys(table, found.held_s), notes=tuple(notes),
@@ -203,9 +209,10 @@ def _columns(logs: Sequence[Log], mapping: Decisions) -> dict[str, dict[str, Cha
         if use.column:
             found[use.file][use.column] = use.applied(table[use.file, use.channel])
     if not any(found.values()):
-        clocks = [log.source for log in logs if log.clock == NONE]
-        why = f"{', '.join(clocks)}: there is no clock" if clocks else "no channel is a quantity that is read"
-        raise NothingToWrite(f"{why}, so that there is no record to write")
+        names = ", ".join(channel.name for log in logs for channel in log.channels) or "none"
+        raise NothingToWrite(
+            f"no channel is a quantity that is read, so that there is no record to write; the channels are {names[:400]}"
+        )
     return found
 
 
@@ -221,7 +228,17 @@ def _one_time_scale(
     order = sorted(logs, key=lambda log: TRUSTED.index(log.clock))
     table: dict[str, Channel] = {}
     notes = []
+    placed = [log for log in order if log.clock != NONE or not columns[log.source]]
+    if not placed or not any(columns[log.source] for log in placed):
+        names = ", ".join(log.source for log in order)
+        raise NothingToWrite(
+            f"{names}: rows have no clock, so that they are no record; where they are evenly spaced, give sample_time_s "
+            "under [[file]] in the mapping"
+        )
     for log in order:
+        if log not in placed:
+            notes.append(f"{log.source}: not used, as its rows have no clock (sample_time_s under [[file]] in the mapping)")
+            continue
         own, clock = columns[log.source], clocks.get(log.source, FileClock(file=log.source))
         if table and own and not (stated and log.source in clocks):
             near = log.clock != OWN and order[0].clock != OWN
@@ -281,7 +298,7 @@ def _tried(
     """Texts of the runs' files as other commands accept them, these runs with families, those refused, and notes."""
     notes: list[str] = []
     if not runs:
-        return {}, [], [], ["no orders act in any stretch: no run is written"]
+        return {}, [], [], []
     if not inputs_of(runs[0].stretch.columns):
         kept = [replace(run, name="track") for run in runs]
         texts = {file_name(k, run): _csv(run, found) for k, run in enumerate(kept, start=1)}
@@ -320,7 +337,7 @@ def _tried(
             kept.append(replace(run, family=label))
             texts[file_name(len(kept), kept[-1])] = text
             batches += own
-            said += [note.partition(": ")[2] for note in record.notes]
+            said += [note for line in record.notes if not (note := line.partition(": ")[2]).startswith(OF_FRAMES)]
     if batches:
         whole = Record(batches=tuple(batches))
         if ship is None:
@@ -367,8 +384,13 @@ def _summary(content: ImportContent, written: Sequence[Path]) -> dict[str, objec
         "runs": len(content.runs),
         "sample_time_s": content.sampled.sample_time_s,
         "runs_rejected": [f"{where}: {why}" for where, why in content.rejected],
-        "next": f"expdesign estimate {folder} --vessel VESSEL.toml",
+        **({"next": f"expdesign estimate {folder} --vessel VESSEL.toml"} if _steered(content) else {}),
     }
+
+
+def _steered(content: ImportContent) -> bool:
+    """Whether there are runs with inputs."""
+    return any(inputs_of(run.stretch.columns) for run in content.runs)
 
 
 def _tables(content: ImportContent) -> tuple[TextTable, ...]:
