@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -82,19 +83,20 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
         return (own + offset - positions)[near]
 
     start = {"rate": math.log(fastest), "lag": max(step_s, 0.3), "delay": step_s}
-    fits = {}
-    for free in (("rate", "lag", "delay"), ("lag", "delay")):
+    def fit(free: tuple[str, ...]) -> Any:
         # an order is seen up to a step after it was given, so that positions may be sooner than it
         least = {"rate": math.log(fastest) - 2.0, "lag": 0.0, "delay": -order_step_s}
         low = [least[part] for part in free]
         high = [math.log(fastest) + 3.0 if part == "rate" else LONGEST_S for part in free]
-        fits[free] = scipy.optimize.least_squares(
+        return scipy.optimize.least_squares(
             left, [start[part] for part in free], bounds=(low, high), args=(free,), diff_step=1e-3,
             x_scale=[0.1 if part == "rate" else step_s for part in free],
         )  # fmt: skip
-    limited, plain = fits["rate", "lag", "delay"], fits["lag", "delay"]
-    free = ("rate", "lag", "delay") if limited.cost < LESS**2 * plain.cost else ("lag", "delay")
-    best = fits[free]
+    best, plain, free = fit(("rate", "lag", "delay")), fit(("lag", "delay")), ("rate", "lag", "delay")
+    if best.cost > LESS**2 * plain.cost:
+        best, free = plain, ("lag", "delay")
+    elif (without := fit(("rate", "delay"))).cost < best.cost / LESS**2:  # a lag may stand for orders between readings
+        best, free = without, ("rate", "delay")
     rest = float(np.sqrt(2 * best.cost / max(int(near.sum()), 1)))
     scatter = np.linalg.pinv(best.jac.T @ best.jac) * rest**2
     std = dict(zip(free, np.sqrt(np.maximum(np.diag(scatter), 0.0)).tolist(), strict=True))
@@ -104,8 +106,8 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     rate = math.exp(value["rate"]) if "rate" in value else math.inf
 
     def told(part: str) -> tuple[float, float] | None:
-        own = math.hypot(std[part], floor_s)
-        return (value[part], own) if value[part] > CERTAIN * own else None
+        own = math.hypot(std.get(part, 0.0), floor_s)
+        return (value[part], own) if part in value and value[part] > CERTAIN * own else None
 
     return Followed(
         signal=name.removesuffix("_rps").removesuffix("_rad"),
