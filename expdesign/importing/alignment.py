@@ -2,7 +2,7 @@
 
 Where both measured the same (a turn, a speed) the lag of the largest correlation is taken. Where one has only the rudder
 and the other the turn, the lag at which the rudder explains most of the change of the yaw rate beside that rate itself,
-r' = b r + k rudder(t - lag): the ship's own slowness is in b then, and not in the lag.
+r' / u^2 = b r / u + k rudder(t - lag), with speed u: the ship's own slowness is in b then, and not in the lag.
 
 Both are found on the whole overlap, and again in blocks of it, whose spread gives the standard error.
 """
@@ -10,7 +10,7 @@ Both are found on the whole overlap, and again in blocks of it, whose spread giv
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -25,7 +25,8 @@ STEP_S = (0.05, 1.0)  # of the series that are compared, at least and at most [s
 NEAR_S = 120.0  # by which a computer's clock may be off [s]
 LIKE = 0.3  # least squared correlation that tells a lag
 MOST_SAMPLES = 400_000
-SMOOTH_S = 1.0
+OVERLAP = 0.5  # of the shorter series at a lag, at least
+SLOW = 0.3  # share of the usual speed below which that does not count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +46,7 @@ class _Series:
     what: str
     time_s: Array
     values: Array
+    speed: Array | None = None  # beside a turn, where it is known [m/s]
 
 
 def lag_of(own: Mapping[str, Channel], other: Mapping[str, Channel], *, near: bool) -> Lag | None:
@@ -78,15 +80,21 @@ def _pairs(own: Mapping[str, Channel], other: Mapping[str, Channel]) -> Iterator
 
 
 def _series(table: Mapping[str, Channel]) -> Iterator[_Series]:
+    speed = next((table[name] for name in ("u_mps", SOG) if name in table), None)
+
+    def beside(times: Array) -> Array | None:
+        return None if speed is None else np.interp(times, speed.time_s, np.abs(speed.values))
+
     if "r_radps" in table:
-        yield _Series("turn", table["r_radps"].time_s, table["r_radps"].values)
+        times = table["r_radps"].time_s
+        yield _Series("turn", times, table["r_radps"].values, beside(times))
     else:
         angle = next((table[name] for name in ("heading_rad", "magnetic_heading_rad", COG) if name in table), None)
         if angle is not None and len(angle) > 3:
             turned = np.unwrap(angle.values)
             steps = np.maximum(np.diff(angle.time_s), 1e-6)
-            yield _Series("turn", (angle.time_s[1:] + angle.time_s[:-1]) / 2, np.diff(turned) / steps)
-    speed = next((table[name] for name in ("u_mps", SOG) if name in table), None)
+            times = (angle.time_s[1:] + angle.time_s[:-1]) / 2
+            yield _Series("turn", times, np.diff(turned) / steps, beside(times))
     if speed is not None:
         yield _Series("speed", speed.time_s, speed.values)
     elif NORTHWARD in table and EASTWARD in table and len(table[NORTHWARD]) == len(table[EASTWARD]):
@@ -103,12 +111,18 @@ def _lag(one: _Series, two: _Series, how: str, *, near: bool) -> Lag | None:
     length = max(np.ptp(one.time_s), np.ptp(two.time_s)) / step_s
     step_s *= max(1.0, length / MOST_SAMPLES)
     x, y = _even(one, step_s), _even(two, step_s)
+    if how == "follows":  # as where the rudder is this file's, but for the sign
+        found = _lag(two, one, "causes", near=near)
+        return None if found is None else replace(found, offset_s=-found.offset_s)
+    beside = np.zeros(0)
+    if how == "causes":
+        y, beside = _change(two, step_s)
     if min(len(x), len(y)) < 40:
         return None
     # index lag that is added to x so that it fits y, beside that of their first times
     between = round((one.time_s[0] - two.time_s[0]) / step_s)
     bounds = (between - round(NEAR_S / step_s), between + round(NEAR_S / step_s)) if near else None
-    whole = _best(x, y, how, bounds)
+    whole = _best(x, y, beside, bounds)
     if whole is None or whole[1] < LIKE:
         return None
     place, explained = whole
@@ -117,7 +131,7 @@ def _lag(one: _Series, two: _Series, how: str, *, near: bool) -> Lag | None:
         if len(piece) < 20:
             continue
         reach = max(3, round(20.0 / step_s))
-        local = _best(x[piece], y, how, (place + piece[0] - reach, place + piece[0] + reach))
+        local = _best(x[piece], y, beside, (place + piece[0] - reach, place + piece[0] + reach))
         if local is not None and local[1] > LIKE:
             parts.append(local[0] - piece[0])
     if len(parts) < FEWEST:
@@ -137,20 +151,19 @@ def _even(series: _Series, step_s: float) -> Array:
     return np.interp(times, series.time_s, series.values)
 
 
-def _best(x: Array, y: Array, how: str, bounds: tuple[float, float] | None) -> tuple[float, float] | None:
+def _change(turn: _Series, step_s: float) -> tuple[Array, Array]:
+    """(k,) change of a yaw rate over the squared speed, and the yaw rate over the speed."""
+    r = _even(turn, step_s)
+    u = np.ones(len(r))
+    if turn.speed is not None:
+        u = _even(replace(turn, values=turn.speed), step_s)
+        u = np.maximum(u, SLOW * max(float(np.median(u)), 1e-6))
+    return np.gradient(r, step_s) / u**2, r / u
+
+
+def _best(x: Array, y: Array, beside: Array, bounds: tuple[float, float] | None) -> tuple[float, float] | None:
     """Lag in samples, between them by a parabola, at which x moved by it fits y best; and the share explained."""
-    if how == "follows":  # y is the rudder, x the turn: the same with both exchanged
-        found = _best(y, x, "causes", None if bounds is None else (-bounds[1], -bounds[0]))
-        return None if found is None else (-found[0], found[1])
-    if how == "causes":
-        d, turn = y, None
-        d, turn = x, y
-        change = np.gradient(turn)
-        turn = turn - turn.mean()
-        change = change - change.mean() - turn * (change @ turn) / max(turn @ turn, 1e-300)
-        score, lags = _explained(d - d.mean(), change, turn)
-    else:
-        score, lags = _explained(x - x.mean(), y - y.mean(), None)
+    score, lags = _explained(x - x.mean(), y - y.mean(), beside - beside.mean() if len(beside) else None)
     if bounds is not None:
         inside = (lags >= bounds[0]) & (lags <= bounds[1])
         score, lags = score[inside], lags[inside]
@@ -165,24 +178,23 @@ def _best(x: Array, y: Array, how: str, bounds: tuple[float, float] | None) -> t
 
 
 def _explained(x: Array, y: Array, beside: Array | None) -> tuple[Array, Array]:
-    """Share of the squares of y that x explains, at every lag at which half of the shorter one overlaps."""
+    """Share of the squares of y that x explains beside a mean and another series, at every lag with enough overlap."""
 
     def correlated(a: Array, b: Array) -> Array:
         return np.asarray(scipy.signal.correlate(b, a, mode="full", method="fft"))
 
     lags = np.arange(-len(x) + 1, len(y))
-    xy, one_x, one_y = correlated(x, y), np.ones(len(x)), np.ones(len(y))
-    xx, yy = correlated(x**2, one_y), correlated(one_x, y**2)
+    one_x, one_y = np.ones(len(x)), np.ones(len(y))
+    count = np.maximum(np.round(correlated(one_x, one_y)), 1.0)
+    sum_x, sum_y = correlated(x, one_y), correlated(one_x, y)
+    xy = correlated(x, y) - sum_x * sum_y / count
+    xx, yy = correlated(x**2, one_y) - sum_x**2 / count, correlated(one_x, y**2) - sum_y**2 / count
     if beside is not None:
-        own = correlated(x, beside)
-        xx = xx - own**2 / np.maximum(correlated(one_x, beside**2), 1e-300)
-    overlap = correlated(one_x, one_y)
-    enough = overlap > 0.5 * min(len(x), len(y))
-    tiny = 1e-12 * max(float(np.max(xx * yy)), 1e-300)
-    score = np.where(enough & (xx * yy > tiny) & (xy > 0 if beside is None else True), xy**2 / np.maximum(xx * yy, tiny), 0.0)
-    return score, lags
-
-
-def sequence(names: Sequence[str], clocks: Sequence[str], order: Sequence[str]) -> list[int]:
-    """Files in the order in which clocks are trusted: by their kind, then as given."""
-    return sorted(range(len(names)), key=lambda k: (order.index(clocks[k]), k))
+        sum_b = correlated(one_x, beside)
+        bb = correlated(one_x, beside**2) - sum_b**2 / count
+        bb = np.maximum(bb, 1e-9 * bb.max())
+        xb, by = correlated(x, beside) - sum_x * sum_b / count, correlated(one_x, beside * y) - sum_b * sum_y / count
+        xy, xx, yy = xy - xb * by / bb, xx - xb**2 / bb, yy - by**2 / bb
+    enough = (count > OVERLAP * min(len(x), len(y))) & (xx > 1e-6 * xx.max()) & (yy > 1e-6 * yy.max())
+    score = np.where(enough, xy**2 / np.maximum(xx * yy, 1e-300), 0.0)
+    return np.where(xy > 0, score, 0.0) if beside is None else score, lags

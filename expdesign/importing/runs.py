@@ -294,7 +294,7 @@ def _with_helm(ship: Vessel, batch: Batch) -> tuple[Vessel, Batch]:
     if "tau_psi" not in batch.input_names:
         return ship, batch
     ahead, moment = (batch.inputs[:, batch.input_names.index(name)] for name in ("tau_x", "tau_psi"))
-    helm = math.radians(35.0) * moment / max(float(np.abs(moment).max()), 1e-9)
+    helm = math.radians(35.0) * moment / max(float(np.abs(moment).max()), 1.0)
     names = ("n1_rps", "rudder1_rad")
     stretch = Stretch(time_s=batch.time_s, columns=dict(zip(names, (ahead, helm), strict=True)))
     like = presumed([stretch], length_m=ship.length_m, sample_time_s=batch.sample_time_s, bow=())

@@ -21,6 +21,11 @@ def _begins(*magic: bytes) -> object:
     return lambda path, head: head.startswith(magic)
 
 
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(64)
+
+
 READERS = (
     Reader(name="PX4 ULog", fits=_begins(b"ULog\x01\x12\x35"), read=read_px4, extra="logs"),
     Reader(name="ROS bag or MCAP", fits=is_ros, read=read_ros, extra="logs"),
@@ -52,7 +57,7 @@ def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
     """
     check_ends(path, "a log")
     try:
-        head = b"" if path.is_dir() else path.open("rb").read(64)
+        head = b"" if path.is_dir() else _head(path)
     except FileNotFoundError:
         raise FileError(path, "", "does not exist, expected a log") from None
     except OSError as error:

@@ -52,6 +52,7 @@ def read_ardupilot(path: Path, sample_time_s: float) -> Log:
                 table.setdefault(field, []).append(float(value))
                 if f"{name}.{field}" not in units:
                     units[f"{name}.{field}"] = _unit(message, field)
+    source.close()
     channels: list[Channel] = []
     notes: list[str] = []
     for name, table in rows.items():
