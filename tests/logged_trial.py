@@ -71,7 +71,9 @@ def voyage(*, parts: tuple[tuple[str, float], ...] = PARTS, heading: float = 0.3
             if kind == "zigzag" and order * (state[2] - course) >= math.radians(20.0) * abs(order):
                 order = -order
             if kind == "steady":
-                order = math.radians(round(math.degrees(np.clip(1.2 * (course - state[2]) - 25.0 * state[5], -0.03, 0.03)), 1))
+                order = math.radians(
+                    round(math.degrees(np.clip(1.2 * (course - state[2]) - 25.0 * state[5], -0.03, 0.03)), 1)
+                )
             rows.append([time, *state, n, order, rudder])
             middle = rudder + np.clip(order - rudder, -RATE_RADPS * STEP_S / 2, RATE_RADPS * STEP_S / 2)
             a = derivative(state, n, middle)
@@ -153,7 +155,7 @@ def dm(degrees: float, digits: int) -> str:
 
 
 def nmea(trip: Voyage, *, magnetic: float | None = None) -> list[str]:
-    """Sentences of a bridge: position, speed, heading (true, or magnetic with a variation [deg]), turn, rudder, shaft."""
+    """Sentences of a bridge: position, speed, heading (magnetic with a variation [deg]), turn, rudder, shaft."""
     lines = []
     for k in range(len(trip.time_s)):
         when = datetime.fromtimestamp(round(trip.time_s[k], 3), UTC)
@@ -166,7 +168,9 @@ def nmea(trip: Voyage, *, magnetic: float | None = None) -> list[str]:
             sentence(f"GPGGA,{clock},{place},4,12,0.9,10.0,M,0.0,M,,"),
             sentence(f"HEHDT,{heading:.4f},T")
             if magnetic is None
-            else sentence(f"HCHDG,{(heading - magnetic) % 360:.4f},,,{abs(magnetic):.1f},{'E' if magnetic > 0 else 'W'}"),
+            else sentence(
+                f"HCHDG,{(heading - magnetic) % 360:.4f},,,{abs(magnetic):.1f},{'E' if magnetic > 0 else 'W'}"
+            ),
             sentence(f"TIROT,{math.degrees(trip.r_radps[k]) * 60:.4f},A"),
             sentence(f"IIRSA,{math.degrees(trip.rudder_rad[k]):.4f},A,,V"),
             sentence(f"IIRPM,S,0,{trip.n_rps[k] * 60:.2f},100,A"),
@@ -276,11 +280,18 @@ def write_ardupilot(path: Path, trip: Voyage) -> Path:
         us = round((trip.time_s[k] - START_S) * 1e6) + 5_000_000
         week, ms = divmod(trip.time_s[k] - GPS_EPOCH_S + LEAP_S, 604_800.0)
         course = math.degrees(trip.course_rad[k])
-        add("GPS", us, 4, round(ms * 1e3), int(week), 12, 90, round(trip.lat_deg[k] * 1e7), round(trip.lon_deg[k] * 1e7),
-            0, trip.speed_mps[k], course, 0.0, 0.0, 1)  # fmt: skip
+        add("GPS", us, 4, round(ms * 1e3), int(week), 12, 90, round(trip.lat_deg[k] * 1e7),
+            round(trip.lon_deg[k] * 1e7),            0, trip.speed_mps[k], course, 0.0, 0.0, 1)  # fmt: skip
         add("ATT", us, 0, 0, 0, 0, 0, round(math.degrees(trip.heading_rad[k]) * 100), 0, 0, 3)
         add("IMU", us, 0, 0.0, 0.0, trip.r_radps[k], 0.0, 0.0, -9.8, 0, 0, 20.0, 1, 1, 10, 10)
-        add("RCOU", us, 1500 + round(trip.order_rad[k] / math.radians(35) * 500), 1500, 1500 + round(trip.n_rps[k] * 100), 0)
+        add(
+            "RCOU",
+            us,
+            1500 + round(trip.order_rad[k] / math.radians(35) * 500),
+            1500,
+            1500 + round(trip.n_rps[k] * 100),
+            0,
+        )
     path.write_bytes(out)
     return path
 
@@ -321,7 +332,11 @@ def write_ulog(path: Path, trip: Voyage) -> Path:
         out.extend(struct.pack("<HB", len(body), ord(kind)) + body)
 
     topics = {
-        "sensor_gps": ("uint64_t timestamp;uint64_t time_utc_usec;double latitude_deg;double longitude_deg;float vel_n_m_s;float vel_e_m_s;", "<QQddff"),
+        "sensor_gps": (
+            "uint64_t timestamp;uint64_t time_utc_usec;double latitude_deg;double longitude_deg;float vel_n_m_s;"
+            "float vel_e_m_s;",
+            "<QQddff",
+        ),
         "vehicle_attitude": ("uint64_t timestamp;float[4] q;", "<Qffff"),
         "vehicle_angular_velocity": ("uint64_t timestamp;float[3] xyz;", "<Qfff"),
         "actuator_servos": ("uint64_t timestamp;float[2] control;", "<Qff"),
@@ -351,7 +366,7 @@ def write_ulog(path: Path, trip: Voyage) -> Path:
 
 
 def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
-    """A bag with position, odometry in axes of ROS, rudder and shaft, by rosbags' writers: "ros1", "sqlite3" or "mcap"."""
+    """A bag with position, odometry, rudder and shaft, by rosbags' writers: "ros1", "sqlite3" or "mcap"."""
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -364,7 +379,8 @@ def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
     with writer:
         topics = {
             "/fix": "sensor_msgs/msg/NavSatFix", "/odom": "nav_msgs/msg/Odometry",
-            "/rudder_cmd": "std_msgs/msg/Float64", "/rudder_angle": "std_msgs/msg/Float64", "/shaft_rpm": "std_msgs/msg/Float64",
+            "/rudder_cmd": "std_msgs/msg/Float64", "/rudder_angle": "std_msgs/msg/Float64",
+            "/shaft_rpm": "std_msgs/msg/Float64",
         }  # fmt: skip
         links = {name: writer.add_connection(name, form, typestore=store) for name, form in topics.items()}
         zeros = np.zeros(36)
@@ -376,7 +392,9 @@ def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
             v3, point = t["geometry_msgs/msg/Vector3"], t["geometry_msgs/msg/Point"]
             yaw = math.pi / 2 - trip.heading_rad[k]
             turn = t["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
-            pose = t["geometry_msgs/msg/Pose"](position=point(x=trip.east_m[k], y=trip.north_m[k], z=0.0), orientation=turn)
+            pose = t["geometry_msgs/msg/Pose"](
+                position=point(x=trip.east_m[k], y=trip.north_m[k], z=0.0), orientation=turn
+            )
             twist = t["geometry_msgs/msg/Twist"](
                 linear=v3(x=trip.u_mps[k], y=-trip.v_mps[k], z=0.0), angular=v3(x=0.0, y=0.0, z=-trip.r_radps[k])
             )

@@ -11,6 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pynmeagps import NMEAReader
+
+from expdesign.cli import main
+from expdesign.importing import read_log
 from logged_trial import (
     RATE_RADPS,
     START_S,
@@ -30,10 +34,6 @@ from logged_trial import (
     write_telemetry,
     write_ulog,
 )
-from pynmeagps import NMEAReader
-
-from expdesign.cli import main
-from expdesign.importing import read_log
 
 KNOT, DEGREE = 1852 / 3600, math.pi / 180
 EXTRA = {
@@ -130,11 +130,11 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
 def test_columns_of_sentences_are_those_of_the_librarys_parser(tmp_path: Path, trip: Voyage) -> None:
     part = trip.every(100)
     lines = nmea(part, magnetic=-7.5)
-    lines += [line.replace("$HCHDG", "$HCHDG") for line in ()]
     (tmp_path / "a.nmea").write_text("\n".join(lines) + "\n")
     log = read_log(tmp_path / "a.nmea")
     parsed = [NMEAReader.parse(line) for line in lines]
-    fields = {"GPRMC.spd": "spd", "GPRMC.cog": "cog", "GPGGA.lat": "lat", "GPGGA.lon": "lon", "HCHDG.headingM": "headingM",
+    fields = {"GPRMC.spd": "spd", "GPRMC.cog": "cog", "GPGGA.lat": "lat", "GPGGA.lon": "lon",
+              "HCHDG.headingM": "headingM",
               "TIROT.rot": "rot", "IIRSA.stbdangle": "stbdangle"}  # fmt: skip
     own = {channel.name: channel.values for channel in log.channels}
     for name, field in fields.items():
@@ -150,7 +150,9 @@ def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> 
     assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "vessel-lines.toml").read_text()
 
 
-def test_the_folder_is_what_other_commands_take(tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_folder_is_what_other_commands_take(
+    tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]
+) -> None:
     imported(write_dialect(tmp_path / "a.csv", trip.every(10)))
     (tmp_path / "ship.toml").write_text(SHIP)
     ship = ["--vessel", str(tmp_path / "ship.toml"), "--json", "--out"]
@@ -159,7 +161,10 @@ def test_the_folder_is_what_other_commands_take(tmp_path: Path, trip: Voyage, ca
     text = json.dumps(found)
     assert "N_ud" in text
     assert main(["indices", str(tmp_path / "out"), *ship, str(tmp_path / "i"), "--quiet"]) == 0
-    assert main(["mine", str(tmp_path / "out"), *ship, str(tmp_path / "m"), "--keep", "1", "--mean", "none", "--quiet"]) == 0
+    assert (
+        main(["mine", str(tmp_path / "out"), *ship, str(tmp_path / "m"), "--keep", "1", "--mean", "none", "--quiet"])
+        == 0
+    )
     values = {item["method"]: item["parameters"] for item in found["methods"]}
     assert abs(values["ls"]["N_ud"]["value"] - 0.0005) < 0.05 * 0.0005
 

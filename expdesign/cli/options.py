@@ -121,7 +121,9 @@ PlanFile = Annotated[
 ]
 DataFiles = Annotated[
     list[Path],
-    typer.Argument(metavar="DATA.csv ...", help="Measured runs, or folders of them; see expdesign explain data for their columns."),
+    typer.Argument(
+        metavar="DATA.csv ...", help="Measured runs, or folders of them; see expdesign explain data for their columns."
+    ),
 ]
 Seed = Annotated[
     int,

@@ -27,7 +27,9 @@ from expdesign.cli.options import (
 def import_(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG ...", help="Logs of one trial or voyage, in any formats: expdesign explain import."),
+        typer.Argument(
+            metavar="LOG ...", help="Logs of one trial or voyage, in any formats: expdesign explain import."
+        ),
     ],
     vessel: Annotated[
         Path | None,
@@ -59,7 +61,9 @@ def import_(
     ] = None,
     length: Annotated[
         float | None,
-        typer.Option("--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."),
+        typer.Option(
+            "--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."
+        ),
     ] = None,
     out: OutByLog = None,
 ) -> Asked:

@@ -70,7 +70,9 @@ def unused_rows(content: ImportContent) -> list[tuple[str, ...]]:
             groups.setdefault((use.file, use.why), []).append(use.channel)
     for log in content.logs:
         if log.unused:
-            groups.setdefault((log.source, "not a reading of the ship's motion, or without a clock"), []).extend(log.unused)
+            groups.setdefault((log.source, "not a reading of the ship's motion, or without a clock"), []).extend(
+                log.unused
+            )
     return [(file, _listed(names), why) for (file, why), names in groups.items()]
 
 
@@ -116,16 +118,20 @@ def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> st
         f"# Made by: {command}",
     ]
     top = {"sample_time_s": mapping.sample_time_s, "length_m": mapping.length_m, "variation_deg": mapping.variation_deg,
-           "antenna_forward_m": mapping.antenna_forward_m, "antenna_starboard_m": mapping.antenna_starboard_m}  # fmt: skip
+           "antenna_forward_m": mapping.antenna_forward_m,
+           "antenna_starboard_m": mapping.antenna_starboard_m}  # fmt: skip
     lines += [f"{key} = {value!r}" for key, value in top.items() if value is not None]
     for clock in mapping.files:
         lines += ["", "[[file]]", f"name = {_text(clock.file)}", f"offset_s = {clock.offset_s!r}"]
         lines += [f"offset_std_s = {clock.offset_std_s!r}"] if clock.offset_std_s else []
-        lines += [f"sample_time_s = {clock.sample_time_s!r}"] * bool(clock.sample_time_s or _has_no_clock(logs, clock.file))
+        lines += [f"sample_time_s = {clock.sample_time_s!r}"] * bool(
+            clock.sample_time_s or _has_no_clock(logs, clock.file)
+        )
     for use in mapping.uses:
         if use.column:
             lines += ["", "[[channel]]", f"file = {_text(use.file)}", f"channel = {_text(use.channel)}",
-                      f"column = {_text(use.column)}", f"unit = {_text(use.unit)}", f"scale = {use.scale!r}"]  # fmt: skip
+                      f"column = {_text(use.column)}", f"unit = {_text(use.unit)}",
+                      f"scale = {use.scale!r}"]  # fmt: skip
             lines += [f"offset = {use.offset!r}"] * bool(use.offset) + [f"why = {_text(use.why)}"] * bool(use.why)
     rest = [use for use in mapping.uses if not use.column]
     if rest:
@@ -233,7 +239,10 @@ def _track(content: ImportContent) -> Markup:
     figure = new_figure(6.4, 4.6)
     axes = figure.subplots()
     parts = [(GREY, 0.8, "", stretch) for stretch in content.sampled.stretches]
-    parts += [(LINES[k % len(LINES)], 2.0, name, run.stretch) for k, (name, run) in enumerate(zip(content.files, content.runs, strict=True))]
+    parts += [
+        (LINES[k % len(LINES)], 2.0, name, run.stretch)
+        for k, (name, run) in enumerate(zip(content.files, content.runs, strict=True))
+    ]
     origin = None
     for colour, width, name, stretch in parts:
         columns = stretch.columns

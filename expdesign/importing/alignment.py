@@ -1,7 +1,7 @@
 """Clocks of several files: how much later one runs than another, from what both saw, with its standard error.
 
-Where both measured the same (a turn, a speed) the lag of the largest correlation is taken. Where one has only the rudder
-and the other the turn, the lag at which the rudder explains most of the change of the yaw rate beside that rate itself,
+Where both measured the same (a turn, a speed) the lag of the largest correlation is taken. Where one has only the
+rudder and the other the turn, the lag at which the rudder explains most of the change of the yaw rate beside that rate itself,
 r' / u^2 = b r / u + k rudder(t - lag), with speed u: the ship's own slowness is in b then, and not in the lag.
 
 Both are found on the whole overlap, and again in blocks of it, whose spread gives the standard error.
@@ -9,7 +9,7 @@ Both are found on the whole overlap, and again in blocks of it, whose spread giv
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -183,7 +183,7 @@ def _explained(x: Array, y: Array, beside: Array | None) -> tuple[Array, Array]:
     def correlated(a: Array, b: Array) -> Array:
         return np.asarray(scipy.signal.correlate(b, a, mode="full", method="fft"))
 
-    lags = np.arange(-len(x) + 1, len(y))
+    lags = np.arange(-len(x) + 1, len(y), dtype=float)
     one_x, one_y = np.ones(len(x)), np.ones(len(y))
     count = np.maximum(np.round(correlated(one_x, one_y)), 1.0)
     sum_x, sum_y = correlated(x, one_y), correlated(one_x, y)
@@ -197,4 +197,4 @@ def _explained(x: Array, y: Array, beside: Array | None) -> tuple[Array, Array]:
         xy, xx, yy = xy - xb * by / bb, xx - xb**2 / bb, yy - by**2 / bb
     enough = (count > OVERLAP * min(len(x), len(y))) & (xx > 1e-6 * xx.max()) & (yy > 1e-6 * yy.max())
     score = np.where(enough, xy**2 / np.maximum(xx * yy, 1e-300), 0.0)
-    return np.where(xy > 0, score, 0.0) if beside is None else score, lags
+    return np.asarray(np.where(xy > 0, score, 0.0) if beside is None else score), lags

@@ -8,10 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.values import Array, seal
+
+Places = NDArray[np.signedinteger[Any]]
+"""Indices of rows."""
 
 GNSS, COMPUTER, OWN, NONE = "satellite time", "a computer's clock", "a clock of its own", "no clock"
 RESET_S, RESET_STEPS = 2.0, 10.0
@@ -71,7 +76,7 @@ def epochs(stamps: Array, places: Array) -> tuple[Array, Array]:
     return stamps[later], places[later]
 
 
-def spread(places: Array, stamps: Array, at: Array) -> Array:
+def spread(places: Array | Places, stamps: Array, at: Array | Places) -> Array:
     """Times (k,) of readings at places of a file from stamps (e,) at other places.
 
     Readings between two stamps are taken for evenly spaced from the first of them on; those before the first stamp
@@ -91,7 +96,7 @@ def spread(places: Array, stamps: Array, at: Array) -> Array:
     return np.where(own < 0, np.nan, stamps[np.maximum(own, 0)] + share * length)
 
 
-def set_right(time_s: Array, *, what: str) -> tuple[Array, Array, list[str]]:
+def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
     """Times (k,) as a clock has them -> the order (k,) of the rows in time, their times, and notes.
 
     A clock that began anew goes on after a gap; stamps that repeat, as coarse ones do, are spread evenly up to the
@@ -146,9 +151,7 @@ def channels_of(
             unit = (units or {}).get(name, "")
             # most channels of a table have all readings, and then share its times
             times_of = times if known.all() else times[known]
-            found.append(
-                Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own[known])
-            )
+            found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own[known]))
     return found, notes
 
 

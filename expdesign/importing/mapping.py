@@ -141,7 +141,8 @@ def dimension(column: str) -> str:
     """Key of `FACTORS` of a column."""
     if column in ("lat_deg", "lon_deg"):
         return "place"
-    ends = (("_radps", "rate"), ("_rad", "angle"), ("_mps2", "acceleration"), ("_mps", "speed"), ("_rps", "revolutions"),
+    ends = (("_radps", "rate"), ("_rad", "angle"), ("_mps2", "acceleration"), ("_mps", "speed"),
+            ("_rps", "revolutions"),
             ("_m", "length"))  # fmt: skip
     return next((name for end, name in ends if column.endswith(end)), "force")
 
@@ -180,14 +181,14 @@ class _Mark:
         """(bow or not, side, number) of an actuator."""
         if self.exact or not self.is_actuator:
             return "", "", ""
-        own = self.name if self.column != "n" else self.name
+        own = self.name
         number = re.search(r"(\d+)\b(?!.*\d)", own)
         side = "p" if re.search(PORT, own) else "s" if re.search(STARBOARD, own) else ""
         return "bow" if re.search(BOW, own) else "", side, "" if side else number[1] if number else ""
 
     @property
     def role(self) -> str:
-        """"order", "reached", or "" where the name says neither."""
+        """Either "order" or "reached"; "" where the name says neither."""
         if self.exact or not self.is_actuator:
             return ""
         return "order" if re.search(ORDER, self.name) else "reached" if re.search(REACHED, self.name) else ""
@@ -208,7 +209,7 @@ def _marked(channel: Channel) -> _Mark:
         return _Mark(column=own.name, rank=-1, unit=f"times {own.factor!r}", exact=True, name=words(channel.name))
     bare, unit = split_unit(channel.name)
     name, unit = words(bare), channel.unit or unit
-    if channel.unit and not unit_word(channel.unit) in {u for t in FACTORS.values() for u in t} | set(SHARES):
+    if channel.unit and unit_word(channel.unit) not in {u for t in FACTORS.values() for u in t} | set(SHARES):
         unit = ""
     talker = re.match(r"([A-Z]{2})([A-Z]{3})\.", channel.name)
     if talker:  # the sentence without who talks
@@ -242,11 +243,11 @@ def _rule(name: str, rules: Sequence[tuple[str, int, str]]) -> tuple[str, int] |
 def _best(channels: Sequence[Channel], marks: Sequence[_Mark]) -> dict[tuple[str, ...], Channel]:
     """The channel of each column: by rank of its name, then readings; companions from one sentence or message."""
     found: dict[tuple[str, ...], Channel] = {}
-    for mark in sorted(set(mark.key for mark in marks if mark.column)):
-        own = [(m.rank, -len(c), k) for k, (c, m) in enumerate(zip(channels, marks, strict=True)) if m.key == mark]
+    for key in sorted({mark.key for mark in marks if mark.column}):
+        own = [(m.rank, -len(c), k) for k, (c, m) in enumerate(zip(channels, marks, strict=True)) if m.key == key]
         longest = max(-count for _, count, _ in own)
         own = [item for item in own if -item[1] > 0.1 * longest]
-        found[mark] = channels[min(own)[2]]
+        found[key] = channels[min(own)[2]]
     for first, second in (("lat_deg", "lon_deg"), (SOG, COG), (NORTHWARD, EASTWARD), ("north_m", "east_m")):
         one = next((c for key, c in found.items() if key[0] == first), None)
         if one is None:
@@ -274,14 +275,14 @@ def _unused(channel: Channel, mark: _Mark, chosen: dict[tuple[str, ...], Channel
     return Use(file=channel.source, channel=channel.name, why=why)
 
 
-def _used(
-    channel: Channel, mark: _Mark, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]
-) -> Use:
+def _used(channel: Channel, mark: _Mark, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> Use:
     """The use of a channel, with its unit."""
     use = Use(file=channel.source, channel=channel.name, column=mark.column, unit=mark.unit, why="its name")
     if mark.exact:
         return replace(use, unit="", scale=float(mark.unit.removeprefix("times ")), why="a column of ours")
-    kind = "angle" if mark.column in ("rudder", "a") else "revolutions" if mark.column == "n" else dimension(mark.column)
+    kind = (
+        "angle" if mark.column in ("rudder", "a") else "revolutions" if mark.column == "n" else dimension(mark.column)
+    )
     if mark.column == "depth_m" or (mark.column == "throttle" and not mark.unit):
         use = _of_depth(use, channel) if mark.column == "depth_m" else use
     largest = float(np.abs(channel.values).max())
@@ -290,14 +291,17 @@ def _used(
         return replace(use, unit="pwm", why="its name; pulses of 1000 to 2000 us")
     if mark.column == "throttle":
         unit = mark.unit or ("percent" if largest > 1.5 else "share")
-        return replace(use, unit=unit, why=f"its name; {unit} as stated" if mark.unit else f"its name; size {largest:.3g}")
+        return replace(
+            use, unit=unit, why=f"its name; {unit} as stated" if mark.unit else f"its name; size {largest:.3g}"
+        )
     if kind == "place" and largest > 1000.0:
         return replace(use, unit="1e-7 deg", why="its name; in units of 1e-7 degrees")
     if kind in ("place", "length", "acceleration"):
         return replace(use, unit=mark.unit or {"place": "deg", "length": "m", "acceleration": "mps2"}[kind])
     if kind == "rate":
         return _by_fit(use, _turning(channel, channels, chosen), ("degpmin", "degps", "radps"), mark.unit,
-                       usual="degpmin" if re.search(r"\brot\b", mark.name) else "radps" if largest < 3.2 else "degps")  # fmt: skip
+                       usual="degpmin" if re.search(r"\brot\b", mark.name)
+                       else "radps" if largest < 3.2 else "degps")  # fmt: skip
     if kind == "speed" and mark.column == SOG:
         return _by_fit(use, _going(channel, channels, chosen), ("kn", "mps", "kmph", "cmps"), mark.unit, usual="kn")
     if mark.unit:
@@ -308,7 +312,9 @@ def _used(
         few = "" if largest > RADIANS[mark.column] or not rounded else " and of few decimals"
         return replace(use, unit=unit, why=f"its name; up to {largest:.4g}{few}, so {unit}")
     if kind == "revolutions":
-        unit = "rps" if re.search(r"\b(rps|hz)\b", mark.name) else "rpm" if "rpm" in mark.name or largest > 30 else "rps"
+        unit = (
+            "rps" if re.search(r"\b(rps|hz)\b", mark.name) else "rpm" if "rpm" in mark.name or largest > 30 else "rps"
+        )
         return replace(use, unit=unit, why=f"its name; up to {largest:.4g}, so {unit}")
     return replace(use, unit="mps")
 
@@ -316,7 +322,9 @@ def _used(
 def _of_depth(use: Use, channel: Channel) -> Use:
     """Depths are counted downwards; heights of the bottom are turned over."""
     if np.mean(channel.values < 0) > 0.5:
-        return replace(use, unit=use.unit or "m", scale=-1.0, why="its name; negative, a height of the bottom: turned over")
+        return replace(
+            use, unit=use.unit or "m", scale=-1.0, why="its name; negative, a height of the bottom: turned over"
+        )
     return use
 
 
@@ -353,12 +361,12 @@ def _by_fit(use: Use, ratio: _Ratio | None, units: Sequence[str], stated: str, *
     if fits:
         return replace(use, unit=near, scale=sign, why=f"its name; {near} by the change of {ratio.of}{turned}")
     why = f"its name; {usual}, as usual, but {ratio.of} changes {size / table[usual]:.3g} times as fast"
-    return replace(use, unit=usual, scale=sign, why=f"{why}{turned}" if ratio.explained > SURE else "its name; as usual")
+    return replace(
+        use, unit=usual, scale=sign, why=f"{why}{turned}" if ratio.explained > SURE else "its name; as usual"
+    )
 
 
-def _turning(
-    channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]
-) -> _Ratio | None:
+def _turning(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> _Ratio | None:
     """The heading's change by the integral of a rate."""
     heading = next((c for key, c in chosen.items() if key[0] in ("heading_rad", MAGNETIC)), None)
     if heading is None or heading.source != channel.source:
@@ -401,7 +409,7 @@ def _common(one: Channel, other: Channel) -> tuple[Array | None, int]:
 
 
 def _steps(values: np.ndarray, window: int) -> np.ndarray:
-    return values[window:] - values[:-window]
+    return np.asarray(values[window:] - values[:-window])
 
 
 def _ratio(x: Array, y: Array, of: str, *, offset: bool = True) -> _Ratio | None:
@@ -443,7 +451,11 @@ def _numbered(
             stem = "a" if mark.column == "a" else "n"
             signal, scale = f"{stem}{numbers[mark.machine]}", _largest(actuators, stem, use)
         column = f"{prefix}{signal}_{'rps' if signal[0] == 'n' else 'rad'}"
-        unit_words = "" if use.unit not in SHARES else f"; of {scale:.4g}, {'as the vessel file has it' if actuators else 'as nothing tells the largest'}"
+        unit_words = (
+            ""
+            if use.unit not in SHARES
+            else f"; of {scale:.4g}, {'as the vessel file has it' if actuators else 'as nothing tells the largest'}"
+        )
         yield id(use), replace(use, column=column, scale=use.scale * scale, why=f"{use.why}; {said}{unit_words}")
 
 

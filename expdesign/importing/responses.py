@@ -17,8 +17,7 @@ import numpy as np
 import scipy
 
 from expdesign.importing.channels import Channel
-from expdesign.records.file import is_input, is_turning_input
-from expdesign.records.file import REACHED
+from expdesign.records.file import REACHED, is_input, is_turning_input
 from expdesign.values import Array
 
 MOST_SAMPLES = 12_000
@@ -83,6 +82,7 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
         return (own + offset - positions)[near]
 
     start = {"rate": math.log(fastest), "lag": max(step_s, 0.3), "delay": step_s}
+
     def fit(free: tuple[str, ...]) -> Any:
         # an order is seen up to a step after it was given, so that positions may be sooner than it
         least = {"rate": math.log(fastest) - 2.0, "lag": 0.0, "delay": -order_step_s}
@@ -92,7 +92,9 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
             left, [start[part] for part in free], bounds=(low, high), args=(free,), diff_step=1e-3,
             x_scale=[0.1 if part == "rate" else step_s for part in free],
         )  # fmt: skip
-    best, plain, free = fit(("rate", "lag", "delay")), fit(("lag", "delay")), ("rate", "lag", "delay")
+
+    free: tuple[str, ...] = ("rate", "lag", "delay")
+    best, plain = fit(free), fit(("lag", "delay"))
     if best.cost > LESS**2 * plain.cost:
         best, free = plain, ("lag", "delay")
     elif (without := fit(("rate", "delay"))).cost < best.cost / LESS**2:  # a lag may stand for orders between readings

@@ -54,7 +54,9 @@ def inputs_of(columns: Mapping[str, Array]) -> dict[str, Array]:
 
 def typical_length_m(stretches: Sequence[Stretch]) -> float:
     """Length of a ship that makes such speeds [m]."""
-    speeds = [np.hypot(s.columns["u_mps"], s.columns["v_mps"]) for s in stretches if {"u_mps", "v_mps"} <= set(s.columns)]
+    speeds = [
+        np.hypot(s.columns["u_mps"], s.columns["v_mps"]) for s in stretches if {"u_mps", "v_mps"} <= set(s.columns)
+    ]
     speed = float(np.quantile(np.concatenate(speeds), 0.8)) if speeds else 3.0
     return max(1.0, speed**2 / (9.81 * FROUDE**2))
 
@@ -80,9 +82,11 @@ def cut(found: Sampled, *, length_m: float) -> list[Run]:
             end = min(len(stretch), last + pause // 2)
             runs.append(
                 Run(
-                    name="", family="", stretch=stretch.cut(slice(start, end)),
+                    name="",
+                    family="",
+                    stretch=stretch.cut(slice(start, end)),
                     approach_s=(first - start) * found.sample_time_s,
-                )  # fmt: skip
+                )
             )
             begin = end
     return runs
@@ -162,9 +166,9 @@ def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, in
             best = float(score[lag]), place, lag - (len(times) - 1)
     if best is None:
         return [], f"the log has none of the plan's inputs, {', '.join(commands.names)}"
-    score, place, offset = best
-    if score < FOUND:
-        return [], f"the plan's commands are not found in the log: they explain {score:.0%} of its orders at best"
+    explained, place, offset = best
+    if explained < FOUND:
+        return [], f"the plan's commands are not found in the log: they explain {explained:.0%} of its orders at best"
     stretch, runs = found.stretches[place], []
     for name, first, last in legs:
         begin, end = (offset + round(sample * ratio) for sample in (first, last))
@@ -172,7 +176,7 @@ def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, in
         if len(part) > 20:
             runs.append(Run(name=name, family="as planned", stretch=part, approach_s=0.0))
     begins = offset * found.sample_time_s
-    return runs, f"the plan begins {begins:.1f} s after the record; its commands explain {score:.0%} of the orders"
+    return runs, f"the plan begins {begins:.1f} s after the record; its commands explain {explained:.0%} of the orders"
 
 
 def _orders(columns: Mapping[str, Array]) -> dict[str, Array]:
@@ -193,7 +197,9 @@ def presumed(stretches: Sequence[Stretch], *, length_m: float, sample_time_s: fl
     """
     inputs = [inputs_of(stretch.columns) for stretch in stretches]
     names = [name for name in inputs[0] if all(name in own for own in inputs)]
-    actuators = _actuators(names, {name: max(float(np.abs(own[name]).max()) for own in inputs) for name in names}, length_m, bow)
+    actuators = _actuators(
+        names, {name: max(float(np.abs(own[name]).max()) for own in inputs) for name in names}, length_m, bow
+    )
     terms = [Term("u", "X_abs_u_u", "abs(u)*u"), Term("v", "Y_abs_u_v", "abs(u)*v"), Term("r", "N_abs_u_r", "abs(u)*r")]
     values = [-0.05 / length_m, -1.0 / length_m, -1.0 / length_m]
     rudders = [one.signals[0] for one in actuators if one.kind == "rudder"]
@@ -241,15 +247,24 @@ def _regressors(ship: Vessel, batch: Batch, inputs: Sequence[Array]) -> Array:
     for k, term in enumerate(ship.model.terms):
         alone = replace(ship.model, parameters=np.eye(len(unit))[k])
         axis = "uvr".index(term.equation)
-        acceleration = alone.accelerations(velocity.T, velocity.T[:2], np.array([signals[name] for name in ship.model.inputs]))
+        acceleration = alone.accelerations(
+            velocity.T, velocity.T[:2], np.array([signals[name] for name in ship.model.inputs])
+        )
         rows.append(np.broadcast_to(np.asarray(acceleration[axis], dtype=float), (len(batch),)))
     return np.array(rows)
 
 
-def _actuators(names: Sequence[str], sizes: Mapping[str, float], length_m: float, bow: Sequence[str]) -> tuple[Actuator, ...]:
+def _actuators(
+    names: Sequence[str], sizes: Mapping[str, float], length_m: float, bow: Sequence[str]
+) -> tuple[Actuator, ...]:
     found = []
     if any(name.startswith("tau") for name in names):
-        limit = [Limit(low=-1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3), high=1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3)) for axis in ("x", "y", "psi")]
+        limit = [
+            Limit(
+                low=-1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3), high=1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3)
+            )
+            for axis in ("x", "y", "psi")
+        ]
         found.append(Actuator(kind="force", number=1, limits=tuple(limit)))
     numbers = sorted({int("".join(c for c in name if c.isdigit())) for name in names if name[0] in "na"})
     for number in numbers:
@@ -257,10 +272,14 @@ def _actuators(names: Sequence[str], sizes: Mapping[str, float], length_m: float
         speed, turns = Limit(low=-size, high=size), f"a{number}_rad" in names
         kind = "azimuth" if turns else "tunnel" if f"n{number}" in bow else "propeller"
         place = 0.4 * length_m if kind == "tunnel" else -0.45 * length_m
-        found.append(Actuator(kind=kind, number=number, forward_m=place, limits=(speed, Limit()) if turns else (speed,)))
+        found.append(
+            Actuator(kind=kind, number=number, forward_m=place, limits=(speed, Limit()) if turns else (speed,))
+        )
     for name in sorted(name for name in names if name.startswith("rudder")):
         number = int("".join(c for c in name if c.isdigit()))
-        found.append(Actuator(kind="rudder", number=number, forward_m=-0.5 * length_m, limits=(Limit(low=-1.6, high=1.6),)))
+        found.append(
+            Actuator(kind="rudder", number=number, forward_m=-0.5 * length_m, limits=(Limit(low=-1.6, high=1.6),))
+        )
     return tuple(found)
 
 
@@ -272,7 +291,9 @@ def family(ship: Vessel, batch: Batch) -> str:
         found = NotStandard(name=batch.name, reason="")
     match found:
         case ZigZag():
-            return f"zig-zag {math.degrees(found.heading_rad):.0f}/{math.degrees(found.helm_rad):.0f} {found.side}".strip()
+            return (
+                f"zig-zag {math.degrees(found.heading_rad):.0f}/{math.degrees(found.helm_rad):.0f} {found.side}".strip()
+            )
         case Circle():
             return f"turning circle {math.degrees(found.helm_rad):.0f} {found.side}"
         case Stop():

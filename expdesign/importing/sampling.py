@@ -1,8 +1,8 @@
 """Channels on one common clock: stretches without a gap, in even steps, in the columns of our CSV.
 
 Readings faster than the steps are averaged over each of them, or, of orders, as they act from a step to the next;
-others of about the same rate are interpolated; slower ones are repeated, so that their interval can be seen and is undone
-where data are used (`expdesign.kinematics`). Angles go round: no mean and no line passes through north.
+others of about the same rate are interpolated; slower ones are repeated, so that their interval can be seen and is
+undone where data are used (`expdesign.kinematics`). Angles go round: no mean and no line passes through north.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ import numpy as np
 from expdesign.errors import NoAnswer
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
-from expdesign.records.file import input_name, is_input
-from expdesign.records.file import PLANNED, REACHED, STEERED
+from expdesign.records.file import PLANNED, REACHED, STEERED, input_name, is_input
 from expdesign.values import Array
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
@@ -100,10 +99,8 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
                 notes.append(f"{name} does not cover all of a stretch, and is left out of it")
         stretches.append(Stretch(time_s=times, columns=_finished(columns, mapping, found)))
     if not stretches:
-        spans = "; ".join(
-            f"{name} from {table[name].time_s[0] - _origin(table):.0f} to {table[name].time_s[-1] - _origin(table):.0f} s"
-            for name in main
-        )
+        ends = {name: table[name].time_s[[0, -1]] - _origin(table) for name in main}
+        spans = "; ".join(f"{name} from {first:.0f} to {last:.0f} s" for name, (first, last) in ends.items())
         raise NothingToWrite(f"no stretch of {SHORTEST} samples is covered by all main columns: {spans}")
     held = {name: table[name].interval_s for name in table if table[name].interval_s > SAME * step_s}
     for name, interval_s in held.items():
@@ -123,7 +120,7 @@ def _is_input(name: str) -> bool:
 
 
 def _is_angle(name: str) -> bool:
-    return name in ("heading_rad", MAGNETIC, COG, "wind_angle_rad") or input_name(name)[:1] == "a" and _is_input(name)
+    return name in ("heading_rad", MAGNETIC, COG, "wind_angle_rad") or (input_name(name)[:1] == "a" and _is_input(name))
 
 
 def _is_held(name: str) -> bool:
@@ -184,7 +181,9 @@ def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], lis
     if len({"u_mps", "v_mps"} & set(table)) == 1 and (NORTHWARD in table or (speed is not None and course is not None)):
         (alone,) = {"u_mps", "v_mps"} & set(table)
         del table[alone]
-        table, notes = _ground_velocity({**table, **({} if speed is None or course is None else {SOG: speed, COG: course})})
+        table, notes = _ground_velocity(
+            {**table, **({} if speed is None or course is None else {SOG: speed, COG: course})}
+        )
         return table, [f"{alone} alone is no velocity, and is left out", *notes]
     if {"u_mps", "v_mps"} <= set(table):
         for name in (NORTHWARD, EASTWARD):
@@ -202,7 +201,9 @@ def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], lis
             "no heading is recorded: u and v cannot be had from speed and course, and course is not taken for heading"
         ]
     if NORTHWARD in table:
-        return table, ["u_mps and v_mps are velocity over ground (speed and course, or north and east) turned by the heading"]
+        return table, [
+            "u_mps and v_mps are the velocity over ground, from speed and course or north and east, in the ship's axes"
+        ]
     return table, []
 
 
@@ -250,7 +251,7 @@ def _grid(table: Table[str, Channel], first: float, last: float, step_s: float) 
         stamps = max(main, key=lambda channel: channel.interval_s).time_s
         later = stamps[(stamps >= first - 1e-9) & (stamps <= last)]
         start = float(later[0]) if len(later) else first
-    return start + step_s * np.arange(int((last - start) / step_s + 1e-6) + 1)
+    return np.asarray(start + step_s * np.arange(int((last - start) / step_s + 1e-6) + 1))
 
 
 def _covers(channel: Channel, times: Array, step_s: float) -> bool:
@@ -278,7 +279,7 @@ def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Arra
         for share in at:
             places = np.searchsorted(own, times + share * step_s + shift + 1e-9, side="right") - 1
             found += values[np.maximum(places, 0)]
-        return found / len(at)
+        return np.asarray(found / len(at))
     if ratio > SAME:
         places = np.searchsorted(own, times + 1e-3 * step_s, side="right") - 1
         return np.asarray(values[np.maximum(places, 0)])

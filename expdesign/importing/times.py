@@ -18,7 +18,7 @@ STAMP = re.compile(
     r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?\s*"
 )
 TIME_NAME = re.compile(
-    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|zeit|uhrzeit|datum|clock|t|secs?|seconds|sample time|received at)\b"
+    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|zeit|uhrzeit|datum|clock|t|secs?|seconds|received at)\b"
 )
 SCALES = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "us"), (1e11, 1e-3, "ms"), (5e8, 1.0, "s"))
 """Least size of a number that is a time since 1970 in a unit, factor to seconds, unit."""
@@ -42,7 +42,7 @@ class Stamps:
 
     @property
     def kind(self) -> str:
-        """"both", "date", "clock", or "" where most cells are neither."""
+        """One of "both", "date", "clock"; "" where most cells are neither."""
         dated, timed = (float(np.isfinite(part).mean()) > 0.5 for part in (self.day, self.second))
         return "both" if dated and timed else "date" if dated else "clock" if timed else ""
 
@@ -131,8 +131,8 @@ def read_numbers(values: Array, name: str, *, unit: str = "") -> tuple[Array, st
 
 def _is_hhmmss(known: Array) -> bool:
     """Whether numbers are hours, minutes and seconds run together: never 60 in either, and jumps by 40 between."""
-    parts = (known % 100 < 60).all() and (known / 100 % 100 < 60).all() and (0 <= known).all() and (known < 2.4e5).all()
+    parts = (known % 100 < 60).all() and (known / 100 % 100 < 60).all() and (known >= 0).all() and (known < 2.4e5).all()
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     jumps = np.abs(steps - step - 40.0) < 0.5
-    return bool(parts and known.max(initial=0) >= 1e4 and (jumps.any() or known.min() > 1e4 and step < 20))
+    return bool(parts and known.max(initial=0) >= 1e4 and (jumps.any() or (known.min() > 1e4 and step < 20)))

@@ -53,10 +53,14 @@ class MappingFile(Table):
     variation_deg: Number | None = Field(
         default=None, description="variation that is added to a magnetic heading [deg], positive to the east"
     )
-    antenna_forward_m: Number = Field(default=0.0, description="place of the satellite antenna forward of amidships [m]")
+    antenna_forward_m: Number = Field(
+        default=0.0, description="place of the satellite antenna forward of amidships [m]"
+    )
     antenna_starboard_m: Number = Field(default=0.0, description="place of the antenna to starboard [m]")
     file: list[FileTable] = Field(default_factory=list, description="tables [[file]], one for each log")
-    channel: list[ChannelTable] = Field(min_length=1, description="tables [[channel]], one for each channel that is used")
+    channel: list[ChannelTable] = Field(
+        min_length=1, description="tables [[channel]], one for each channel that is used"
+    )
 
 
 def load_mapping(path: Path | str) -> Mapping:
@@ -71,14 +75,19 @@ def load_mapping(path: Path | str) -> Mapping:
     given: dict[str, int] = {}
     for number, use in enumerate(uses, start=1):
         if use.column and use.column in given:
-            raise entry.at("channel").item(number).at("column").error(
-                f"is {use.column!r} as in channel[{given[use.column]}], expected every column once"
+            raise (
+                entry.at("channel")
+                .item(number)
+                .at("column")
+                .error(f"is {use.column!r} as in channel[{given[use.column]}], expected every column once")
             )
         given[use.column] = number
     return Mapping(
         uses=tuple(uses),
         files=tuple(
-            FileClock(file=one.name, offset_s=one.offset_s, offset_std_s=one.offset_std_s, sample_time_s=one.sample_time_s)
+            FileClock(
+                file=one.name, offset_s=one.offset_s, offset_std_s=one.offset_std_s, sample_time_s=one.sample_time_s
+            )
             for one in file.file
         ),
         sample_time_s=file.sample_time_s,

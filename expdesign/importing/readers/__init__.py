@@ -1,9 +1,11 @@
-"""Formats of logs: one row of `READERS` each, asked in turn whether a file is theirs. The library of a format is loaded
-when a file of it is met; a missing one is told with the extra that installs it.
+"""Formats of logs: one row of `READERS` each, asked in turn whether a file is theirs.
+
+The library of a format is loaded when a file of it is met; a missing one is told with the extra that installs it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from expdesign.errors import FileError
@@ -17,7 +19,7 @@ from expdesign.importing.readers.text import is_text, read_text
 from expdesign.input_files import check_ends
 
 
-def _begins(*magic: bytes) -> object:
+def _begins(*magic: bytes) -> Callable[[Path, bytes], bool]:
     return lambda path, head: head.startswith(magic)
 
 

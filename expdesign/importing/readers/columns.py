@@ -28,7 +28,7 @@ def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: f
         own = {name: columns[name] for name in group}
         name, times, clock, how = _clock(own, columns)
         if times is None and sample_time_s > 0:
-            times, clock = np.arange(len(next(iter(own.values())))) * sample_time_s, OWN
+            times, clock = np.asarray(np.arange(len(next(iter(own.values())))) * sample_time_s), OWN
             how = f"{', '.join(own)}: count as {sample_time_s:g} s apart, as the mapping says"
         elif times is None:
             times, clock = np.arange(len(next(iter(own.values()))), dtype=float), NONE
@@ -39,7 +39,7 @@ def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: f
         texts = [key for key, values in own.items() if values.dtype.kind not in "biuf" and key != name]
         numbers = {key: np.asarray(v, dtype=float) for key, v in own.items() if key != name and key not in texts}
         units = {key: split_unit(key)[1] for key in numbers}
-        found, more = channels_of(numbers, times, source=source, units=units, what=name)
+        found, more = channels_of(numbers, np.asarray(times), source=source, units=units, what=name)
         channels += found
         notes += [how, *more]
         unused += texts

@@ -40,7 +40,7 @@ FIELDS = {
     "XDR": "",
     "ZDA": "",
 }
-"""Sentence -> fields that are read, each with its unit, the field that gives its sign, and the one that must be valid."""
+"""Sentence -> fields that are read, each with its unit, the field that gives its sign, and that which must be valid."""
 PLACES = {name: {field: place for place, field in enumerate(NMEA_PAYLOADS_GET[name])} for name in FIELDS}
 INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}
 """Marks of a reading that is not valid."""
@@ -240,7 +240,9 @@ def _checked(bodies: Sequence[str]) -> Array:
     starts = np.cumsum([0, *map(len, texts)])[:-1]
     sums = np.bitwise_xor.reduceat(np.frombuffer(b"".join(texts), dtype=np.uint8), starts)
     said = [_hex(end) if star else None for _, star, end in parts]
-    return np.array([0 if value is None else 1 if value == own else -1 for value, own in zip(said, sums.tolist(), strict=True)])
+    return np.array(
+        [0 if value is None else 1 if value == own else -1 for value, own in zip(said, sums.tolist(), strict=True)]
+    )
 
 
 def _hex(text: str) -> int:

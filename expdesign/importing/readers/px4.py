@@ -44,7 +44,9 @@ def read_px4(path: Path, sample_time_s: float) -> Log:
         if data.name not in READ or len(data.data["timestamp"]) < 2:
             unused.append(topic)
             continue
-        own = {NAMES.get(key, key): np.asarray(data.data[key], dtype=float) for key in READ[data.name] if key in data.data}
+        own = {
+            NAMES.get(key, key): np.asarray(data.data[key], dtype=float) for key in READ[data.name] if key in data.data
+        }
         units = {f"{topic}.{NAMES.get(key, key)}": unit for key, unit in READ[data.name].items()}
         if "q[0]" in data.data:
             w, x, y, z = (np.asarray(data.data[f"q[{k}]"], dtype=float) for k in range(4))
@@ -67,5 +69,7 @@ def _clock(topics: list) -> tuple[float, str]:  # type: ignore[type-arg]
             utc = np.asarray(data.data["time_utc_usec"], dtype=float)
             known = utc > LEAST_UTC_US
             if known.any():
-                return float(np.median(utc[known] - np.asarray(data.data["timestamp"], dtype=float)[known])) * 1e-6, GNSS
+                return float(
+                    np.median(utc[known] - np.asarray(data.data["timestamp"], dtype=float)[known])
+                ) * 1e-6, GNSS
     return 0.0, OWN

@@ -134,8 +134,10 @@ def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
     if sentences.unchecked:
         yield f"used {counted(sentences.unchecked, 'sentence')} without a checksum"
     if other:
-        yield f"left out {counted(other, 'line')} that is no sentence" if other == 1 else (
-            f"left out {other} lines that are no sentences"
+        yield (
+            f"left out {counted(other, 'line')} that is no sentence"
+            if other == 1
+            else (f"left out {other} lines that are no sentences")
         )
 
 
@@ -289,9 +291,7 @@ class _Table:
             self.strange[column] += text.strip().lower() not in MISSING
             return np.nan
 
-    def columns(
-        self, stamps: Array, at: Array, sample_time_s: float
-    ) -> tuple[dict[str, Array], Array, str, list[str]]:
+    def columns(self, stamps: Array, at: Array, sample_time_s: float) -> tuple[dict[str, Array], Array, str, list[str]]:
         """Numbers by name, times of the rows, kind of clock, notes; rows are counted where nothing tells times."""
         names, notes = self.dialect.names, []
         if self.broken:
@@ -304,7 +304,7 @@ class _Table:
             times, clock = spread(place, stamps, at), GNSS
             how = "rows have no clock of their own, and are spread evenly between the satellite times around them"
         elif times is None and sample_time_s > 0:
-            times, clock = np.arange(len(place)) * sample_time_s, OWN
+            times, clock = np.asarray(np.arange(len(place)) * sample_time_s), OWN
             how = f"rows have no clock, and count as {sample_time_s:g} s apart, as the mapping says"
         elif times is None:
             how = (
@@ -315,7 +315,7 @@ class _Table:
             clock = NONE
         notes.append(how)
         values = {names[k]: self.blocks.joined(f"{k}") for k in self._of("number") if k not in taken}
-        return values, times, clock, notes
+        return values, np.asarray(times), clock, notes
 
     def _times(self) -> tuple[set[int], Array | None, str, str]:
         """Columns that are times, the times, kind of clock, and how they were read."""
@@ -324,8 +324,11 @@ class _Table:
             day, second = self.blocks.joined(f"{k}|day"), self.blocks.joined(f"{k}|second")
             self.time_name = self.dialect.names[k]
             clock = GNSS if re.search(r"\b(gps|gnss|utc)\b", names[k]) else COMPUTER
-            return {k, *self._of("both"), *self._of("date"), *self._of("clock")}, day * DAY_S + second, clock, (
-                f"time is {self.time_name}, date and time"
+            return (
+                {k, *self._of("both"), *self._of("date"), *self._of("clock")},
+                day * DAY_S + second,
+                clock,
+                (f"time is {self.time_name}, date and time"),
             )
         if clocks := self._of("clock"):
             second = over_midnight(self.blocks.joined(f"{clocks[0]}|second"))
@@ -333,7 +336,12 @@ class _Table:
             if dates := self._of("date"):
                 day = self.blocks.joined(f"{dates[0]}|day")
                 whole = np.where(np.isfinite(day), day, np.nan) * DAY_S + second % DAY_S
-                return {*clocks, *dates}, whole, COMPUTER, f"time is {self.dialect.names[dates[0]]} and {self.time_name}"
+                return (
+                    {*clocks, *dates},
+                    whole,
+                    COMPUTER,
+                    f"time is {self.dialect.names[dates[0]]} and {self.time_name}",
+                )
             return {*clocks}, second, OWN, f"time is {self.time_name}, a time of day without a date"
         numbers = [k for k in self._of("number") if TIME_NAME.search(names[k]) or names[k].startswith("time")]
         for k in numbers:
@@ -351,5 +359,3 @@ class _Table:
 def is_text(path: Path, head: bytes) -> bool:
     """Whether a file may be text: the last reader that is asked."""
     return True
-
-

@@ -154,7 +154,8 @@ def import_logs(
         _leave_mapping(none, folder, mapping, read, notes, command)
         raise none
     content = ImportContent(
-        logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts), rejected=tuple(rejected),
+        logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts),
+        rejected=tuple(rejected),
         followed=followed(table), sensors=sensor_keys(table, found.held_s), notes=tuple(notes),
         origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
         version=__version__,
@@ -187,7 +188,9 @@ def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Deci
             raise FileError(path, f"channel[{number}].file", f"is {use.file!r}, expected one of {', '.join(there)}")
         if use.channel not in there[use.file]:
             listed = ", ".join(there[use.file][:12]) or "no channel with a time"
-            raise FileError(path, f"channel[{number}].channel", f"is {use.channel!r}, which {use.file} has not; it has {listed}")
+            raise FileError(
+                path, f"channel[{number}].channel", f"is {use.channel!r}, which {use.file} has not; it has {listed}"
+            )
     named = {(use.file, use.channel) for use in mapping.uses}
     rest = [
         replace(mapping.uses[0], file=log.source, channel=channel.name, column="", unit="", scale=1.0, offset=0.0,
@@ -211,7 +214,7 @@ def _columns(logs: Sequence[Log], mapping: Decisions) -> dict[str, dict[str, Cha
     if not any(found.values()):
         names = ", ".join(channel.name for log in logs for channel in log.channels) or "none"
         raise NothingToWrite(
-            f"no channel is a quantity that is read, so that there is no record to write; the channels are {names[:400]}"
+            f"no channel is a quantity that is read, so that there is no record to write; channels are {names[:400]}"
         )
     return found
 
@@ -232,12 +235,14 @@ def _one_time_scale(
     if not placed or not any(columns[log.source] for log in placed):
         names = ", ".join(log.source for log in order)
         raise NothingToWrite(
-            f"{names}: rows have no clock, so that they are no record; where they are evenly spaced, give sample_time_s "
-            "under [[file]] in the mapping"
+            f"{names}: rows have no clock, so that they are no record; where they are evenly spaced, give "
+            "sample_time_s under [[file]] in the mapping"
         )
     for log in order:
         if log not in placed:
-            notes.append(f"{log.source}: not used, as its rows have no clock (sample_time_s under [[file]] in the mapping)")
+            notes.append(
+                f"{log.source}: not used, as its rows have no clock (sample_time_s under [[file]] in the mapping)"
+            )
             continue
         own, clock = columns[log.source], clocks.get(log.source, FileClock(file=log.source))
         if table and own and not (stated and log.source in clocks):
@@ -245,8 +250,8 @@ def _one_time_scale(
             lag = lag_of(own, table, near=near)
             if lag is None and not near:
                 raise NothingToWrite(
-                    f"{log.source} has {log.clock} and saw nothing that another log saw (turn, speed, roll, rudder), so "
-                    f"that its times cannot be set: expected offset_s under [[file]] in the mapping"
+                    f"{log.source} has {log.clock} and saw nothing that another log saw (turn, speed, roll, rudder), "
+                    f"so that its times cannot be set: expected offset_s under [[file]] in the mapping"
                 )
             if lag is None:
                 notes.append(f"{log.source}: {log.clock}, taken as it stands: nothing that both logs saw checks it")
@@ -328,7 +333,9 @@ def _tried(
                 )  # fmt: skip
             except (FileError, InputError) as error:
                 what = f"{error.key} {error.problem}" if isinstance(error, FileError) else str(error)
-                refused.append((f"from {begins:.0f} s on, {len(run.stretch) * found.sample_time_s:.0f} s", what.strip()))
+                refused.append(
+                    (f"from {begins:.0f} s on, {len(run.stretch) * found.sample_time_s:.0f} s", what.strip())
+                )
                 continue
             own = [replace(batch, name=batch.name.replace(path.name, f"run {k}")) for batch in record.batches]
             label = run.family or family(taken, own[0])
@@ -394,11 +401,15 @@ def _steered(content: ImportContent) -> bool:
 
 
 def _tables(content: ImportContent) -> tuple[TextTable, ...]:
-    tables = [
+    tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]] = [
         ("Channels that are used", ("column", "channel", "unit", "times", "why"), channel_rows(content)),
         ("Not used", ("log", "channel", "why"), unused_rows(content)),
         ("Runs", ("file", "what", "begins", "lasts s", "approach s"), run_rows(content)),
-        ("Rejected", ("where", "why"), list(content.rejected)),
-        ("How actuators follow their orders", ("signal", "rate", "lag s", "dead time s", "left"), response_rows(content)),
+        ("Rejected", ("where", "why"), [*content.rejected]),
+        (
+            "How actuators follow their orders",
+            ("signal", "rate", "lag s", "dead time s", "left"),
+            response_rows(content),
+        ),
     ]
     return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
