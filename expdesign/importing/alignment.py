@@ -1,7 +1,7 @@
 """Clocks of several files: how much later one runs than another, from what both saw, with its standard error.
 
 Where both measured the same (a turn, a speed) the lag of the largest correlation is taken. Where one has only the
-rudder and the other the turn, the lag at which the rudder explains most of the change of the yaw rate beside that rate itself,
+rudder and the other the turn, the lag at which the rudder explains most of the change of the yaw rate beside that rate,
 r' / u^2 = b r / u + k rudder(t - lag), with speed u: the ship's own slowness is in b then, and not in the lag.
 
 Both are found on the whole overlap, and again in blocks of it, whose spread gives the standard error.

@@ -65,6 +65,7 @@ class Reader:
     """One format."""
 
     name: str  # for messages
+    meaning: str  # what is read of it
     fits: Callable[[Path, bytes], bool]  # whether a file that begins with these bytes is of this format
     read: Callable[[Path, float], Log]  # file, and time between rows where it has no clock (0 for unknown) -> log
     extra: str = ""  # of this package, which has to be installed

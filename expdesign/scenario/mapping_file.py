@@ -13,6 +13,7 @@ from expdesign.importing.units import FACTORS, SHARES
 from expdesign.records.file import Source, is_input, meaning
 from expdesign.scenario.tables import Entry, NonNegative, Number, Table, Text, check_table, read_toml
 
+COLUMNS_BESIDE = EXTRA_COLUMNS
 UNITS = ", ".join(dict.fromkeys(unit for table in FACTORS.values() for unit in table if unit.isascii() and unit))
 
 

@@ -29,20 +29,41 @@ def _head(path: Path) -> bytes:
 
 
 READERS = (
-    Reader(name="PX4 ULog", fits=_begins(b"ULog\x01\x12\x35"), read=read_px4, extra="logs"),
-    Reader(name="ROS bag or MCAP", fits=is_ros, read=read_ros, extra="logs"),
-    Reader(name="ArduPilot log", fits=is_ardupilot, read=read_ardupilot, extra="logs"),
-    Reader(name="Parquet", fits=_begins(b"PAR1"), read=read_parquet, extra="logs"),
-    Reader(name="Excel (.xlsx)", fits=_begins(b"PK\x03\x04"), read=read_excel, extra="logs"),
-    Reader(name="MATLAB file", fits=_begins(b"MATLAB 5.0"), read=read_matlab, extra=""),
     Reader(
-        name="MATLAB 7.3 file",
-        fits=lambda path, head: head.startswith(b"MATLAB 7.3") or head.startswith(b"\x89HDF"),
-        read=read_matlab73,
+        name="PX4 ULog", meaning="positions, velocities, attitude, rates and outputs, by pyulog",
+        fits=_begins(b"ULog\x01\x12\x35"), read=read_px4, extra="logs",
+    ),
+    Reader(
+        name="ROS bag or MCAP", meaning="bags of ROS 1 and folders of ROS 2, by rosbags; axes of REP 103 are turned",
+        fits=is_ros, read=read_ros, extra="logs",
+    ),
+    Reader(
+        name="ArduPilot log", meaning=".bin and .log of the board, .tlog of the telemetry, by pymavlink",
+        fits=is_ardupilot, read=read_ardupilot, extra="logs",
+    ),
+    Reader(
+        name="Parquet", meaning="a table with a column of times, by pyarrow", fits=_begins(b"PAR1"), read=read_parquet,
         extra="logs",
     ),
-    Reader(name="text: CSV of any dialect, NMEA 0183", fits=is_text, read=read_text, extra=""),
-)
+    Reader(
+        name="Excel", meaning="the first sheet of a .xlsx, read as the text that it shows, by openpyxl",
+        fits=_begins(b"PK\x03\x04"), read=read_excel, extra="logs",
+    ),
+    Reader(
+        name="MATLAB", meaning="vectors, matrices and structures of them, up to version 7, by scipy",
+        fits=_begins(b"MATLAB 5.0"), read=read_matlab,
+    ),
+    Reader(
+        name="MATLAB 7.3", meaning="the same of version 7.3, and other HDF5, by h5py",
+        fits=_begins(b"MATLAB 7.3", b"\x89HDF"), read=read_matlab73, extra="logs",
+    ),
+    Reader(
+        name="text",
+        meaning="tables with any separator, decimal sign, header and clock; NMEA 0183, also behind times of reception, "
+        "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; both in one file",
+        fits=is_text, read=read_text,
+    ),
+)  # fmt: skip
 """All formats; what no other one begins like may be text."""
 OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 
