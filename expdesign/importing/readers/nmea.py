@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import date, timedelta
 
 import numpy as np
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
 
 from expdesign.importing.channels import DAY_S, Blocks, Channel, epochs, spread
-from expdesign.importing.times import over_midnight, read_numbers, read_stamps
+from expdesign.importing.times import over_midnight, read_numbers, read_stamps, tells_month_first
 from expdesign.values import Array
 
 FIELDS = {
@@ -48,6 +49,12 @@ TIMED = ("RMC", "GGA", "GNS", "GLL", "ZDA")
 WIND_UNITS = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}
 XDR_UNITS = {"D": "deg", "M": "m", "N": "", "P": "percent"}
 SENTENCE = re.compile(r"[$!]([A-Z]{2,4}[A-Z]{3}|P[A-Z0-9]+),")
+DATE_AND_TIME = re.compile(
+    r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4})[T ,;_\t]+"
+    r"(\d{1,2}:\d{2}:\d{2}(?:\.\d*)?\s*(?:Z|[+-]\d{2}:?\d{2})?)"
+)
+TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:\.\d*)?")
+DAY_OF_YEAR = re.compile(r"\b(\d{4}):(\d{3}):(\d{2}:\d{2}:\d{2}(?:\.\d+)?)")
 TAG_TIME = re.compile(r"\\[^\\]*\bc:(\d{9,16})[^\\]*\\")
 
 
@@ -125,7 +132,7 @@ class Sentences:
             self.blocks.add(f"{name}|{unit}|place", places)
             self.blocks.add(f"{name}|{unit}|value", values)
 
-    def _by_shaft(self, name: str, rows: list[list[str]], places: Array, column: object) -> None:
+    def _by_shaft(self, name: str, rows: list[list[str]], places: Array, column: Callable[[str], list[str]]) -> None:
         """Revolutions of each engine or shaft by its number: odd ones are to starboard, even ones to port."""
         values = _numbers([row[2] if len(row) > 2 else "" for row in rows])
         good = np.isfinite(values) & ~np.isin([row[4] if len(row) > 4 else "" for row in rows], list(INVALID))
@@ -150,18 +157,18 @@ class Sentences:
         for (label, unit), pairs in found.items():
             self._keep(f"{name}.{label}", unit, *np.array(pairs).T)
 
-    def _anchor(self, kind: str, places: Array, column: object) -> None:
+    def _anchor(self, kind: str, places: Array, column: Callable[[str], list[str]]) -> None:
         """Times of day, with the date where the sentence has it."""
-        clock = _numbers(column("time"))  # type: ignore[operator]
+        clock = _numbers(column("time"))
         second = np.floor(clock / 1e4) * 3600.0 + np.floor(clock / 100 % 100) * 60.0 + clock % 100.0
         day = np.full(len(clock), np.nan)
         if kind == "RMC":
-            date = _numbers(column("date"))  # type: ignore[operator]
+            dates = _numbers(column("date"))
             texts = [f"{2000 + d % 100 if d % 100 < 80 else 1900 + d % 100}-{d // 100 % 100:02}-{d // 10000:02}"
-                     if d == d else "" for d in (int(x) if x == x else np.nan for x in date)]  # fmt: skip
+                     if d == d else "" for d in (int(x) if x == x else np.nan for x in dates)]  # fmt: skip
             day = read_stamps(texts).day
         elif kind == "ZDA":
-            parts = [column(field) for field in ("year", "month", "day")]  # type: ignore[operator]
+            parts = [column(field) for field in ("year", "month", "day")]
             day = read_stamps(["-".join(row) for row in zip(*parts, strict=True)]).day
         self.blocks.add("anchor|place", places)
         self.blocks.add("anchor|second", second)
@@ -175,8 +182,8 @@ class Sentences:
         if any(tags):
             values = np.array([float(tag[1]) if tag else np.nan for tag in tags])
         else:
-            texts = [re.split(r"[,;\t]|\s(?=\D)", text.strip(" ,;\t\"'[]"))[0].strip(" \"'[]") for text in prefixes]
-            stamps = read_stamps(texts)
+            texts = [_stamp_in(text) for text in prefixes]
+            stamps = read_stamps(texts, day_first=not tells_month_first(texts))
             day = np.where(np.isfinite(stamps.day), stamps.day, 0.0)
             values = day * DAY_S + stamps.second
             if not np.isfinite(values).any():
@@ -216,6 +223,17 @@ class Sentences:
                 values = self.blocks.joined(key)[known]
                 found.append(Channel(name=name, source=self.source, unit=unit, time_s=time_s[known], values=values))
         return found
+
+
+def _stamp_in(prefix: str) -> str:
+    """Date and time, the time of day or the number before a sentence, whatever is around it; "" for none."""
+    if found := DAY_OF_YEAR.search(prefix):
+        day = date(int(found[1]), 1, 1) + timedelta(days=int(found[2]) - 1)
+        return f"{day.isoformat()} {found[3]}"
+    if found := DATE_AND_TIME.search(prefix):
+        return f"{found[1]} {found[2]}"
+    found = TIME_OF_DAY.search(prefix) or re.search(r"\d+(?:\.\d+)?", prefix)
+    return found[0] if found else ""
 
 
 def _numbers(texts: Sequence[str]) -> Array:

@@ -224,7 +224,9 @@ class _Table:
     time_name: str = "time"
 
     def __post_init__(self) -> None:
-        self.month_first = tells_month_first(re.split("[,;\t ]", " ".join(self.sample)))
+        cells = re.split("[,;\t ]", " ".join(self.sample))
+        self.month_first = tells_month_first(cells)
+        self.ambiguous = next(filter(re.compile(r"(0?\d|1[0-2])[-/](0?\d|1[0-2])[-/]\d{4}").fullmatch, cells), "")
         rows = [row for line in self.sample if (row := next(iter(self.dialect.rows([line])), []))]
         rows = [row for row in rows[self.dialect.header :] if len(row) == len(self.dialect.names)]
         self.kinds = [self._kind([row[k] for row in rows]) for k in range(len(self.dialect.names))]
@@ -299,6 +301,8 @@ class _Table:
         for column, count in (+self.strange).items():
             notes.append(f"left out {counted(count, 'cell')} of {names[column]} without a number")
         taken, times, clock, how = self._times()
+        if self.ambiguous and not self.month_first:
+            notes.append(f"dates such as {self.ambiguous} are read with the day first")
         place = self.blocks.joined("place")
         if times is None and len(stamps) > 1:
             times, clock = spread(place, stamps, at), GNSS

@@ -43,8 +43,8 @@ LOADS = (
 )
 MAPPINGS = (
     "expdesign import writes one, mapping.toml, with what it guessed from names, units and readings; changed, it is "
-    "given as --map. column = (readings in the unit) scale + offset. A channel that the file does not name is not used. "
-    "Of percent, share and pwm (1000 to 2000 us, 1500 in the middle) scale is what the largest order is."
+    "given as --map. column = (readings in the unit) scale + offset. A channel that the file does not name is not "
+    "used. Of percent, share and pwm (1000 to 2000 us, 1500 in the middle) scale is what the largest order is."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
