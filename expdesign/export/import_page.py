@@ -260,7 +260,7 @@ def _track(content: ImportContent) -> Markup:
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
     light_grid(axes)
-    if 0 < len(content.runs) <= 8:
+    if 0 < len(content.runs) <= 8 and axes.lines:
         axes.legend(fontsize=8)
     return svg(figure, key="track", label="way over ground with the runs")
 

@@ -35,9 +35,9 @@ RULES = (
     ("wind_angle_rad", 0, r"\bawa\b|mwv angle r\b|(rel\w*|app\w*|vane)?.*wind (angle|dir\w*)"),
     ("wind_speed_mps", 0, r"\baws\b|mwv speed r\b|(rel\w*|app\w*)?.*wind (speed|spd)"),
     ("lat_deg", 0, r"\b(gga|gns|gps|fix|global position)\b.*\b(lat\w*)\b"),
-    ("lat_deg", 1, r"\b(lat|latitude|breite)\b"),
+    ("lat_deg", 1, r"\b(lat|latitude|breite|breitengrad)\b"),
     ("lon_deg", 0, r"\b(gga|gns|gps|fix|global position)\b.*\b(lon\w*|lng)\b"),
-    ("lon_deg", 1, r"\b(lon|lng|long|longitude|laenge)\b"),
+    ("lon_deg", 1, r"\b(lon|lng|long|longitude|laenge|lange|langengrad)\b"),
     ("roll_rate_radps", 0, r"\b(roll ?(rate|speed)|rollspeed|gyr\w* x|angular velocity x|xgyro|gx|rx)\b"),
     ("r_radps", 0, r"\b(rot|rate of turn|yaw ?rate|yawspeed|turn rate|r)$|\brot\b"),
     ("r_radps", 1, r"\b(gyr\w* z|angular velocity z|zgyro|gz|rz)\b"),
@@ -45,6 +45,7 @@ RULES = (
     ("imu_lateral_mps2", 0, r"\b(acc\w* y|linear acceleration y|yacc|ay|lateral acceleration)\b"),
     (MAGNETIC, 2, r"\bheading m\b|\bhdg m\b|\bmagnetic heading\b|\bheading mag\w*\b"),
     (VARIATION, 0, r"\b(variation|mv|declination|magvar)\b"),
+    (COG, 0, r"\b(kurs uber grund|course over ground|course made good)\b"),
     ("heading_rad", 0, r"\b(heading t|headt|true heading|hdt|ths|gyro heading)\b"),
     ("heading_rad", 1, r"\b(att|attitude) (yaw|heading)\b|\b(heading|hdg|psi|kurs|hdg t)\b"),
     ("heading_rad", 2, r"\b(yaw|compass|gyro)\b"),
@@ -52,16 +53,20 @@ RULES = (
     (NORTHWARD, 0, r"\b(vn|vel n|v north|velocity north)\b|\blocal position ned vx\b|global position int vx"),
     (EASTWARD, 0, r"\b(ve|vel e|v east|velocity east)\b|\blocal position ned vy\b|global position int vy"),
     (SOG, 0, r"\b(sogn|sog|speed over ground|ground ?speed|gps speed|gps spd|rmc spd)\b"),
-    (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit)$"),
+    (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit( uber grund)?|velocity|groundspeed)$"),
     ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge speed)$"),
     ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway speed)$"),
     ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth|tiefe)\b"),
     ("north_m", 2, r"\b(north|northing|pn)\b"),
     ("east_m", 2, r"\b(east|easting|pe)\b"),
-    ("rudder", 0, r"\b(rudder\d*|rsa|rud|helm|steering|ruder|nozzle|roer)\b"),
+    ("rudder", 0, r"\b(rudder\d*|rsa|rud|helm|steering|ruder|ruderlage|ruderwinkel|nozzle|roer)\b"),
     ("a", 0, r"\b(azi|azimuth|azim|pod angle|thruster angle|azi angle)\b"),
-    ("n", 0, r"\b(rpm\d*|rps|revs|revolutions|shaft speed|prop(eller)? speed)\b|(^|\s)n( ?\d+)?$"),
-    ("throttle", 0, r"\b(throttle|thrust|engine order|power lever|lever)\b"),
+    (
+        "n",
+        0,
+        r"\b(rpm\d*|rps|drehzahl|revs|revolutions|shaft speed|prop(eller)? speed)\b|^(?!.*\bpos).*(^|\s)n( ?\d+)?$",
+    ),
+    ("throttle", 0, r"\b(throttle|thrust|thruster|motor|engine order|power lever|lever)\b"),
 )
 """Column, or kind of actuator signal, and rank of the pattern among those of a column; the first that fits counts. The
 first column of all, "", is of what is no measurement of the ship's own motion."""
@@ -76,6 +81,7 @@ RADIANS = {"heading_rad": 6.4, MAGNETIC: 6.4, COG: 6.4, "roll_rad": 1.6, "rudder
 """Largest size of an angle in radians, by column or kind."""
 BESIDE = ("roll_rad", "roll_rate_radps", "depth_m", "wind_speed_mps", "wind_angle_rad", "imu_lateral_mps2")
 """Columns that a record does without: one that is the same in all rows is no reading."""
+MOST_DEGREES = {"lat_deg": 90.0, "lon_deg": 180.0}
 FINE_DEG, MOSTLY = 1e-3, 0.5
 """Usual change of a coordinate below which it is in degrees; share of negative ones among heights."""
 DECIMALS = 2  # most decimals of an angle that is taken for degrees
@@ -109,6 +115,9 @@ class Use:
     def applied(self, channel: Channel) -> Channel:
         """The channel in the column's unit."""
         values = channel.values - (1500.0 if self.unit == "pwm" else 0.0)
+        if self.unit == "ddmm":  # degrees and minutes run together
+            size = np.abs(values)
+            values = np.sign(values) * (np.floor(size / 100.0) + size % 100.0 / 60.0)
         values = values * self.factor * self.scale + self.offset
         return replace(channel, name=self.column, unit="", values=values)
 
@@ -294,10 +303,11 @@ def _used(channel: Channel, mark: _Mark, channels: Sequence[Channel], chosen: di
         return replace(
             use, unit=unit, why=f"its name; {unit} as stated" if mark.unit else f"its name; size {largest:.3g}"
         )
-    if kind == "place" and largest > 1000.0:
-        return replace(use, unit="1e-7 deg", why="its name; in units of 1e-7 degrees")
-    if kind in ("place", "length", "acceleration"):
-        return replace(use, unit=mark.unit or {"place": "deg", "length": "m", "acceleration": "mps2"}[kind])
+    if kind == "place":
+        unit, why = _place_unit(mark.column, channel.values)
+        return replace(use, unit=unit, why=f"its name{why}")
+    if kind in ("length", "acceleration"):
+        return replace(use, unit=mark.unit or {"length": "m", "acceleration": "mps2"}[kind])
     if kind == "rate":
         return _by_fit(use, _turning(channel, channels, chosen), ("degpmin", "degps", "radps"), mark.unit,
                        usual="degpmin" if re.search(r"\brot\b", mark.name)
@@ -317,6 +327,16 @@ def _used(channel: Channel, mark: _Mark, channels: Sequence[Channel], chosen: di
         )
         return replace(use, unit=unit, why=f"its name; up to {largest:.4g}, so {unit}")
     return replace(use, unit="mps")
+
+
+def _place_unit(column: str, values: Array) -> tuple[str, str]:
+    """Unit of a latitude or longitude, by its size, and words on it."""
+    largest, most = float(np.abs(values).max()), MOST_DEGREES[column]
+    if largest <= most:
+        return "deg", ""
+    if largest < 100.0 * most:
+        return "ddmm", "; degrees and minutes run together (scale = -1.0 for S or W)"
+    return "1e-7 deg", "; in units of 1e-7 degrees"
 
 
 def _of_depth(use: Use, channel: Channel) -> Use:
@@ -386,9 +406,11 @@ def _going(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str
     lat, lon = (next((c for key, c in chosen.items() if key[0] == name), None) for name in ("lat_deg", "lon_deg"))
     if lat is None or lon is None or len(lat) != len(lon) or lat.source != channel.source:
         return None
-    scale = 1e-7 if np.abs(lat.values).max() > 1000 else 1.0
-    north, east = 111195.0 * scale * lat.values, 111195.0 * scale * lon.values
-    east = east * np.cos(np.radians(scale * lat.values[0]))
+    lat_deg, lon_deg = (
+        Use(file="", channel="", column=name, unit=_place_unit(name, one.values)[0]).applied(one).values
+        for name, one in (("lat_deg", lat), ("lon_deg", lon))
+    )
+    north, east = 111195.0 * lat_deg, 111195.0 * lon_deg * np.cos(np.radians(lat_deg[0]))
     times, step = _common(channel, lat)
     if times is None:
         return None
@@ -431,7 +453,8 @@ def _numbered(
     table = {(c.source, c.name): c for c in channels}
     shares = any(use.unit in SHARES for use, _ in own)
     forces = not actuators or any(one.kind == "force" for one in actuators)
-    as_forces = shares and forces and not any(mark.column in ("n", "a") for _, mark in own)
+    throttles = {mark.machine for _, mark in own if mark.column == "throttle"}
+    as_forces = shares and forces and len(throttles) < 2 and not any(mark.column in ("n", "a") for _, mark in own)
     machines = sorted({mark.machine for _, mark in own if mark.column != "rudder"}, key=_as_listed)
     rudders = sorted({mark.machine for _, mark in own if mark.column == "rudder"}, key=_as_listed)
     turning = {mark.machine for _, mark in own if mark.column == "a"}

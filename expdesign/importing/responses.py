@@ -107,13 +107,19 @@ def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     floor_s = step_s / math.sqrt(12.0 * moves)
     rate = math.exp(value["rate"]) if "rate" in value else math.inf
 
+    # the same, as a share of the time that a usual change takes
+    usual_s = (
+        float(np.median(np.abs(np.diff(orders))[changes[changes < cut] - 1])) / rate if rate < math.inf else math.inf
+    )
+    late = order_step_s / math.sqrt(12.0 * moves) / max(usual_s, step_s)
+
     def told(part: str) -> tuple[float, float] | None:
         own = math.hypot(std.get(part, 0.0), floor_s)
         return (value[part], own) if part in value and value[part] > CERTAIN * own else None
 
     return Followed(
         signal=name.removesuffix("_rps").removesuffix("_rad"),
-        rate=(rate, rate * std["rate"]) if math.isfinite(rate) else None,
+        rate=(rate, rate * math.hypot(std["rate"], late)) if math.isfinite(rate) else None,
         lag_s=told("lag"), delay_s=told("delay"), offset=offset, rest=rest, moves=moves,
     )  # fmt: skip
 

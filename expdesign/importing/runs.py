@@ -114,7 +114,7 @@ def _acts(stretch: Stretch, inputs: Mapping[str, Array], pause: int) -> np.ndarr
         two = max(1, pause // 5)
         later, sooner = np.r_[drive[two:], np.full(two, drive[-1])], np.r_[np.full(two, drive[0]), drive[:-two]]
         changed = np.abs(later - sooner) > DRIVE_SHARE * size
-        acts |= changed | (np.abs(sides - np.median(sides)) > DRIVE_SHARE * size)
+        acts |= changed | (np.abs(sides - np.quantile(sides, 0.2)) > DRIVE_SHARE * size)
         u = stretch.columns.get("u_mps")
         if u is not None:
             smooth = scipy.ndimage.uniform_filter1d(u, pause)
@@ -306,7 +306,12 @@ def family(ship: Vessel, batch: Batch) -> str:
     if not moved:
         return "steady"
     if not helm:
-        return "changes of speed"
+        apart = np.ptp(
+            [values for name, values in zip(batch.input_names, batch.inputs.T, strict=True) if name in moved], axis=0
+        )
+        return (
+            "helm by propellers" if np.ptp(apart) > DRIVE_SHARE * max(float(apart.max()), 1e-9) else "changes of speed"
+        )
     return "helm" if len(helm) == len(moved) else "helm and speed"
 
 

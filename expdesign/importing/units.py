@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 
 from expdesign.records.file import ANGLE, REVOLUTIONS, SPEED, YAW_RATE
 
@@ -13,7 +14,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "speed": {**SPEED, "m/sec": 1.0, "mm/s": 1e-3, "km/hr": 1.0 / 3.6, "mph": 0.44704},
     "rate": {**YAW_RATE, "°/s": DEGREE, "°/min": DEGREE / 60.0, "deg/sec": DEGREE, "degrees/s": DEGREE,
              "deg/m": DEGREE / 60.0, "rad/sec": 1.0, "mrad/s": 1e-3, "r/s": 1.0},
-    "place": {"deg": 1.0, "°": 1.0, "degrees": 1.0, "degree": 1.0, "rad": 1.0 / DEGREE, "1e-7 deg": 1e-7},
+    "place": {"deg": 1.0, "°": 1.0, "degrees": 1.0, "degree": 1.0, "rad": 1.0 / DEGREE, "1e-7 deg": 1e-7, "ddmm": 1.0},
     "length": {"m": 1.0, "km": 1e3, "cm": 0.01, "mm": 1e-3, "ft": 0.3048, "meters": 1.0, "metres": 1.0, "nm": 1852.0},
     "revolutions": {**REVOLUTIONS, "1/s": 1.0, "r/min": 1.0 / 60.0, "u/min": 1.0 / 60.0, "min-1": 1.0 / 60.0},
     "acceleration": {"mps2": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "m/s/s": 1.0, "g": 9.80665, "mg": 9.80665e-3},
@@ -31,6 +32,7 @@ ALIASES = {"kt": "kn", "kts": "kn", "knots": "kn", "knot": "kn", "degrees": "deg
 
 def words(name: str) -> str:
     """A name in lower case words: `RPM_P` -> "rpm p", `ATT.DesYaw` -> "att des yaw"."""
+    name = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
     apart = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
     return " ".join(re.findall(r"[a-z]+|\d+", apart.lower().replace("²", "2")))
 

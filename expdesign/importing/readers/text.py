@@ -27,6 +27,11 @@ BLOCK_BYTES = 1 << 22  # read at once
 SNIFFED = 400  # lines that a dialect is told from
 SEPARATORS = (";", "\t", "|", ",", " ")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?\s*")
+PLACE = re.compile(
+    r"\s*([+-]?\d{1,3}(?:[.,]\d+)?)\s*(?:[°ºd:\s]\s*(\d{1,2}(?:[.,]\d+)?)\s*['m:\s]?)?"
+    r"\s*(?:(\d{1,2}(?:[.,]\d+)?)\s*[\"″s]?)?\s*([NSEWO])\s*"
+)
+"""A latitude or longitude with its side, as `54°30.12'N`."""
 COMMENT = "#%/"
 SHARE = 0.5  # of cells of a row of data that are numbers or times
 TEXTS_SHOWN = 3
@@ -194,6 +199,7 @@ def _decimal_commas(lines: Sequence[str], separator: str) -> bool:
 def _is_data(row: Sequence[str], comma: bool) -> bool:
     filled = [cell for cell in row if cell.strip()]
     known = sum(bool(NUMBER.fullmatch(cell)) for cell in filled)
+    known += sum(bool(PLACE.fullmatch(cell)) for cell in filled)
     known += sum(bool(np.isfinite([*read_stamps([cell]).day, *read_stamps([cell]).second]).any()) for cell in filled)
     return len(filled) > 0 and known >= max(1.0, SHARE * len(filled)) and known > 0
 
@@ -232,6 +238,7 @@ class _Table:
         self.kinds = [self._kind([row[k] for row in rows]) for k in range(len(self.dialect.names))]
         self.first = self.dialect.header
         self.shown = {k: list(dict.fromkeys(row[k].strip() for row in rows)) for k in self._of("text")}
+        self.letters = {k: "".join(row[k][-1:] for row in rows) for k in self._of("place")}
         self.units = {
             name: unit for name, unit in zip(self.dialect.names, self.dialect.units, strict=True) if unit
         }  # fmt: skip
@@ -240,10 +247,16 @@ class _Table:
         filled = [cell for cell in cells if cell.strip().lower() not in MISSING]
         if not filled or sum(bool(NUMBER.fullmatch(cell)) for cell in filled) > SHARE * len(filled):
             return "number"
+        if sum(bool(PLACE.fullmatch(cell)) for cell in filled) > SHARE * len(filled):
+            return "place"
         return read_stamps(filled).kind or "text"
 
     def _of(self, kind: str) -> list[int]:
         return [k for k, own in enumerate(self.kinds) if own == kind]
+
+    def _side(self, column: int) -> str:
+        """What a column of places holds, by the letters in its cells."""
+        return "latitude" if any(letter in self.letters[column] for letter in "NS") else "longitude"
 
     def texts(self) -> list[str]:
         """Columns of texts, with some of these."""
@@ -273,6 +286,8 @@ class _Table:
         for k, kind in enumerate(self.kinds):
             if kind == "number":
                 self.blocks.add(f"{k}", self._numbers(k, columns[k]))
+            elif kind == "place":
+                self.blocks.add(f"{k}", [_degrees(text) for text in columns[k]])
             elif kind != "text":
                 stamps = read_stamps(columns[k], day_first=not self.month_first)
                 self.blocks.add(f"{k}|day", stamps.day)
@@ -319,6 +334,7 @@ class _Table:
             clock = NONE
         notes.append(how)
         values = {names[k]: self.blocks.joined(f"{k}") for k in self._of("number") if k not in taken}
+        values |= {f"{names[k]} ({self._side(k)})": self.blocks.joined(f"{k}") for k in self._of("place")}
         return values, np.asarray(times), clock, notes
 
     def _times(self) -> tuple[set[int], Array | None, str, str]:
@@ -358,6 +374,15 @@ class _Table:
             self.time_name = self.dialect.names[k]
             return {k}, times, clock, f"time is {self.time_name}, {how}"
         return set(), None, NONE, ""
+
+
+def _degrees(text: str) -> float:
+    """Of a latitude or longitude with its side, nan where it is none."""
+    found = PLACE.fullmatch(text)
+    if found is None:
+        return float("nan")
+    parts = [float((part or "0").replace(",", ".")) for part in found.groups()[:3]]
+    return (parts[0] + parts[1] / 60.0 + parts[2] / 3600.0) * (-1.0 if found[4] in "SW" else 1.0)
 
 
 def is_text(path: Path, head: bytes) -> bool:
