@@ -21,6 +21,7 @@ from logged_trial import (
     START_S,
     Voyage,
     nmea,
+    sentence,
     voyage,
     write_ardupilot,
     write_dialect,
@@ -167,6 +168,45 @@ def test_columns_of_sentences_are_those_of_the_librarys_parser(tmp_path: Path, t
         theirs = [getattr(one, field) for one in parsed if one.identity == name.partition(".")[0]]
         assert np.abs(own[name] - theirs).max() < 1e-9, name  # the library rounds to ten decimals
     assert np.all(own["HCHDG.variation"] == -7.5)
+
+
+SENTENCES = {
+    "IIRSA,-12.3,A,4.5,A": {"IIRSA.stbdangle": -12.3, "IIRSA.portangle": 4.5},
+    "IIRSA,-12.3,V,4.5,A": {"IIRSA.portangle": 4.5},
+    "IIRPM,S,1,-120.5,80,A": {"IIRPM.rpm shaft 1 starboard": -120.5},
+    "IIRPM,E,2,1500,80,A": {"IIRPM.rpm engine 2 port": 1500.0},
+    "TIROT,-45.7,A": {"TIROT.rot": -45.7},
+    "TIROT,-45.7,V": {},
+    "HEHDT,271.25,T": {"HEHDT.headingT": 271.25},
+    "HETHS,271.25,A": {"HETHS.headt": 271.25},
+    "HCHDG,98.3,2.0,E,12.6,W": {"HCHDG.headingM": 98.3, "HCHDG.variation": -12.6, "HCHDG.deviation": 2.0},
+    "HCHDM,98.3,M": {"HCHDM.headingM": 98.3},
+    "GPVTG,54.7,T,34.4,M,5.5,N,10.2,K,A": {"GPVTG.cogt": 54.7, "GPVTG.sogn": 5.5},
+    "VDVBW,12.5,0.25,A,13.1,-0.5,A,,,,": {
+        "VDVBW.longwaterspd": 12.5, "VDVBW.transwaterspd": 0.25, "VDVBW.longgroundspd": 13.1,
+        "VDVBW.transgroundspd": -0.5,
+    },
+    "VWVHW,120.5,T,118.0,M,5.0,N,9.26,K": {"VWVHW.hdgT": 120.5, "VWVHW.hdgM": 118.0, "VWVHW.spdN": 5.0},
+    "GNGNS,122310.2,3722.425671,S,12258.856215,W,DAAA,14,0.9,1005.543,6.5,,,S": {
+        "GNGNS.lat": -(37 + 22.425671 / 60), "GNGNS.lon": -(122 + 58.856215 / 60),
+    },
+    "GPGLL,3722.425671,N,12258.856215,W,122310.2,V,N": {},
+    "WIMWV,214.8,R,10.0,N,A": {"WIMWV.angle.R": 214.8, "WIMWV.speed.R": 10.0 * KNOT},
+    "WIMWV,214.8,T,36.0,K,A": {"WIMWV.angle.T": 214.8, "WIMWV.speed.T": 10.0},
+    "SDDPT,12.4,-0.8,100": {"SDDPT.depth": 12.4, "SDDPT.offset": -0.8},
+    "SDDBT,40.7,f,12.4,M,6.8,F": {"SDDBT.depthm": 12.4},
+    "YXXDR,A,-5.5,D,PITCH,A,3.25,D,ROLL": {"YXXDR.PITCH": -5.5, "YXXDR.ROLL": 3.25},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", SENTENCES)
+def test_each_sentence_is_read_as_its_definition_says(body: str, tmp_path: Path) -> None:
+    clock = ["GPZDA,120000.00,09,10,2025,00,00", "GPZDA,120001.00,09,10,2025,00,00"]
+    (tmp_path / "a.log").write_text("\n".join(map(sentence, [clock[0], body, clock[1], body])) + "\n")
+    log = read_log(tmp_path / "a.log")
+    assert {channel.name: channel.values[0] for channel in log.channels} == pytest.approx(SENTENCES[body], abs=1e-9)
+    assert all(abs(channel.time_s[0] - 1_760_011_200.0) < 1e-6 for channel in log.channels)
+    assert log.clock == "satellite time"
 
 
 def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> None:

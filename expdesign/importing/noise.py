@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import NORTHWARD, SOG
+from expdesign.kinematics import held
 from expdesign.values import Array
 
 EARTH_M_PER_DEG = 111195.0
@@ -16,6 +17,8 @@ THIRD = math.sqrt(20.0)
 """Standard deviation of third differences of white noise of one."""
 STEPS = 2000
 WHOLE = 0.98
+LOOKED_AT = 20_000
+"""Samples from which it is told whether a log repeats readings."""
 KEYS = (("heading_rad", "heading_rad", "heading"), ("r_radps", "yaw_rate_radps", "yaw_rate"),
         ("u_mps", "velocity_mps", "velocity"), (NORTHWARD, "velocity_mps", "velocity"),
         (SOG, "velocity_mps", "velocity"), ("lat_deg", "position_m", "position"), ("north_m", "position_m", "position"),
@@ -33,14 +36,19 @@ def sensor_keys(found: Mapping[str, Channel], held_s: Mapping[str, float]) -> di
         values = found[column].values
         if column == "heading_rad":
             values = np.unwrap(values)
+        interval_s = held_s.get(column, 0.0)
+        how = held(values[:LOOKED_AT, None])
+        if how is not None and not how.interpolated:  # the log repeats what was read before
+            values = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0)]
+            interval_s = how.interval * found[column].interval_s
         rounding = scale * step_of(values)
         noise = scale * white_noise(values)
         value = max(noise, rounding / math.sqrt(12.0))
         if value > 0:
             words = f"noise {noise:.2g}, rounded to {rounding:.2g}" if rounding else f"noise {noise:.2g}"
             keys[key] = float(f"{value:.2g}"), words
-        if sensor and column in held_s:
-            keys[f"{sensor}_interval_s"] = float(f"{held_s[column]:.4g}"), "between readings"
+        if sensor and interval_s:
+            keys[f"{sensor}_interval_s"] = float(f"{interval_s:.4g}"), "between readings"
     return keys
 
 

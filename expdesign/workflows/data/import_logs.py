@@ -317,7 +317,9 @@ def _tried(
         bow = bow_signals(mapping)
         taken = presumed([run.stretch for run in runs], length_m=length_m, sample_time_s=found.sample_time_s, bow=bow)
     assert taken is not None
-    batches, kept, refused, texts, said = [], [], [], {}, []
+    batches, kept, refused = [], [], []
+    texts: dict[str, str] = {}
+    said: dict[str, list[str]] = {}
     outputs = OUTPUTS if "heading_rad" in runs[0].stretch.columns else ()
     with TemporaryDirectory(prefix="expdesign-") as folder:
         for k, run in enumerate(runs, start=1):
@@ -337,14 +339,13 @@ def _tried(
                     (f"from {begins:.0f} s on, {len(run.stretch) * found.sample_time_s:.0f} s", what.strip())
                 )
                 continue
-            own = [replace(batch, name=batch.name.replace(path.name, f"run {k}")) for batch in record.batches]
-            label = run.family or family(taken, own[0])
-            if run.name:
-                label = f"{run.name} ({family(taken, own[0])})"
-            kept.append(replace(run, family=label))
-            texts[file_name(len(kept), kept[-1])] = text
-            batches += own
-            said += [note for line in record.notes if not (note := line.partition(": ")[2]).startswith(OF_FRAMES)]
+            kept.append(replace(run, family=run.name or family(taken, record.batches[0])))
+            name = file_name(len(kept), kept[-1])
+            texts[name] = text
+            batches += [replace(batch, name=batch.name.replace(path.name, name)) for batch in record.batches]
+            for line in record.notes:
+                if not (note := line.partition(": ")[2]).startswith(OF_FRAMES):
+                    said.setdefault(note, []).append(name)
     if batches:
         whole = Record(batches=tuple(batches))
         if ship is None:
@@ -352,8 +353,15 @@ def _tried(
         doubts = checked(whole, taken).doubts
         if ship is None:
             doubts = tuple(_without_file(doubt) for doubt in doubts)
-        notes += [*doubts, *dict.fromkeys(said)]
+        notes += [*doubts, *(f"{_some(names, kept)}{note}" for note, names in said.items())]
     return texts, kept, refused, notes
+
+
+def _some(names: Sequence[str], runs: Sequence[Run]) -> str:
+    """The runs that a note is on, where it is not on all of them."""
+    if len(names) == len(runs):
+        return ""
+    return f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: "
 
 
 def _without_file(text: str) -> str:
