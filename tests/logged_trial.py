@@ -10,6 +10,7 @@ import math
 import struct
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -40,20 +41,20 @@ class Voyage:
         """Every so many samples."""
         return Voyage(*(getattr(self, name)[::count] for name in self.__dataclass_fields__))
 
-    @property
+    @cached_property
     def lat_deg(self) -> np.ndarray:
         """By the radii of curvature at the place."""
         return LAT + np.degrees(self.north_m / 6_377_900.0)
 
-    @property
+    @cached_property
     def lon_deg(self) -> np.ndarray:
         return LON + np.degrees(self.east_m / (6_392_320.0 * math.cos(math.radians(LAT))))
 
-    @property
+    @cached_property
     def speed_mps(self) -> np.ndarray:
         return np.hypot(self.u_mps, self.v_mps)
 
-    @property
+    @cached_property
     def course_rad(self) -> np.ndarray:
         return (self.heading_rad + np.arctan2(self.v_mps, self.u_mps)) % (2 * np.pi)
 

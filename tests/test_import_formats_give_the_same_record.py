@@ -187,10 +187,10 @@ SENTENCES = {
         "VDVBW.transgroundspd": -0.5,
     },
     "VWVHW,120.5,T,118.0,M,5.0,N,9.26,K": {"VWVHW.hdgT": 120.5, "VWVHW.hdgM": 118.0, "VWVHW.spdN": 5.0},
-    "GNGNS,122310.2,3722.425671,S,12258.856215,W,DAAA,14,0.9,1005.543,6.5,,,S": {
+    "GNGNS,120000.00,3722.425671,S,12258.856215,W,DAAA,14,0.9,1005.543,6.5,,,S": {
         "GNGNS.lat": -(37 + 22.425671 / 60), "GNGNS.lon": -(122 + 58.856215 / 60),
     },
-    "GPGLL,3722.425671,N,12258.856215,W,122310.2,V,N": {},
+    "GPGLL,3722.425671,N,12258.856215,W,120000.00,V,N": {},
     "WIMWV,214.8,R,10.0,N,A": {"WIMWV.angle.R": 214.8, "WIMWV.speed.R": 10.0 * KNOT},
     "WIMWV,214.8,T,36.0,K,A": {"WIMWV.angle.T": 214.8, "WIMWV.speed.T": 10.0},
     "SDDPT,12.4,-0.8,100": {"SDDPT.depth": 12.4, "SDDPT.offset": -0.8},

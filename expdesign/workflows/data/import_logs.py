@@ -306,12 +306,12 @@ def _tried(
         return {}, [], [], []
     if not inputs_of(runs[0].stretch.columns):
         kept = [replace(run, name="track") for run in runs]
-        texts = {file_name(k, run): _csv(run, found) for k, run in enumerate(kept, start=1)}
+        tracks = {file_name(k, run): _csv(run, found) for k, run in enumerate(kept, start=1)}
         notes.append(
             "no channel is an order or a position of a rudder or a propeller: the track is written as it is, and "
             "estimate and diagnose need such inputs"
         )
-        return texts, kept, [], notes
+        return tracks, kept, [], notes
     taken = ship
     if ship is None:
         bow = bow_signals(mapping)
