@@ -21,6 +21,7 @@ from expdesign.signals import Commands
 from logged_trial import (
     START_S,
     Voyage,
+    iso,
     logger_rows,
     nmea,
     voyage,
@@ -170,6 +171,25 @@ def test_a_rudder_of_another_clock_is_set_by_the_turn(offset_s: float, tmp_path:
     assert abs(clock["offset_s"] - truth) < 4 * clock["offset_std_s"]
     assert clock["offset_std_s"] < 0.5
     assert "are added to its times, by rudder and turn" in notes_of(said)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 2.3, -40.0])
+def test_a_computers_clock_is_held_against_what_a_receiver_saw(late_s: float, tmp_path: Path, trip: Voyage) -> None:
+    bridge = write_nmea(tmp_path / "bridge.nmea", trip.every(5))
+    kept = [line for line in bridge.read_text().splitlines() if "RSA" not in line and "RPM" not in line]
+    bridge.write_text("\n".join(kept) + "\n")
+    part = trip.every(5)
+    rows = zip(part.time_s + late_s, np.degrees(part.order_rad), np.degrees(part.rudder_rad), strict=True)
+    lines = [f"{iso(when)};{order:.1f};{angle:.1f}" for when, order, angle in rows]
+    (tmp_path / "plc.csv").write_text("\n".join(["Timestamp;Rudder setpoint;Rudder actual", *lines]) + "\n")
+    _, said, out = run_import(bridge, tmp_path / "plc.csv")
+    clock = next(one for one in said["clocks"] if one["file"] == "plc.csv")  # type: ignore[attr-defined]
+    assert abs(clock["offset_s"] + late_s) < max(0.1, 4 * clock["offset_std_s"])
+    assert "agrees with the others" in notes_of(said) if not late_s else "are added to its times" in notes_of(said)
+    before = columns_of(said, out)
+    _, said, out = run_import(bridge, tmp_path / "plc.csv", options=("--map", str(out / "mapping.toml")))
+    assert np.allclose(columns_of(said, out)["reached_rudder1_rad"], before["reached_rudder1_rad"])
+    assert not late_s or "are added to its times, as the mapping says" in notes_of(said)
 
 
 def test_lags_of_noisy_series_are_within_their_standard_errors() -> None:

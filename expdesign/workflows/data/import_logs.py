@@ -261,6 +261,8 @@ def _one_time_scale(
                 clock = replace(clock, offset_s=round(lag.offset_s, 4), offset_std_s=float(f"{lag.std_s:.2g}"))
             else:
                 notes.append(f"{log.source}: its clock agrees with the others within {lag.std_s:.2g} s, by {lag.by}")
+        elif clock.offset_s:
+            notes.append(f"{log.source}: {clock.offset_s:g} s are added to its times, as the mapping says")
         elif not table:
             notes.append(f"times are those of {log.source}: {log.clock}")
         clocks[log.source] = clock
