@@ -24,7 +24,7 @@ FLOORS = {
         ("dictionary", "estimation", "indices", "step_trials"),
         ("information", "diagnosis", "assessment", "roll", "kinematics", "particulars"),
         ("durations",),
-        ("growing", "rehearsal", "plan", "monitoring", "loading"),
+        ("growing", "rehearsal", "plan", "monitoring", "loading", "importing"),
         ("shortest_day", "foresight"),
         ("scenario", "export"),
         ("workflows",),

@@ -67,7 +67,7 @@ def test_nothing_is_explained_in_words_of_the_program(topic: str, capsys: pytest
 
 
 def test_every_key_of_a_file_is_required_optional_or_has_a_default() -> None:
-    for name in ("scenario", "vessel", "dictionary", "area", "loads"):
+    for name in ("scenario", "vessel", "dictionary", "area", "loads", "mapping"):
         for section in explain(name).sections:
             assert all(entry.default for entry in section.entries)
 

@@ -57,6 +57,10 @@ def test_a_card_becomes_a_vessel_as_its_page_says(tmp_path: Path, monkeypatch: p
     carried_out(commands, tmp_path, monkeypatch)
 
 
+def test_a_log_is_imported_and_estimated_as_the_tutorial_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    carried_out(tutorial("your-log"), tmp_path, monkeypatch)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["first-plan", "first-estimate"])
 def test_a_tutorial_runs_from_its_first_command_to_its_last(

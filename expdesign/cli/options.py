@@ -96,6 +96,7 @@ def out_option(default: str) -> object:
 Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]
 OutBesidePlan = Annotated[Path | None, out_option("the folder of the plan")]
 OutByData = Annotated[Path | None, out_option("runs/<first data file>")]
+OutByLog = Annotated[Path | None, out_option("runs/<first log>-runs")]
 OutByVessel = Annotated[Path | None, out_option("runs/<vessel>-indices")]
 OutByCard = Annotated[Path | None, out_option("runs/<card>-nominal")]
 OutInclined = Annotated[Path | None, out_option("runs/<vessel>-incline")]
@@ -121,7 +122,9 @@ PlanFile = Annotated[
 ]
 DataFiles = Annotated[
     list[Path],
-    typer.Argument(metavar="DATA.csv ...", help="Measured runs; see expdesign explain data for their columns."),
+    typer.Argument(
+        metavar="DATA.csv ...", help="Measured runs, or folders of them; see expdesign explain data for their columns."
+    ),
 ]
 Seed = Annotated[
     int,

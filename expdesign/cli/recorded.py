@@ -14,12 +14,76 @@ from expdesign.cli.options import (
     Jobs,
     Mean,
     OutByData,
+    OutByLog,
     OutByVessel,
     Rudder,
     Seed,
     Throttle,
     Velocity,
 )
+
+
+@command("import")
+def import_(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG ...", help="Logs of one trial or voyage, in any formats: expdesign explain import."
+        ),
+    ],
+    vessel: Annotated[
+        Path | None,
+        typer.Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="Numbers thrusters and rudders as this file does, and holds the ship's answers against its model.",
+        ),
+    ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option("--plan", metavar="PLAN.json", help="Cut out the runs of this plan, by their names."),
+    ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="MAPPING.toml",
+            help="The mapping of an earlier import, edited; see expdesign explain mapping. Default: guessed.",
+        ),
+    ] = None,
+    sample_time: Annotated[
+        float | None,
+        typer.Option(
+            "--sample-time",
+            metavar="S",
+            help="Time between rows that are written [s]. Default: that of the slowest main sensor, at most 1.",
+        ),
+    ] = None,
+    length: Annotated[
+        float | None,
+        typer.Option(
+            "--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."
+        ),
+    ] = None,
+    out: OutByLog = None,
+) -> Asked:
+    """Turn logs, as ships and craft record them, into runs that the other commands read.
+
+    Writes a CSV file for each run, mapping.toml with all decisions, vessel-lines.toml with what the logs tell of
+    actuators and sensors, import.json and import.html. estimate, diagnose, indices and mine take the folder.
+
+    Example: expdesign import bridge.nmea rudder.csv --vessel ship.toml
+    """
+    return ask(
+        "import_logs",
+        logs,
+        out,
+        vessel=vessel,
+        plan=plan,
+        map_file=map_file,
+        sample_time_s=sample_time,
+        length_m=length,
+    )
 
 
 @command("estimate")

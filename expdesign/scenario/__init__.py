@@ -11,6 +11,7 @@ from expdesign.scenario.charts import load_area
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.durations_file import load_repeats
 from expdesign.scenario.loads_file import LoadCases, load_cases
+from expdesign.scenario.mapping_file import load_mapping
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
 from expdesign.scenario.variant_file import Variant, load_variant

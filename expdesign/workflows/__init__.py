@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.diagnose import diagnose
     from expdesign.workflows.data.estimate import estimate
     from expdesign.workflows.data.identify_steps import identify_steps
+    from expdesign.workflows.data.import_logs import import_logs
     from expdesign.workflows.data.indices import indices
     from expdesign.workflows.data.mine import mine
     from expdesign.workflows.data.monitor import monitor

@@ -33,7 +33,7 @@ from expdesign.export.estimate_page import EstimateContent, estimate_html, estim
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
 from expdesign.workflows.outcome import Outcome, TextTable, command_text, note_on_roll
-from expdesign.workflows.steps.measured import doubted, measured, reduced_data
+from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
 STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
@@ -63,8 +63,9 @@ def estimate(
     """Parameters of a vessel from measured data, into `out` or runs/<first data file>."""
     if not data:
         raise InputError("no data files are given, expected one or more CSV files")
-    for path in tests:
-        if path in data:
+    used = data_files(data)
+    for path in data_files(tests):
+        if path in used:
             raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
     progress("reading the data", 0.0)
     ship = load_vessel(vessel)

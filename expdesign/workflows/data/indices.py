@@ -24,7 +24,7 @@ from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, TextTable, command_text
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import data_files, measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
 
@@ -101,8 +101,9 @@ def _measured(
     seen: list[Found] = []
     doubts: list[str] = []
     notes: list[str] = []
-    for number, path in enumerate(data):
-        progress(f"reading {path.name}", 0.6 * number / len(data))
+    files = data_files(data)
+    for number, path in enumerate(files):
+        progress(f"reading {path.name}", 0.6 * number / len(files))
         record = at_reference_point(measured([path], ship), ship.sensors)
         seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
         doubts += record.doubts

@@ -11,6 +11,7 @@ from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
 from expdesign.scenario.keys import Key, keys_of
 from expdesign.scenario.loads_file import LoadsFile
+from expdesign.scenario.mapping_file import COLUMNS_BESIDE, MappingFile
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import Table
 from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTable, VesselTable
@@ -46,6 +47,11 @@ CARDS = (
     "vessel file of it. Only [ship] and one of [[thrusters]] are required. Trial values are fitted; one turning circle "
     "tells more than all particulars. Forward and starboard are positive, counted from midships."
 )
+MAPPINGS = (
+    "expdesign import writes one, mapping.toml, with what it guessed from names, units and readings; changed, it is "
+    "given as --map. column = (readings in the unit) scale + offset. A channel that the file does not name is not "
+    "used. Of percent, share and pwm (1000 to 2000 us, 1500 in the middle) scale is what the largest order is."
+)
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
     "the way and where, what was tried, and a change of one key with which the test that failed passes. A draft is no "
@@ -80,6 +86,15 @@ def card_topic() -> Topic:
 def loads_topic() -> Topic:
     """Keys of a file of load cases."""
     return Topic(name="loads", title="Files of load cases", text=LOADS, sections=_by_table(LoadsFile))
+
+
+def mapping_topic() -> Topic:
+    """Keys of a mapping file, and the columns that others are made from."""
+    beside = tuple(
+        Explained(name=name, meaning=meaning, default="optional") for name, meaning in COLUMNS_BESIDE.items()
+    )
+    more = Section(name="columns", title="columns beside those of expdesign explain data", entries=beside)
+    return Topic(name="mapping", title="Mapping files", text=MAPPINGS, sections=(*_by_table(MappingFile), more))
 
 
 def dictionary_topic() -> Topic:

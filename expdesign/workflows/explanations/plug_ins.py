@@ -132,5 +132,21 @@ def data_topic() -> Topic:
     return _list("data", "Columns of measured data", entries, text)
 
 
+def import_topic() -> Topic:
+    """Formats of logs."""
+    from expdesign.importing import READERS
+
+    entries = tuple(
+        Explained(name=item.name, meaning=item.meaning, allowed=f"needs expdesign[{item.extra}]" if item.extra else "")
+        for item in READERS
+    )
+    text = (
+        "A file is known by how it begins, not by its name. All channels are read; the mapping says which become "
+        "columns (expdesign explain mapping). Several logs are put on one time scale: satellite time first, then "
+        "computers' clocks, then clocks of their own, set by what both logs saw."
+    )
+    return _list("import", "Formats of expdesign import", entries, text)
+
+
 def _list(name: str, title: str, entries: tuple[Explained, ...], text: str = "") -> Topic:
     return Topic(name=name, title=title, text=text, sections=(Section(name=name, title="", entries=entries),))

@@ -36,9 +36,12 @@ def data_files(data: Sequence[Path]) -> tuple[Path, ...]:
 def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", undo: bool = True) -> Record:
     """Measured data of a vessel: its own actuators' signals, or generalised forces where the first file has those.
 
+    A folder stands for the CSV files in it.
+
     A model in discrete form holds for one sample time, which the data must have; in continuous form any will do. Faults
     of instruments that are certain are told, and undone if asked for.
     """
+    data = data_files(data)
     inputs, header = vessel.model.inputs, _header(data[0])
     if not {column_name(name) for name in inputs} <= header and set(FORCE_SIGNALS) <= header:
         inputs = FORCE_SIGNALS

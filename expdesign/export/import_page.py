@@ -1,0 +1,290 @@
+"""Results of an import: the mapping as a file, lines for a vessel file, JSON, tables and a page."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from expdesign.export.files import finite, strict_json
+from expdesign.export.pages import page_template
+from expdesign.export.pages.figures import GREY, LINES, drawn, light_grid, new_figure, page_figure, svg
+from expdesign.importing import Followed, Log, Run, Sampled, inputs_of
+from expdesign.importing import Mapping as Decisions
+from expdesign.vessel import response_keys, stem
+
+MOST_POINTS = 4000
+"""Of a line in a figure."""
+MOST_TEXTS = 12
+DEGREES = 180.0 / np.pi
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ImportContent:
+    """The values that page and files show."""
+
+    logs: tuple[Log, ...]
+    mapping: Decisions
+    sampled: Sampled
+    runs: tuple[Run, ...]
+    files: tuple[str, ...]  # names, one for each run
+    rejected: tuple[tuple[str, str], ...]  # where, and why
+    followed: tuple[Followed, ...]  # how actuators follow their orders
+    sensors: Mapping[str, tuple[float, str]]  # key of [sensors] -> value, and what it is
+    notes: tuple[str, ...]
+    origin_s: float  # time of the first row that is written
+    dated: bool  # whether it counts from 1970
+    # command, version: to reproduce it
+    command: str
+    version: str
+
+
+def channel_rows(content: ImportContent) -> list[tuple[str, ...]]:
+    """One for each channel that is used, in the order of the columns' names."""
+    uses = sorted((use for use in content.mapping.uses if use.column), key=lambda use: (use.column, use.file))
+    return [
+        (use.column, _channel(content, use.file, use.channel), use.unit or "-", _times(use.scale, use.offset), use.why)
+        for use in uses
+    ]  # fmt: skip
+
+
+def _times(scale: float, offset: float) -> str:
+    return f"{scale:.5g}" + (f" {offset:+.5g}" if offset else "")
+
+
+def _channel(content: ImportContent, file: str, channel: str) -> str:
+    return channel if len(content.logs) == 1 else f"{file}: {channel}"
+
+
+def unused_rows(content: ImportContent) -> list[tuple[str, ...]]:
+    """Log, channels or texts that are not used, and why; those of one reason together."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for use in content.mapping.uses:
+        if not use.column:
+            groups.setdefault((use.file, use.why), []).append(use.channel)
+    for log in content.logs:
+        if log.unused:
+            groups.setdefault((log.source, "not a reading of the ship's motion, or without a clock"), []).extend(
+                log.unused
+            )
+    return [(file, _listed(names), why) for (file, why), names in groups.items()]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - MOST_TEXTS
+    return ", ".join(names[:MOST_TEXTS]) + (f" and {more} more" if more > 0 else "")
+
+
+def run_rows(content: ImportContent) -> list[tuple[str, ...]]:
+    """File, what it is, when it begins, how long it lasts, and how long its approach is."""
+    step_s = content.sampled.sample_time_s
+    return [
+        (name, run.family, moment(content, float(run.stretch.time_s[0])), f"{len(run.stretch) * step_s:.4g}",
+         f"{run.approach_s:.4g}")
+        for name, run in zip(content.files, content.runs, strict=True)
+    ]  # fmt: skip
+
+
+def moment(content: ImportContent, time_s: float) -> str:
+    """A time as a date where it is known, else in seconds from the beginning."""
+    if not content.dated:
+        return f"{time_s - content.origin_s:.1f} s"
+    return datetime.fromtimestamp(time_s, UTC).strftime("%Y-%m-%d %H:%M:%S")
+
+
+def response_rows(content: ImportContent) -> list[tuple[str, ...]]:
+    """Signal, slew rate, lag, dead time and what is left, each with its standard error."""
+    return [
+        (one.signal, _with_std(one.rate), _with_std(one.lag_s), _with_std(one.delay_s), f"{one.rest:.2g}")
+        for one in content.followed
+    ]
+
+
+def _with_std(value: tuple[float, float] | None) -> str:
+    return "none shows" if value is None else f"{value[0]:.3g} \N{PLUS-MINUS SIGN} {value[1]:.1g}"
+
+
+def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> str:
+    """The mapping as a file that `--map` reads."""
+    lines = [
+        "# How the channels of these logs become columns. Change what is wrong, and give the file as --map.",
+        "# Keys: expdesign explain mapping. Columns: expdesign explain data.",
+        f"# Made by: {command}",
+    ]
+    top = {"sample_time_s": mapping.sample_time_s, "length_m": mapping.length_m, "variation_deg": mapping.variation_deg,
+           "antenna_forward_m": mapping.antenna_forward_m,
+           "antenna_starboard_m": mapping.antenna_starboard_m}  # fmt: skip
+    lines += [f"{key} = {value!r}" for key, value in top.items() if value is not None]
+    for clock in mapping.files:
+        lines += ["", "[[file]]", f"name = {_text(clock.file)}", f"offset_s = {clock.offset_s!r}"]
+        lines += [f"offset_std_s = {clock.offset_std_s!r}"] if clock.offset_std_s else []
+        lines += [f"sample_time_s = {clock.sample_time_s!r}"] * bool(
+            clock.sample_time_s or _has_no_clock(logs, clock.file)
+        )
+    for use in mapping.uses:
+        if use.column:
+            lines += ["", "[[channel]]", f"file = {_text(use.file)}", f"channel = {_text(use.channel)}",
+                      f"column = {_text(use.column)}", f"unit = {_text(use.unit)}",
+                      f"scale = {use.scale!r}"]  # fmt: skip
+            lines += [f"offset = {use.offset!r}"] * bool(use.offset) + [f"why = {_text(use.why)}"] * bool(use.why)
+    rest = [use for use in mapping.uses if not use.column]
+    if rest:
+        lines += ["", "# Not used; add a table [[channel]] for what should be:"]
+        lines += [f"# file = {_text(use.file)}, channel = {_text(use.channel)} ({use.why})" for use in rest]
+    return "\n".join(lines) + "\n"
+
+
+def _has_no_clock(logs: Sequence[Log], name: str) -> bool:
+    return any(log.source == name and log.clock == "no clock" for log in logs)
+
+
+def _text(value: str) -> str:
+    """A string of TOML: that of JSON, but for one letter."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def vessel_lines(content: ImportContent) -> str:
+    """What the logs tell of actuators and sensors, as lines to be put into a vessel file."""
+    lines = [
+        "# Lines for a vessel file, to be copied into its tables: what the logs tell of actuators and sensors.",
+        f"# Made by: {content.command}",
+    ]
+    for one in content.followed:
+        keys = response_keys(stem(one.signal))
+        lines += ["", f"# In the table [[actuators]] that has {one.signal}; {one.moves} changes of its order:"]
+        for key, value in (("rate", one.rate), ("lag_s", one.lag_s), ("delay_s", one.delay_s)):
+            if value is not None:
+                lines.append(f"# {keys[key]} = {value[0]:.3g}  # standard error {value[1]:.1g}")
+        if abs(one.offset) > 3 * one.rest:
+            lines.append(f"# {keys['offset']} = {one.offset:.3g}  # reached less ordered, at rest")
+    if content.sensors:
+        lines += ["", "[sensors]"]
+        lines += [f"{key} = {value!r}  # {words}" for key, (value, words) in content.sensors.items()]
+    return "\n".join(lines) + "\n"
+
+
+def import_json(content: ImportContent) -> str:
+    """All decisions and results."""
+    return strict_json(
+        {
+            "command": content.command,
+            "version": content.version,
+            "begins": moment(content, content.origin_s) if content.dated else None,
+            "begins_s": content.origin_s,
+            "sample_time_s": content.sampled.sample_time_s,
+            "logs": [
+                {"name": log.source, "clock": log.clock, "channels": len(log.channels), "unused": list(log.unused)}
+                for log in content.logs
+            ],
+            "clocks": [
+                {"file": one.file, "offset_s": one.offset_s, "offset_std_s": one.offset_std_s}
+                for one in content.mapping.files
+            ],
+            "channels": [
+                {"file": use.file, "channel": use.channel, "column": use.column or None, "unit": use.unit,
+                 "scale": use.scale, "offset": use.offset, "why": use.why}
+                for use in content.mapping.uses
+            ],
+            "runs": [
+                {"file": name, "what": run.family, "begins_s": float(run.stretch.time_s[0]) - content.origin_s,
+                 "lasts_s": len(run.stretch) * content.sampled.sample_time_s, "approach_s": run.approach_s}
+                for name, run in zip(content.files, content.runs, strict=True)
+            ],
+            "rejected": [{"where": where, "why": why} for where, why in content.rejected],
+            "actuators": {
+                one.signal: {
+                    key: None if value is None else {"value": finite(value[0]), "std": finite(value[1])}
+                    for key, value in (("rate", one.rate), ("lag_s", one.lag_s), ("delay_s", one.delay_s))
+                }
+                for one in content.followed
+            },
+            "sensors": {key: value for key, (value, _) in content.sensors.items()},
+            "notes": list(content.notes),
+        }
+    )  # fmt: skip
+
+
+def earlier_files(folder: Path) -> set[str]:
+    """Runs that an earlier import wrote into a folder, which a new one replaces."""
+    try:
+        runs = json.loads((folder / "import.json").read_text(encoding="utf-8"))["runs"]
+        return {run["file"] for run in runs if Path(run["file"]).name == run["file"] and run["file"].endswith(".csv")}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+
+
+def import_html(content: ImportContent) -> str:
+    """One HTML page without any outside reference."""
+    track, times = drawn([lambda: _track(content), lambda: _series(content)])
+    return page_template("import.html").render(
+        content=content, track=track, times=times, channels=channel_rows(content), unused=unused_rows(content),
+        runs=run_rows(content), responses=response_rows(content),
+        sensors=[(key, f"{value:.4g}", words) for key, (value, words) in content.sensors.items()],
+    )  # fmt: skip
+
+
+def _thin(count: int) -> slice:
+    return slice(None, None, max(1, math.ceil(count / MOST_POINTS)))
+
+
+@page_figure
+def _track(content: ImportContent) -> Markup:
+    """The way over ground, with the runs in colour."""
+    figure = new_figure(6.4, 4.6)
+    axes = figure.subplots()
+    parts = [(GREY, 0.8, "", stretch) for stretch in content.sampled.stretches]
+    parts += [
+        (LINES[k % len(LINES)], 2.0, name, run.stretch)
+        for k, (name, run) in enumerate(zip(content.files, content.runs, strict=True))
+    ]
+    origin = None
+    for colour, width, name, stretch in parts:
+        columns = stretch.columns
+        if "lat_deg" in columns:
+            north, east = columns["lat_deg"], columns["lon_deg"]
+            origin = origin or (float(north[0]), float(east[0]))
+            north, east = 111195.0 * (north - origin[0]), 111195.0 * np.cos(np.radians(origin[0])) * (east - origin[1])
+        elif "north_m" in columns:
+            north, east = columns["north_m"], columns["east_m"]
+        else:
+            continue
+        thin = _thin(len(stretch))
+        axes.plot(east[thin], north[thin], color=colour, linewidth=width, label=name or None)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+    light_grid(axes)
+    if 0 < len(content.runs) <= 8 and axes.lines:
+        axes.legend(fontsize=8)
+    return svg(figure, key="track", label="way over ground with the runs")
+
+
+@page_figure
+def _series(content: ImportContent) -> Markup:
+    """Heading, speed and inputs over time, runs shaded."""
+    first = content.sampled.stretches[0].columns
+    inputs = list(inputs_of(first))[:6]
+    rows = [name for name in ("heading_rad", "u_mps") if name in first] + inputs
+    figure = new_figure(8.6, 1.2 + 1.1 * max(len(rows), 1))
+    for axes, name in zip(np.atleast_1d(figure.subplots(max(len(rows), 1), 1, sharex=True)), rows, strict=False):
+        angle = name.endswith("_rad")
+        for stretch in content.sampled.stretches:
+            values = inputs_of(stretch.columns).get(name, stretch.columns.get(name))
+            if values is not None:
+                thin = _thin(len(stretch))
+                axes.plot((stretch.time_s[thin] - content.origin_s) / 60.0, values[thin] * (DEGREES if angle else 1.0),
+                          color="#0072B2", linewidth=0.8)  # fmt: skip
+        for k, run in enumerate(content.runs):
+            ends = (run.stretch.time_s[[0, -1]] - content.origin_s) / 60.0
+            axes.axvspan(*ends, color=LINES[k % len(LINES)], alpha=0.15, linewidth=0)
+        axes.set_ylabel(name.replace("_rad", " deg").replace("_", " "), fontsize=8)
+        light_grid(axes)
+        axes.set_xlabel("time [min]")
+        axes.label_outer()
+    return svg(figure, key="series", label="heading, speed and inputs over time, runs shaded")

@@ -1,0 +1,31 @@
+"""Logs of ships and craft become files that this package reads; every decision is told, kept and may be changed.
+
+    log -> channels (name, unit, times, readings)                readers
+        -> columns of ours, in our units and senses               mapping: guessed, or as a file says
+        -> one time scale for all files                           alignment
+        -> even steps without gaps                                sampling
+        -> runs                                                   runs
+    beside: how actuators follow their orders                     responses
+            noise, rounding and interval of each sensor           noise
+
+Times count from 1970 UTC where a clock has a date. Angles are in radians, headings clockwise from north.
+"""
+
+from expdesign.importing.alignment import Lag, lag_of
+from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log
+from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use, bow_signals, guess
+from expdesign.importing.noise import sensor_keys
+from expdesign.importing.readers import READERS, read_log
+from expdesign.importing.responses import Followed, followed
+from expdesign.importing.runs import (
+    Run,
+    cut,
+    cut_by_plan,
+    family,
+    file_name,
+    fitted,
+    inputs_of,
+    presumed,
+    typical_length_m,
+)
+from expdesign.importing.sampling import NothingToWrite, Sampled, Stretch, sampled

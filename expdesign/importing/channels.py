@@ -1,0 +1,171 @@
+"""What a log holds, whatever its format: channels of numbers, each with its own times; and clocks set right.
+
+Times count from 1970 UTC where the clock is that of a satellite receiver or a computer, else from any origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from expdesign.values import Array, seal
+
+Places = NDArray[np.signedinteger[Any]]
+"""Indices of rows."""
+
+GNSS, COMPUTER, OWN, NONE = "satellite time", "a computer's clock", "a clock of its own", "no clock"
+RESET_S, RESET_STEPS = 2.0, 10.0
+"""A step back in time of more than both, in seconds and usual steps, is a clock that began anew."""
+RESTART_GAP_S = 60.0
+"""Put between readings before and after a clock began anew [s]."""
+DAY_S = 86400.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Channel:
+    """Readings of one quantity."""
+
+    name: str  # as the format has it, e.g. "GPRMC.spd"
+    source: str  # name of the file
+    unit: str = ""  # where the format says it, by the words of `units`
+    time_s: Array  # (k,) never decreasing
+    values: Array  # (k,) finite
+
+    def __post_init__(self) -> None:
+        seal(self, time_s="k", values="k")
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def interval_s(self) -> float:
+        """Usual time between readings [s]; infinite for fewer than two."""
+        steps = np.diff(self.time_s)
+        return float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Log:
+    """All that was read of one file."""
+
+    source: str  # name of the file
+    clock: str  # one of GNSS, COMPUTER, OWN, NONE
+    channels: tuple[Channel, ...]
+    notes: tuple[str, ...] = ()  # what was broken, converted, taken for granted
+    unused: tuple[str, ...] = ()  # what stands in the file and is no channel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """One format."""
+
+    name: str  # for messages
+    meaning: str  # what is read of it
+    fits: Callable[[Path, bytes], bool]  # whether a file that begins with these bytes is of this format
+    read: Callable[[Path, float], Log]  # file, and time between rows where it has no clock (0 for unknown) -> log
+    extra: str = ""  # of this package, which has to be installed
+
+
+def epochs(stamps: Array, places: Array) -> tuple[Array, Array]:
+    """Stamps (e,) that differ, in order, and the places (e,) in a file where each is first seen; later ones only."""
+    later = np.flatnonzero(np.diff(np.maximum.accumulate(stamps), prepend=-np.inf) > 0)
+    return stamps[later], places[later]
+
+
+def spread(places: Array | Places, stamps: Array, at: Array | Places) -> Array:
+    """Times (k,) of readings at places of a file from stamps (e,) at other places.
+
+    Readings between two stamps are taken for evenly spaced from the first of them on; those before the first stamp
+    are nan.
+    """
+    if len(stamps) < 2:
+        return np.full(len(places), np.nan)
+    own = np.searchsorted(at, places, side="right") - 1
+    steps = np.append(np.diff(stamps), np.median(np.diff(stamps)))
+    usual = float(np.median(steps))
+    count = np.bincount(own[own >= 0], minlength=len(stamps))
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    before = int((own < 0).sum())
+    rank = np.arange(len(places)) - before - first[np.maximum(own, 0)]
+    share = rank / np.maximum(count[np.maximum(own, 0)], 1)
+    length = np.minimum(steps, 2.0 * usual)[np.maximum(own, 0)]  # a gap is not filled
+    return np.where(own < 0, np.nan, stamps[np.maximum(own, 0)] + share * length)
+
+
+def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
+    """Times (k,) as a clock has them -> the order (k,) of the rows in time, their times, and notes.
+
+    A clock that began anew goes on after a gap; stamps that repeat, as coarse ones do, are spread evenly up to the
+    next; rows that were swapped are sorted.
+    """
+    notes: list[str] = []
+    order = np.flatnonzero(np.isfinite(time_s))
+    if len(order) < len(time_s):
+        notes.append(f"{what}: {len(time_s) - len(order)} rows have no readable time and are left out")
+    times = time_s[order]
+    if len(times) < 3:
+        return order, times, notes
+    steps = np.diff(times)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    resets = np.flatnonzero(steps < -max(RESET_S, RESET_STEPS * usual)) + 1
+    for place in resets:
+        times = np.concatenate([times[:place], times[place:] + times[:place].max() + RESTART_GAP_S - times[place]])
+    if len(resets):
+        notes.append(f"{what}: the clock goes back {len(resets)} times and counts as begun anew after a gap there")
+    backward = np.diff(times) < 0
+    if backward.any():
+        notes.append(f"{what}: {int(backward.sum())} stamps go back in time; the rows are sorted")
+        sorting = np.argsort(times, kind="stable")
+        order, times = order[sorting], times[sorting]
+    repeated = np.diff(times) == 0
+    if repeated.any():
+        stamps, at = np.unique(times, return_index=True)
+        places = np.arange(len(times))
+        if len(stamps) < 2:
+            return order[:1], times[:1], [*notes, f"{what}: all rows have one and the same time"]
+        notes.append(f"{what}: {int(repeated.sum())} stamps repeat; those rows are spread evenly up to the next stamp")
+        times = spread(places, stamps, at)
+    return order, times, notes
+
+
+def channels_of(
+    columns: Mapping[str, Array],
+    time_s: Array,
+    *,
+    source: str,
+    units: Mapping[str, str] | None = None,
+    prefix: str = "",
+    what: str = "",
+) -> tuple[list[Channel], list[str]]:
+    """Channels of a table whose rows (k,) share a clock, and notes on it; readings that are no numbers are left out."""
+    order, times, notes = set_right(np.asarray(time_s, dtype=float), what=what or source)
+    found = []
+    for name, values in columns.items():
+        own = np.asarray(values, dtype=float)[order]
+        known = np.isfinite(own)
+        if known.any():
+            unit = (units or {}).get(name, "")
+            # most channels of a table have all readings, and then share its times
+            times_of = times if known.all() else times[known]
+            found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own[known]))
+    return found, notes
+
+
+@dataclass
+class Blocks:
+    """Arrays that grow block by block, by name."""
+
+    parts: dict[str, list[Array]] = field(default_factory=dict)
+
+    def add(self, name: str, values: Sequence[float] | Array) -> None:
+        """Append values of a name."""
+        self.parts.setdefault(name, []).append(np.asarray(values, dtype=float))
+
+    def joined(self, name: str) -> Array:
+        """All values of a name; empty where there are none."""
+        return np.concatenate(self.parts[name]) if self.parts.get(name) else np.zeros(0)

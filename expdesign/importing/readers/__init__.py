@@ -1,0 +1,104 @@
+"""Formats of logs: one row of `READERS` each, asked in turn whether a file is theirs.
+
+The library of a format is loaded when a file of it is met; a missing one is told with the extra that installs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from expdesign.errors import FileError
+from expdesign.importing.channels import Log, Reader
+from expdesign.importing.readers.ardupilot import is_ardupilot, read_ardupilot
+from expdesign.importing.readers.matlab import read_matlab, read_matlab73
+from expdesign.importing.readers.px4 import read_px4
+from expdesign.importing.readers.ros import is_ros, read_ros
+from expdesign.importing.readers.sheets import read_excel, read_parquet
+from expdesign.importing.readers.text import is_text, read_text
+from expdesign.input_files import check_ends
+
+
+def _begins(*magic: bytes) -> Callable[[Path, bytes], bool]:
+    return lambda path, head: head.startswith(magic)
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(64)
+
+
+READERS = (
+    Reader(
+        name="PX4 ULog", meaning="positions, velocities, attitude, rates and outputs, by pyulog",
+        fits=_begins(b"ULog\x01\x12\x35"), read=read_px4, extra="logs",
+    ),
+    Reader(
+        name="ROS bag or MCAP", meaning="bags of ROS 1 and folders of ROS 2, by rosbags; axes of REP 103 are turned",
+        fits=is_ros, read=read_ros, extra="logs",
+    ),
+    Reader(
+        name="ArduPilot log", meaning=".bin and .log of the board, .tlog of the telemetry, by pymavlink",
+        fits=is_ardupilot, read=read_ardupilot, extra="logs",
+    ),
+    Reader(
+        name="Parquet", meaning="a table with a column of times, by pyarrow", fits=_begins(b"PAR1"), read=read_parquet,
+        extra="logs",
+    ),
+    Reader(
+        name="Excel", meaning="the first sheet of a .xlsx, read as the text that it shows, by openpyxl",
+        fits=_begins(b"PK\x03\x04"), read=read_excel, extra="logs",
+    ),
+    Reader(
+        name="MATLAB", meaning="vectors, matrices and structures of them, up to version 7, by scipy",
+        fits=_begins(b"MATLAB 5.0"), read=read_matlab,
+    ),
+    Reader(
+        name="MATLAB 7.3", meaning="the same of version 7.3, and other HDF5, by h5py",
+        fits=_begins(b"MATLAB 7.3", b"\x89HDF"), read=read_matlab73, extra="logs",
+    ),
+    Reader(
+        name="text",
+        meaning="tables with any separator, decimal sign, header and clock; NMEA 0183, also behind times of reception, "
+        "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; both in one file",
+        fits=is_text, read=read_text,
+    ),
+)  # fmt: skip
+"""All formats; what no other one begins like may be text."""
+OLD_EXCEL = b"\xd0\xcf\x11\xe0"
+
+
+def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
+    """What a file, or the folder of a bag, holds.
+
+    Args:
+        path: of it.
+        sample_time_s: between rows of a table without a clock [s]; 0 where it is not known.
+
+    Raises:
+        FileError: missing, empty, of no known format or broken, or the library that reads it is not installed.
+    """
+    check_ends(path, "a log")
+    try:
+        head = b"" if path.is_dir() else _head(path)
+    except FileNotFoundError:
+        raise FileError(path, "", "does not exist, expected a log") from None
+    except OSError as error:
+        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
+    if path.is_dir() and not is_ros(path, head):
+        raise FileError(path, "", "is a folder without metadata.yaml, expected files, or the folder of a ROS 2 bag")
+    if not head and not path.is_dir():
+        raise FileError(path, "", "is empty, expected a log")
+    if head.startswith(OLD_EXCEL):
+        raise FileError(path, "", "is a spreadsheet of the old format .xls, expected it saved as .xlsx or CSV")
+    reader = next(one for one in READERS if one.fits(path, head))
+    try:
+        return reader.read(path, sample_time_s)
+    except ModuleNotFoundError as error:
+        hint = f"needs {error.name}: pip install 'expdesign[{reader.extra or 'logs'}]'"
+        raise FileError(path, "", f"is a {reader.name}, which {hint}") from None
+    except FileError:
+        raise
+    except Exception as error:  # libraries raise anything on broken files
+        what = " ".join(f"{type(error).__name__}: {error}".split())[:160]
+        raise FileError(path, "", f"begins like a {reader.name} but cannot be read ({what})") from None

@@ -1,0 +1,63 @@
+"""Excel by openpyxl, Parquet by pyarrow."""
+
+from __future__ import annotations
+
+from datetime import datetime, time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from expdesign.errors import FileError
+from expdesign.importing.channels import Log
+from expdesign.importing.readers.columns import columns_log
+from expdesign.importing.readers.text import read_text
+
+
+def read_excel(path: Path, sample_time_s: float) -> Log:
+    """The first sheet with two rows or more, read as the text that it shows."""
+    import openpyxl
+
+    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    try:
+        for sheet in book.worksheets:
+            lines = ["\t".join(map(_text, row)) for row in sheet.iter_rows(values_only=True) if any(map(_filled, row))]
+            if len(lines) < 2:
+                continue
+            with TemporaryDirectory(prefix="expdesign-") as folder:
+                copy = Path(folder) / path.name
+                copy.write_text("\n".join(lines) + "\n", encoding="utf-8")
+                return read_text(copy, sample_time_s)
+    finally:
+        book.close()
+    raise FileError(path, "", "has no sheet with rows, expected a header and one row per sample")
+
+
+def _filled(cell: object) -> bool:
+    return cell is not None
+
+
+def _text(cell: object) -> str:
+    if cell is None:
+        return ""
+    if isinstance(cell, datetime):
+        return cell.isoformat(sep=" ")
+    return cell.isoformat() if isinstance(cell, time) else str(cell).replace("\t", " ").replace("\n", " ")
+
+
+def read_parquet(path: Path, sample_time_s: float) -> Log:
+    """All columns of numbers, times and texts; other ones are left out."""
+    import pyarrow
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(path)
+    columns = {}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        kind = column.type
+        if pyarrow.types.is_temporal(kind):
+            columns[name] = np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
+        elif pyarrow.types.is_integer(kind) or pyarrow.types.is_floating(kind) or pyarrow.types.is_boolean(kind):
+            columns[name] = np.asarray(column.to_numpy(), dtype=float)
+        elif pyarrow.types.is_string(kind) or pyarrow.types.is_large_string(kind):
+            columns[name] = np.asarray(column.to_numpy(), dtype=object)
+    return columns_log(path.name, columns, sample_time_s)

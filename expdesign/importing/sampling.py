@@ -1,0 +1,315 @@
+"""Channels on one common clock: stretches without a gap, in even steps, in the columns of our CSV.
+
+Readings faster than the steps are averaged over each of them, or, of orders, as they act from a step to the next;
+others of about the same rate are interpolated; slower ones are repeated, so that their interval can be seen and is
+undone where data are used (`expdesign.kinematics`). Angles go round: no mean and no line passes through north.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping as Table
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.errors import NoAnswer
+from expdesign.importing.channels import Channel
+from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
+from expdesign.records.file import PLANNED, REACHED, STEERED, input_name, is_input
+from expdesign.values import Array
+
+FORCES = ("tau_x", "tau_y", "tau_psi")
+MAIN = ("lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", NORTHWARD, EASTWARD, "r_radps")
+PLACES = {"lat_deg", "lon_deg", "north_m", "east_m"}
+LONGEST_STEP_S, SHORTEST_STEP_S = 1.0, 0.01
+SAME = 1.5  # ratio of intervals within which two rates are the same
+GAP = 3.5  # intervals without a reading that are a gap
+LEAST_GAP_S = 1.5
+SHORTEST = 10  # samples of a stretch
+COVERED = 0.98  # share of a stretch that a column beside the main ones must cover
+EARLY = 0.25  # share of a step by which a stamp may be late and the reading still belongs to that step
+FAST = 20.0  # degrees between readings from which a way through north may be an average
+EARTH_M = 6.371e6  # radius, for the few metres between antenna and midships
+NORTH_CLOSE = 80.0  # degrees between its ends, at most
+
+
+class NothingToWrite(NoAnswer):
+    """The logs hold nothing that makes a record."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stretch:
+    """Rows without a gap."""
+
+    time_s: Array  # (k,) in even steps
+    columns: Table[str, Array]  # (k,) by name
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def cut(self, part: slice) -> Stretch:
+        """Consecutive rows."""
+        return Stretch(time_s=self.time_s[part], columns={name: own[part] for name, own in self.columns.items()})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sampled:
+    """All that was put on the common clock."""
+
+    stretches: tuple[Stretch, ...]
+    sample_time_s: float
+    notes: tuple[str, ...]
+    held_s: Table[str, float]  # column -> interval of a sensor that is read less often [s]
+
+
+def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
+    """Columns on a common clock.
+
+    Args:
+        found: column -> channel in its unit, on one time scale.
+        mapping: for the sample time, the variation and the antenna.
+
+    Raises:
+        NothingToWrite: there is neither a position nor a velocity, or no time that all main columns cover.
+    """
+    table, notes = dict(found), []
+    for name in [name for name in table if _is_angle(name)]:
+        table[name], bad = _without_north(table[name])
+        if bad:
+            notes.append(f"{name}: {bad} readings on the way through north were averages across it, and are left out")
+    table, more = _true_heading(table, mapping)
+    notes += more
+    table, more = _ground_velocity(table)
+    notes += more
+    main = [name for name in table if name in MAIN or _is_input(name)]
+    if not set(main) & (PLACES | {"u_mps", NORTHWARD}):
+        raise NothingToWrite("the logs give neither positions nor velocities, expected one of them")
+    step_s = mapping.sample_time_s or _step(table)
+    stretches = []
+    for first, last in _covered([table[name] for name in main], step_s):
+        times = _grid(table, first, last, step_s)
+        if len(times) < SHORTEST:
+            continue
+        columns = {name: _resampled(name, table[name], times, step_s) for name in main}
+        for name in table.keys() - set(main):
+            if _covers(table[name], times, step_s):
+                columns[name] = _resampled(name, table[name], times, step_s)
+            else:
+                notes.append(f"{name} does not cover all of a stretch, and is left out of it")
+        stretches.append(Stretch(time_s=times, columns=_finished(columns, mapping, found)))
+    if not stretches:
+        ends = {name: table[name].time_s[[0, -1]] - _origin(table) for name in main}
+        spans = "; ".join(f"{name} from {first:.0f} to {last:.0f} s" for name, (first, last) in ends.items())
+        raise NothingToWrite(f"no stretch of {SHORTEST} samples is covered by all main columns: {spans}")
+    held = {name: table[name].interval_s for name in table if table[name].interval_s > SAME * step_s}
+    for name, interval_s in held.items():
+        if name != VARIATION:
+            notes.append(f"{name} is read every {interval_s:.4g} s; the last reading is repeated in between")
+    return Sampled(
+        stretches=tuple(stretches), sample_time_s=step_s, notes=tuple(dict.fromkeys(notes)), held_s=held
+    )  # fmt: skip
+
+
+def _origin(table: Table[str, Channel]) -> float:
+    return min(float(channel.time_s[0]) for channel in table.values())
+
+
+def _is_input(name: str) -> bool:
+    return is_input(input_name(name))
+
+
+def _is_angle(name: str) -> bool:
+    return name in ("heading_rad", MAGNETIC, COG, "wind_angle_rad") or (input_name(name)[:1] == "a" and _is_input(name))
+
+
+def _is_held(name: str) -> bool:
+    """Whether a value stands until the next one: orders, marks."""
+    return (_is_input(name) and not name.startswith(REACHED)) or name.startswith(PLANNED) or name in (STEERED, "batch")
+
+
+def _without_north(channel: Channel) -> tuple[Channel, int]:
+    """The channel without readings that were averaged or interpolated the long way round, and their number.
+
+    Such readings go from 359 to 1 degrees by 180: steps of one sense, each large, which together make nearly a turn.
+    """
+    degrees = np.degrees(channel.values) % 360.0
+    steps = np.diff(degrees)
+    if len(steps) and np.quantile(np.abs((steps + 180.0) % 360.0 - 180.0), 0.9) > FAST / 2.0:
+        return channel, 0  # a course of a ship that lies still goes anywhere
+    sense = np.sign(steps) * (np.abs(steps) > FAST)
+    edges = np.flatnonzero(np.diff(sense)) + 1
+    bad = np.zeros(len(degrees), dtype=bool)
+    for part in np.split(np.arange(len(steps)), edges):
+        if len(part) < 2 or not sense[part[0]]:
+            continue
+        total = float(degrees[part[-1] + 1] - degrees[part[0]])
+        if 360.0 - abs(total) < NORTH_CLOSE:
+            bad[part[1:]] = True
+    if not bad.any():
+        return channel, 0
+    return replace(channel, time_s=channel.time_s[~bad], values=channel.values[~bad]), int(bad.sum())
+
+
+def _true_heading(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[str, Channel], list[str]]:
+    """The heading from a magnetic one."""
+    variation = table.pop(VARIATION, None)
+    if MAGNETIC not in table:
+        return table, []
+    magnetic = table.pop(MAGNETIC)
+    if "heading_rad" in table:
+        return table, []
+    if mapping.variation_deg is not None:
+        east, words = np.radians(mapping.variation_deg), f"{mapping.variation_deg:g} degrees, as the mapping says"
+    elif variation is not None:
+        east = np.interp(magnetic.time_s, variation.time_s, variation.values)
+        words = f"{np.degrees(np.median(variation.values)):.2g} degrees, as the log says"
+    else:
+        east, words = 0.0, ""
+    heading = replace(magnetic, name="heading_rad", values=magnetic.values + east)
+    note = (
+        f"the heading is magnetic; the variation added is {words}"
+        if words
+        else "the heading is magnetic, and no variation is known: it stays magnetic (variation_deg in the mapping)"
+    )
+    return {**table, "heading_rad": heading}, [note]
+
+
+def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
+    """Velocity north and east from speed and course, unless it is measured in the ship's axes."""
+    speed, course = table.pop(SOG, None), table.pop(COG, None)
+    if len({"u_mps", "v_mps"} & set(table)) == 1 and (NORTHWARD in table or (speed is not None and course is not None)):
+        (alone,) = {"u_mps", "v_mps"} & set(table)
+        del table[alone]
+        table, notes = _ground_velocity(
+            {**table, **({} if speed is None or course is None else {SOG: speed, COG: course})}
+        )
+        return table, [f"{alone} alone is no velocity, and is left out", *notes]
+    if {"u_mps", "v_mps"} <= set(table):
+        for name in (NORTHWARD, EASTWARD):
+            table.pop(name, None)
+        return table, []
+    if NORTHWARD not in table and speed is not None and course is not None and len(course) > 1:
+        # at the times of the speed; the course of a ship that lies still is anything, and counts by her speed
+        angle = np.interp(speed.time_s, course.time_s, np.unwrap(course.values))
+        known = (speed.time_s >= course.time_s[0] - 1e-3) & (speed.time_s <= course.time_s[-1] + 1e-3)
+        for name, part in ((NORTHWARD, np.cos(angle)), (EASTWARD, np.sin(angle))):
+            table[name] = replace(speed, name=name, time_s=speed.time_s[known], values=(speed.values * part)[known])
+    if NORTHWARD in table and "heading_rad" not in table:
+        table.pop(NORTHWARD), table.pop(EASTWARD, None)
+        return table, [
+            "no heading is recorded: u and v cannot be had from speed and course, and course is not taken for heading"
+        ]
+    if NORTHWARD in table:
+        return table, [
+            "u_mps and v_mps are the velocity over ground, from speed and course or north and east, in the ship's axes"
+        ]
+    return table, []
+
+
+def _step(table: Table[str, Channel]) -> float:
+    """The interval of the slowest main sensor of the ship's motion, at most a second."""
+    own = [channel.interval_s for name, channel in table.items() if name in MAIN]
+    interval_s = max((value for value in own if value < math.inf), default=LONGEST_STEP_S)
+    fastest_s = min(own, default=interval_s)
+    if interval_s > LONGEST_STEP_S:
+        interval_s = max(LONGEST_STEP_S, fastest_s)
+    return float(f"{max(interval_s, SHORTEST_STEP_S):.4g}")
+
+
+def _covered(channels: list[Channel], step_s: float) -> list[tuple[float, float]]:
+    """Times that all channels cover without a gap."""
+    spans = [(-np.inf, np.inf)]
+    for channel in channels:
+        longest = max(GAP * channel.interval_s, GAP * step_s, LEAST_GAP_S)
+        cuts = np.flatnonzero(np.diff(channel.time_s) > longest)
+        begins, ends = channel.time_s[np.r_[0, cuts + 1]], channel.time_s[np.r_[cuts, len(channel) - 1]]
+        own = list(zip(begins.tolist(), ends.tolist(), strict=True))
+        spans = _crossed(spans, own)
+    return [(first, last) for first, last in spans if np.isfinite([first, last]).all()]
+
+
+def _crossed(one: list[tuple[float, float]], two: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Intersections of two lists of intervals in order."""
+    found, i, j = [], 0, 0
+    while i < len(one) and j < len(two):
+        first, last = max(one[i][0], two[j][0]), min(one[i][1], two[j][1])
+        if first < last:
+            found.append((first, last))
+        if one[i][1] < two[j][1]:
+            i += 1
+        else:
+            j += 1
+    return found
+
+
+def _grid(table: Table[str, Channel], first: float, last: float, step_s: float) -> Array:
+    """Even times, which meet the stamps of the slowest main sensor of about this rate."""
+    main = [c for name, c in table.items() if name in MAIN and 1 / SAME < c.interval_s / step_s < SAME]
+    start = first
+    if main:
+        stamps = max(main, key=lambda channel: channel.interval_s).time_s
+        later = stamps[(stamps >= first - 1e-9) & (stamps <= last)]
+        start = float(later[0]) if len(later) else first
+    return np.asarray(start + step_s * np.arange(int((last - start) / step_s + 1e-6) + 1))
+
+
+def _covers(channel: Channel, times: Array, step_s: float) -> bool:
+    longest = max(GAP * channel.interval_s, GAP * step_s, LEAST_GAP_S)
+    place = np.clip(np.searchsorted(channel.time_s, times), 1, max(len(channel) - 1, 1))
+    if len(channel) < 2:
+        return False
+    inside = (times >= channel.time_s[0] - step_s) & (times <= channel.time_s[-1] + longest)
+    near = channel.time_s[place] - channel.time_s[place - 1] <= longest
+    return float(np.mean(inside & (near | (times > channel.time_s[-1])))) >= COVERED
+
+
+def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Array:
+    """Values (k,) at even times."""
+    own, values = channel.time_s, channel.values
+    if _is_angle(name):
+        values = np.unwrap(values)
+    ratio = channel.interval_s / step_s
+    parts = math.ceil(1.0 / max(ratio, 1e-4)) if ratio < 1.0 / SAME else 1
+    shares = (np.arange(parts) + 0.5) / parts
+    if _is_held(name):
+        shift = EARLY * min(channel.interval_s, step_s) if parts == 1 else 0.0
+        at = np.zeros(1) if parts == 1 else shares
+        found = np.zeros(len(times))
+        for share in at:
+            places = np.searchsorted(own, times + share * step_s + shift + 1e-9, side="right") - 1
+            found += values[np.maximum(places, 0)]
+        return np.asarray(found / len(at))
+    if ratio > SAME:
+        places = np.searchsorted(own, times + 1e-3 * step_s, side="right") - 1
+        return np.asarray(values[np.maximum(places, 0)])
+    if parts == 1:
+        return np.interp(times, own, values)
+    found = np.zeros(len(times))
+    for share in shares:
+        found += np.interp(times + (share - 0.5) * step_s, own, values)
+    return found / parts
+
+
+def _finished(columns: dict[str, Array], mapping: Mapping, found: Table[str, Channel]) -> dict[str, Array]:
+    """The columns of our CSV: velocities in the ship's axes, at the antenna's place or at midships."""
+    if NORTHWARD in columns and EASTWARD in columns:
+        north, east = columns.pop(NORTHWARD), columns.pop(EASTWARD)
+        c, s = np.cos(columns["heading_rad"]), np.sin(columns["heading_rad"])
+        columns |= {"u_mps": c * north + s * east, "v_mps": c * east - s * north}
+    if forces := [name for name in FORCES if name in columns]:
+        columns |= {name: np.zeros(len(columns[forces[0]])) for name in FORCES if name not in columns}
+    ahead, beside = mapping.antenna_forward_m, mapping.antenna_starboard_m
+    if not (ahead or beside) or "heading_rad" not in columns:
+        return columns
+    c, s = np.cos(columns["heading_rad"]), np.sin(columns["heading_rad"])
+    north, east = c * ahead - s * beside, s * ahead + c * beside
+    if "lat_deg" in columns:
+        columns["lon_deg"] = columns["lon_deg"] - np.degrees(east / EARTH_M) / np.cos(np.radians(columns["lat_deg"]))
+        columns["lat_deg"] = columns["lat_deg"] - np.degrees(north / EARTH_M)
+    elif "north_m" in columns:
+        columns |= {"north_m": columns["north_m"] - north, "east_m": columns["east_m"] - east}
+    if "r_radps" in columns and "u_mps" in columns and (SOG in found or NORTHWARD in found):
+        columns["u_mps"] = columns["u_mps"] + columns["r_radps"] * beside
+        columns["v_mps"] = columns["v_mps"] - columns["r_radps"] * ahead
+    return columns

@@ -1,0 +1,417 @@
+"""A voyage of the 50 m ship of the field's data, simulated here, and written as logs of many formats.
+
+The equations are those of `data/field/README.md`: no part of the package makes or writes them. Binary formats without a
+writer in a kept library are written by hand, from their specification.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+RATE_RADPS = 0.05
+STEP_S = 0.1
+START_S = 1_760_000_000.0  # 2025-10-09 08:53:20 UTC
+LAT, LON = 54.5, 18.6
+PARTS = (("steady", 120.0), ("zigzag", 300.0), ("steady", 240.0), ("circle", 500.0), ("steady", 150.0))
+
+
+@dataclass(frozen=True)
+class Voyage:
+    """Truth every 0.1 s: the heading wrapped to a turn, the rudder's order and where it stands."""
+
+    time_s: np.ndarray
+    north_m: np.ndarray
+    east_m: np.ndarray
+    heading_rad: np.ndarray
+    u_mps: np.ndarray
+    v_mps: np.ndarray
+    r_radps: np.ndarray
+    n_rps: np.ndarray
+    order_rad: np.ndarray
+    rudder_rad: np.ndarray
+
+    def every(self, count: int) -> Voyage:
+        """Every so many samples."""
+        return Voyage(*(getattr(self, name)[::count] for name in self.__dataclass_fields__))
+
+    @cached_property
+    def lat_deg(self) -> np.ndarray:
+        """By the radii of curvature at the place."""
+        return LAT + np.degrees(self.north_m / 6_377_900.0)
+
+    @cached_property
+    def lon_deg(self) -> np.ndarray:
+        return LON + np.degrees(self.east_m / (6_392_320.0 * math.cos(math.radians(LAT))))
+
+    @cached_property
+    def speed_mps(self) -> np.ndarray:
+        return np.hypot(self.u_mps, self.v_mps)
+
+    @cached_property
+    def course_rad(self) -> np.ndarray:
+        return (self.heading_rad + np.arctan2(self.v_mps, self.u_mps)) % (2 * np.pi)
+
+
+def voyage(*, parts: tuple[tuple[str, float], ...] = PARTS, heading: float = 0.3) -> Voyage:
+    """Steady legs, a 20/20 zig-zag and a turning circle, without weather."""
+    state = np.array([0.0, 0.0, heading, 4.24, 0.0, 0.0])
+    rows, rudder, order = [], 0.0, 0.0
+    n = 3.0
+    time = 0.0
+    for kind, seconds in parts:
+        course = state[2]
+        order = {"zigzag": math.radians(20.0), "circle": math.radians(35.0)}.get(kind, 0.0)
+        for _ in range(round(seconds / STEP_S)):
+            if kind == "zigzag" and order * (state[2] - course) >= math.radians(20.0) * abs(order):
+                order = -order
+            if kind == "steady":
+                order = math.radians(
+                    round(math.degrees(np.clip(1.2 * (course - state[2]) - 25.0 * state[5], -0.03, 0.03)), 1)
+                )
+            rows.append([time, *state, n, order, rudder])
+            middle = rudder + np.clip(order - rudder, -RATE_RADPS * STEP_S / 2, RATE_RADPS * STEP_S / 2)
+            a = derivative(state, n, middle)
+            state = state + STEP_S * derivative(state + STEP_S / 2 * a, n, middle)
+            rudder += float(np.clip(order - rudder, -RATE_RADPS * STEP_S, RATE_RADPS * STEP_S))
+            time += STEP_S
+    t, north, east, psi, u, v, r, rps, orders, rudders = np.array(rows).T
+    return Voyage(START_S + t, north, east, psi % (2 * np.pi), u, v, r, rps, orders, rudders)
+
+
+def derivative(state: np.ndarray, n: float, rudder: float) -> np.ndarray:
+    """The ship's equations of motion."""
+    _, _, psi, u, v, r = state
+    return np.array([
+        u * math.cos(psi) - v * math.sin(psi),
+        u * math.sin(psi) + v * math.cos(psi),
+        r,
+        -0.004 * abs(u) * u + 0.008 * abs(n) * n + 1.2 * v * r,
+        -0.02 * abs(u) * v - 0.3 * u * r,
+        -0.02 * abs(u) * r + 0.0005 * abs(u) * u * math.sin(rudder),
+    ])  # fmt: skip
+
+
+def iso(time_s: float) -> str:
+    """`2025-10-09T08:53:20.100Z`."""
+    return datetime.fromtimestamp(round(time_s, 3), UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def write_own(path: Path, trip: Voyage) -> Path:
+    """A CSV of ours."""
+    head = "time_s,lat_deg,lon_deg,heading_rad,u_mps,v_mps,r_radps,n1_rps,rudder1_rad,reached_rudder1_rad"
+    columns = (trip.time_s - START_S, trip.lat_deg, trip.lon_deg, trip.heading_rad, trip.u_mps, trip.v_mps,
+               trip.r_radps, trip.n_rps, trip.order_rad, trip.rudder_rad)  # fmt: skip
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=head, comments="", fmt="%.10g")
+    return path
+
+
+NAMES = ("Lat", "Lon", "SOG [kn]", "COG", "HDG", "ROT (deg/min)", "RPM", "Rudder order", "Rudder angle")
+
+
+def logger_rows(trip: Voyage) -> np.ndarray:
+    """(k, 9) what a bridge logger writes: degrees, knots, revolutions per minute."""
+    return np.column_stack([
+        trip.lat_deg, trip.lon_deg, trip.speed_mps * 3600 / 1852, np.degrees(trip.course_rad),
+        np.degrees(trip.heading_rad), np.degrees(trip.r_radps) * 60, trip.n_rps * 60, np.degrees(trip.order_rad),
+        np.degrees(trip.rudder_rad),
+    ])  # fmt: skip
+
+
+def write_dialect(path: Path, trip: Voyage, *, separator: str = ";", comma: bool = True, stamps: str = "iso") -> Path:
+    """A logger's CSV: some separator, decimal sign and clock."""
+    lines = ["Bridge logger, exported", separator.join([*{"split": ("Date", "Time")}.get(stamps, ("Time",)), *NAMES])]
+    for time_s, row in zip(trip.time_s.tolist(), logger_rows(trip).tolist(), strict=True):
+        cells = [f"{row[0]:.8f}", f"{row[1]:.8f}", *(f"{value:.4f}" for value in row[2:])]
+        text = iso(time_s)
+        clock = {
+            "iso": [text], "split": [f"{text[8:10]}.{text[5:7]}.{text[:4]}", text[11:23]], "s": [f"{time_s:.3f}"],
+            "ms": [f"{time_s * 1e3:.0f}"], "us": [f"{time_s * 1e6:.0f}"], "ns": [f"{round(time_s * 1e3) * 10**6}"],
+            "day": [text[11:23]], "hhmmss": [text[11:23].replace(":", "")],
+        }[stamps]  # fmt: skip
+        cells = [cell.replace(".", ",") for cell in cells] if comma else cells
+        lines.append(separator.join([*clock, *cells]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def sentence(body: str) -> str:
+    """With its checksum."""
+    total = 0
+    for letter in body:
+        total ^= ord(letter)
+    return f"${body}*{total:02X}"
+
+
+def dm(degrees: float, digits: int) -> str:
+    """Degrees and minutes run together."""
+    whole = int(abs(degrees))
+    return f"{whole:0{digits}d}{60 * (abs(degrees) - whole):010.7f}"
+
+
+def nmea(trip: Voyage, *, magnetic: float | None = None) -> list[str]:
+    """Sentences of a bridge: position, speed, heading (magnetic with a variation [deg]), turn, rudder, shaft."""
+    lines = []
+    for k in range(len(trip.time_s)):
+        when = datetime.fromtimestamp(round(trip.time_s[k], 3), UTC)
+        clock, date = when.strftime("%H%M%S.") + f"{when.microsecond // 10000:02d}", when.strftime("%d%m%y")
+        knots, course = trip.speed_mps[k] * 3600 / 1852, math.degrees(trip.course_rad[k])
+        place = f"{dm(trip.lat_deg[k], 2)},N,{dm(trip.lon_deg[k], 3)},E"
+        heading = math.degrees(trip.heading_rad[k])
+        lines += [
+            sentence(f"GPRMC,{clock},A,{place},{knots:.4f},{course:.3f},{date},,,A"),
+            sentence(f"GPGGA,{clock},{place},4,12,0.9,10.0,M,0.0,M,,"),
+            sentence(f"HEHDT,{heading:.4f},T")
+            if magnetic is None
+            else sentence(
+                f"HCHDG,{(heading - magnetic) % 360:.4f},,,{abs(magnetic):.1f},{'E' if magnetic > 0 else 'W'}"
+            ),
+            sentence(f"TIROT,{math.degrees(trip.r_radps[k]) * 60:.4f},A"),
+            sentence(f"IIRSA,{math.degrees(trip.rudder_rad[k]):.4f},A,,V"),
+            sentence(f"IIRPM,S,0,{trip.n_rps[k] * 60:.2f},100,A"),
+            sentence("GPGSV,1,1,00"),
+        ]
+    return lines
+
+
+def write_nmea(path: Path, trip: Voyage, *, magnetic: float | None = None, broken: int = 0) -> Path:
+    """A log of NMEA 0183, some of whose lines are broken off."""
+    lines = nmea(trip, magnetic=magnetic)
+    rng = np.random.default_rng(3)
+    for place in rng.choice(len(lines), broken, replace=False).tolist():
+        lines[place] = lines[place][: len(lines[place]) // 2] + lines[place][len(lines[place]) // 2 + 1 :]
+    path.write_text("\r\n".join(lines) + "\r\n")
+    return path
+
+
+def write_opencpn(path: Path, trip: Voyage) -> Path:
+    """What OpenCPN's data recorder writes: time of reception, kind, and the sentence in quotes."""
+    lines, each = nmea(trip), 7
+    rows = ["timestamp,type,id,message"]
+    for k, line in enumerate(lines):
+        rows.append(f'{iso(trip.time_s[k // each] + 0.012)},NMEA0183,{line[3:6]},"{line}"')
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def write_excel(path: Path, trip: Voyage) -> Path:
+    """A sheet with a header, units below it, and dates."""
+    import openpyxl
+
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet()
+    sheet.append(["Time", "Latitude", "Longitude", "SOG", "COG", "HDG", "ROT", "RPM", "Rudder order", "Rudder angle"])
+    sheet.append(["UTC", "deg", "deg", "kn", "deg", "deg", "deg/min", "rpm", "deg", "deg"])
+    for time_s, row in zip(trip.time_s.tolist(), logger_rows(trip).tolist(), strict=True):
+        sheet.append([datetime.fromtimestamp(round(time_s, 3), UTC).replace(tzinfo=None), *row])
+    book.save(path)
+    return path
+
+
+def write_parquet(path: Path, trip: Voyage) -> Path:
+    """A table with time stamps."""
+    import pyarrow
+    import pyarrow.parquet
+
+    stamps = np.round(trip.time_s * 1e3).astype("datetime64[ms]")
+    names = [name.replace(" ", "_") for name in NAMES]
+    columns = dict(zip(names, logger_rows(trip).T, strict=True))
+    pyarrow.parquet.write_table(pyarrow.table({"timestamp": stamps, **columns}), path)
+    return path
+
+
+def matlab_content(trip: Voyage) -> dict[str, np.ndarray]:
+    return {
+        "t": trip.time_s - START_S, "lat": trip.lat_deg, "lon": trip.lon_deg, "psi": np.degrees(trip.heading_rad),
+        "u": trip.u_mps, "v": trip.v_mps, "yaw_rate": np.degrees(trip.r_radps), "rpm": 60 * trip.n_rps,
+        "rudder_cmd": np.degrees(trip.order_rad), "rudder_act": np.degrees(trip.rudder_rad),
+    }  # fmt: skip
+
+
+def write_matlab(path: Path, trip: Voyage) -> Path:
+    """A structure of vectors, version 5."""
+    import scipy.io
+
+    scipy.io.savemat(path, {"ship": matlab_content(trip), "note": "a trial"})
+    return path
+
+
+def write_matlab73(path: Path, trip: Voyage) -> Path:
+    """Version 7.3: HDF5, vectors as columns of a matrix."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values in matlab_content(trip).items():
+            file[f"ship/{name}"] = values[None, :]
+    return path
+
+
+DF = {
+    "GPS": (130, "QBIHBcLLeffffB", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U"),
+    "ATT": (131, "QccccCCccB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
+    "IMU": (132, "QBffffffIIfBBHH", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz"),
+    "RCOU": (133, "QHHHH", "TimeUS,C1,C2,C3,C4"),
+    "PARM": (134, "QNff", "TimeUS,Name,Value,Default"),
+}
+FORMATS = {"Q": "Q", "B": "B", "I": "I", "H": "H", "c": "h", "C": "H", "L": "i", "e": "i", "f": "f", "N": "16s"}
+GPS_EPOCH_S, LEAP_S = 315_964_800.0, 18.0
+
+
+def write_ardupilot(path: Path, trip: Voyage) -> Path:
+    """A board's log, by the layout of its FMT messages: servo 1 steers, servo 3 is the throttle."""
+    out = bytearray()
+    for name, (kind, form, labels) in {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **DF}.items():
+        size = 89 if name == "FMT" else 3 + struct.calcsize("<" + "".join(FORMATS[c] for c in form))
+        body = struct.pack("<BB4s16s64s", kind, size, name.encode(), form.encode(), labels.encode())
+        out += b"\xa3\x95\x80" + body
+
+    def add(name: str, *values: object) -> None:
+        kind, form, _ = DF[name]
+        out.extend(b"\xa3\x95" + bytes([kind]) + struct.pack("<" + "".join(FORMATS[c] for c in form), *values))
+
+    for servo, function in ((b"SERVO1_FUNCTION", 26.0), (b"SERVO3_FUNCTION", 70.0)):
+        add("PARM", 1, servo, function, 0.0)
+    for k in range(len(trip.time_s)):
+        us = round((trip.time_s[k] - START_S) * 1e6) + 5_000_000
+        week, ms = divmod(trip.time_s[k] - GPS_EPOCH_S + LEAP_S, 604_800.0)
+        course = math.degrees(trip.course_rad[k])
+        add("GPS", us, 4, round(ms * 1e3), int(week), 12, 90, round(trip.lat_deg[k] * 1e7),
+            round(trip.lon_deg[k] * 1e7),            0, trip.speed_mps[k], course, 0.0, 0.0, 1)  # fmt: skip
+        add("ATT", us, 0, 0, 0, 0, 0, round(math.degrees(trip.heading_rad[k]) * 100), 0, 0, 3)
+        add("IMU", us, 0, 0.0, 0.0, trip.r_radps[k], 0.0, 0.0, -9.8, 0, 0, 20.0, 1, 1, 10, 10)
+        add(
+            "RCOU",
+            us,
+            1500 + round(trip.order_rad[k] / math.radians(35) * 500),
+            1500,
+            1500 + round(trip.n_rps[k] * 100),
+            0,
+        )
+    path.write_bytes(out)
+    return path
+
+
+def write_telemetry(path: Path, trip: Voyage) -> Path:
+    """A telemetry log, by pymavlink's own encoder."""
+    from pymavlink.dialects.v20 import ardupilotmega as mav
+
+    link = mav.MAVLink(None)
+    with path.open("wb") as file:
+
+        def add(time_s: float, message: object) -> None:
+            file.write(struct.pack(">Q", round(time_s * 1e6)) + message.pack(link))  # type: ignore[attr-defined]
+
+        for k in range(len(trip.time_s)):
+            t, ms = trip.time_s[k], round((trip.time_s[k] - START_S) * 1e3)
+            c, s = math.cos(trip.heading_rad[k]), math.sin(trip.heading_rad[k])
+            north, east = trip.u_mps[k] * c - trip.v_mps[k] * s, trip.u_mps[k] * s + trip.v_mps[k] * c
+            yaw = (trip.heading_rad[k] + math.pi) % (2 * math.pi) - math.pi
+            add(t, mav.MAVLink_global_position_int_message(
+                ms, round(trip.lat_deg[k] * 1e7), round(trip.lon_deg[k] * 1e7), 0, 0, round(north * 100),
+                round(east * 100), 0, round(math.degrees(trip.heading_rad[k]) * 100) % 36000))  # fmt: skip
+            add(t, mav.MAVLink_attitude_message(ms, 0.0, 0.0, yaw, 0.0, 0.0, trip.r_radps[k]))
+            add(t, mav.MAVLink_servo_output_raw_message(
+                ms * 1000, 0, 1500 + round(trip.order_rad[k] / math.radians(35) * 500), 1500,
+                1500 + round(trip.n_rps[k] * 100), 0, 0, 0, 0, 0))  # fmt: skip
+            if k == 0:
+                for name, value in ((b"SERVO1_FUNCTION", 26.0), (b"SERVO3_FUNCTION", 70.0)):
+                    add(t, mav.MAVLink_param_value_message(name, value, 2, 2, 0))
+    return path
+
+
+def write_ulog(path: Path, trip: Voyage) -> Path:
+    """PX4's format, by its specification: formats, subscriptions, data."""
+    out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
+
+    def add(kind: str, body: bytes) -> None:
+        out.extend(struct.pack("<HB", len(body), ord(kind)) + body)
+
+    topics = {
+        "sensor_gps": (
+            "uint64_t timestamp;uint64_t time_utc_usec;double latitude_deg;double longitude_deg;float vel_n_m_s;"
+            "float vel_e_m_s;",
+            "<QQddff",
+        ),
+        "vehicle_attitude": ("uint64_t timestamp;float[4] q;", "<Qffff"),
+        "vehicle_angular_velocity": ("uint64_t timestamp;float[3] xyz;", "<Qfff"),
+        "actuator_servos": ("uint64_t timestamp;float[2] control;", "<Qff"),
+        "actuator_motors": ("uint64_t timestamp;float[2] control;", "<Qff"),
+    }
+    add("B", bytes(40))
+    for name, (form, _) in topics.items():
+        add("F", f"{name}:{form}".encode())
+    for number, name in enumerate(topics):
+        add("A", struct.pack("<BH", 0, number) + name.encode())
+    for k in range(len(trip.time_s)):
+        us = round((trip.time_s[k] - START_S) * 1e6) + 1_000_000
+        c, s = math.cos(trip.heading_rad[k]), math.sin(trip.heading_rad[k])
+        half = trip.heading_rad[k] / 2
+        rows = (
+            (us, round(trip.time_s[k] * 1e6), trip.lat_deg[k], trip.lon_deg[k], trip.u_mps[k] * c - trip.v_mps[k] * s,
+             trip.u_mps[k] * s + trip.v_mps[k] * c),
+            (us, math.cos(half), 0.0, 0.0, math.sin(half)),
+            (us, 0.0, 0.0, trip.r_radps[k]),
+            (us, trip.order_rad[k] / math.radians(35), math.nan),
+            (us, trip.n_rps[k] / 5, math.nan),
+        )  # fmt: skip
+        for number, (row, (_, packed)) in enumerate(zip(rows, topics.values(), strict=True)):
+            add("D", struct.pack("<H", number) + struct.pack(packed, *row))
+    path.write_bytes(out)
+    return path
+
+
+def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
+    """A bag with position, odometry, rudder and shaft, by rosbags' writers: "ros1", "sqlite3" or "mcap"."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
+    t = store.types
+    writer = Writer1(path) if kind == "ros1" else Writer2(path, version=9, storage_plugin=StoragePlugin[kind.upper()])
+    serialize = store.serialize_ros1 if kind == "ros1" else store.serialize_cdr
+    with writer:
+        topics = {
+            "/fix": "sensor_msgs/msg/NavSatFix", "/odom": "nav_msgs/msg/Odometry",
+            "/rudder_cmd": "std_msgs/msg/Float64", "/rudder_angle": "std_msgs/msg/Float64",
+            "/shaft_rpm": "std_msgs/msg/Float64",
+        }  # fmt: skip
+        links = {name: writer.add_connection(name, form, typestore=store) for name, form in topics.items()}
+        zeros = np.zeros(36)
+        for k in range(len(trip.time_s)):
+            ns = round(trip.time_s[k] * 1e3) * 1_000_000
+            stamp = t["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+            extra = {"seq": k} if kind == "ros1" else {}
+            header = t["std_msgs/msg/Header"](stamp=stamp, frame_id="map", **extra)
+            v3, point = t["geometry_msgs/msg/Vector3"], t["geometry_msgs/msg/Point"]
+            yaw = math.pi / 2 - trip.heading_rad[k]
+            turn = t["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+            pose = t["geometry_msgs/msg/Pose"](
+                position=point(x=trip.east_m[k], y=trip.north_m[k], z=0.0), orientation=turn
+            )
+            twist = t["geometry_msgs/msg/Twist"](
+                linear=v3(x=trip.u_mps[k], y=-trip.v_mps[k], z=0.0), angular=v3(x=0.0, y=0.0, z=-trip.r_radps[k])
+            )
+            messages = {
+                "/fix": t["sensor_msgs/msg/NavSatFix"](
+                    header=header, status=t["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
+                    latitude=float(trip.lat_deg[k]), longitude=float(trip.lon_deg[k]), altitude=0.0,
+                    position_covariance=np.zeros(9), position_covariance_type=0),
+                "/odom": t["nav_msgs/msg/Odometry"](
+                    header=header, child_frame_id="base_link",
+                    pose=t["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=zeros),
+                    twist=t["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=zeros)),
+                "/rudder_cmd": t["std_msgs/msg/Float64"](data=math.degrees(trip.order_rad[k])),
+                "/rudder_angle": t["std_msgs/msg/Float64"](data=math.degrees(trip.rudder_rad[k])),
+                "/shaft_rpm": t["std_msgs/msg/Float64"](data=60 * trip.n_rps[k]),
+            }  # fmt: skip
+            for name, message in messages.items():
+                writer.write(links[name], ns, serialize(message, topics[name]))
+    return path

@@ -1,0 +1,278 @@
+"""One simulated voyage, written as logs of every format by writers that are not ours, is imported as it was sailed."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pynmeagps import NMEAReader
+
+from expdesign.cli import main
+from expdesign.importing import read_log
+from logged_trial import (
+    RATE_RADPS,
+    START_S,
+    Voyage,
+    nmea,
+    sentence,
+    voyage,
+    write_ardupilot,
+    write_dialect,
+    write_excel,
+    write_matlab,
+    write_matlab73,
+    write_nmea,
+    write_opencpn,
+    write_own,
+    write_parquet,
+    write_ros,
+    write_telemetry,
+    write_ulog,
+)
+
+KNOT, DEGREE = 1852 / 3600, math.pi / 180
+EXTRA = {
+    write_excel: "openpyxl", write_parquet: "pyarrow", write_matlab73: "h5py", write_ulog: "pyulog",
+    write_ros: "rosbags", write_ardupilot: "pymavlink", write_telemetry: "pymavlink",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def trip() -> Voyage:
+    return voyage()
+
+
+def imported(path: Path, *options: str) -> tuple[dict[str, np.ndarray], dict[str, object]]:
+    """Columns of all runs one after the other, with the time in UTC, and import.json."""
+    out = path.parent / "out"
+    assert main(["import", str(path), "--length-m", "50", "--out", str(out), "--quiet", *options]) == 0
+    said = json.loads((out / "import.json").read_text())
+    tables = []
+    for run in said["runs"]:
+        names = (out / run["file"]).read_text().partition("\n")[0].split(",")
+        tables.append(dict(zip(names, np.loadtxt(out / run["file"], delimiter=",", skiprows=1).T, strict=True)))
+    columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    begins_s = said["begins_s"]
+    if begins_s < 1e9:  # a clock of its own: a time of day, or seconds from the beginning
+        begins_s += START_S - START_S % 86400 if begins_s > 3600 else START_S
+    columns["time_s"] += begins_s
+    return columns, said
+
+
+def errors(columns: dict[str, np.ndarray], trip: Voyage) -> dict[str, float]:
+    """Largest difference from the truth at the same times, by column."""
+    truth = {
+        "lat_deg": trip.lat_deg, "lon_deg": trip.lon_deg, "heading_rad": np.unwrap(trip.heading_rad),
+        "u_mps": trip.u_mps, "v_mps": trip.v_mps, "r_radps": trip.r_radps, "n1_rps": trip.n_rps,
+        "rudder1_rad": trip.order_rad, "reached_rudder1_rad": trip.rudder_rad, "reached_n1_rps": trip.n_rps,
+        "tau_psi": trip.order_rad / math.radians(35),
+    }  # fmt: skip
+    found = {}
+    for name in columns.keys() & truth.keys():
+        error = columns[name] - np.interp(columns["time_s"], trip.time_s, truth[name])
+        if name == "heading_rad":
+            error = (error + np.pi) % (2 * np.pi) - np.pi
+        found[name] = float(np.abs(error).max())
+    return found
+
+
+# rounding of what each writer writes, at most; a turn of 0.03 rad/s times the rounding of times adds to headings
+FINE = {"lat_deg": 1e-8, "lon_deg": 1e-8, "heading_rad": 1.5e-6, "u_mps": 5e-5, "v_mps": 5e-5, "r_radps": 2e-8}
+BOARD = {"lat_deg": 6e-8, "lon_deg": 6e-8, "heading_rad": 1e-4, "u_mps": 5e-4, "v_mps": 5e-4, "r_radps": 1e-7}
+TELEMETRY = {**BOARD, "u_mps": 8e-3, "v_mps": 8e-3}
+CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], set[str]]] = {
+    "ours": ("a.csv", write_own, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    **{
+        f"dialect {stamps}{separator!r}": (
+            "a.csv", partial(write_dialect, separator=separator, comma=comma, stamps=stamps), FINE,
+            {"n1_rps", "rudder1_rad", "reached_rudder1_rad"},
+        )
+        for stamps, separator, comma in (
+            ("iso", ";", True), ("split", "\t", False), ("s", ",", False), ("ms", ",", False), ("us", "|", False),
+            ("ns", ";", False), ("day", "\t", True), ("hhmmss", ",", False),
+        )
+    },
+    "nmea": ("a.nmea", write_nmea, FINE, {"n1_rps", "reached_rudder1_rad"}),
+    "opencpn": ("a.csv", write_opencpn, FINE, {"n1_rps", "reached_rudder1_rad"}),
+    "excel": ("a.xlsx", write_excel, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "parquet": ("a.parquet", write_parquet, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "matlab": ("a.mat", write_matlab, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "matlab 7.3": ("a.mat", write_matlab73, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "ardupilot": ("a.bin", write_ardupilot, BOARD, {"tau_psi"}),
+    "telemetry": ("a.tlog", write_telemetry, TELEMETRY, {"tau_psi"}),
+    "px4": ("a.ulg", write_ulog, {**FINE, "heading_rad": 2e-6}, {"tau_psi"}),
+    "ros 1": ("a.bag", partial(write_ros, kind="ros1"), FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "ros 2": ("a", partial(write_ros, kind="sqlite3"), FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+    "mcap": ("a", partial(write_ros, kind="mcap"), FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: Voyage) -> None:
+    name, write, bounds, inputs = CASES[case]
+    extra = EXTRA.get(getattr(write, "func", write))
+    if extra and importlib.util.find_spec(extra) is None:
+        pytest.skip(f"needs {extra}")
+    columns, said = imported(write(tmp_path / name, trip.every(5)))
+    found = errors(columns, trip)
+    assert set(bounds) | inputs <= set(found)
+    assert {key: found[key] for key in bounds if found[key] > bounds[key]} == {}
+    # an order is 0 or +-35 degrees, +-20 degrees, or a tenth of a degree for the course; pulses are rounded to 1/500
+    assert all(found[key] < (2e-3 if key == "tau_psi" else 2e-6) for key in inputs)
+    assert [run["what"] for run in said["runs"]] == ["zig-zag 20/20 starboard", "turning circle 35 starboard"]
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "{0:%Y-%m-%dT%H:%M:%S.%f}+00:00        ",  # of a logger on the network
+        "NAV {0:%Y/%m/%d %H:%M:%S.%f} GPS ",  # of research vessels, as the next three
+        "{0:%m/%d/%Y},{0:%H:%M:%S.%f},",
+        "cnav\t{0:%Y:%j:%H:%M:%S.%f}\t",
+        "[{0:%d.%m.%Y %H:%M:%S.%f}] ",
+        "{1:.3f} ",
+        "{2:.0f};",
+        "\\s:gps,c:{1:.0f}*55\\",
+    ],
+)
+def test_times_of_reception_are_found_before_sentences(form: str, tmp_path: Path, trip: Voyage) -> None:
+    part = trip.every(10)
+    lines, each = nmea(part), 7
+    later_s = 10 * 86400.0  # on the 19th, so that no date can be read with the month first and last
+    stamps = [part.time_s[k // each] + later_s for k in range(len(lines))]
+    heads = [form.format(datetime.fromtimestamp(t, UTC), t, t * 1e3) for t in stamps]
+    kept = [head + line for head, line in zip(heads, lines, strict=True) if line[3:6] in ("HDT", "ROT")]
+    (tmp_path / "a.log").write_text("\n".join(kept) + "\n")
+    (heading,) = (channel for channel in read_log(tmp_path / "a.log").channels if channel.name == "HEHDT.headingT")
+    assert np.abs(heading.time_s - part.time_s - later_s).max() < 1e-3
+
+
+def test_columns_of_sentences_are_those_of_the_librarys_parser(tmp_path: Path, trip: Voyage) -> None:
+    part = trip.every(100)
+    lines = nmea(part, magnetic=-7.5)
+    (tmp_path / "a.nmea").write_text("\n".join(lines) + "\n")
+    log = read_log(tmp_path / "a.nmea")
+    parsed = [NMEAReader.parse(line) for line in lines]
+    fields = {"GPRMC.spd": "spd", "GPRMC.cog": "cog", "GPGGA.lat": "lat", "GPGGA.lon": "lon",
+              "HCHDG.headingM": "headingM",
+              "TIROT.rot": "rot", "IIRSA.stbdangle": "stbdangle"}  # fmt: skip
+    own = {channel.name: channel.values for channel in log.channels}
+    for name, field in fields.items():
+        theirs = [getattr(one, field) for one in parsed if one.identity == name.partition(".")[0]]
+        assert np.abs(own[name] - theirs).max() < 1e-9, name  # the library rounds to ten decimals
+    assert np.all(own["HCHDG.variation"] == -7.5)
+
+
+SENTENCES = {
+    "IIRSA,-12.3,A,4.5,A": {"IIRSA.stbdangle": -12.3, "IIRSA.portangle": 4.5},
+    "IIRSA,-12.3,V,4.5,A": {"IIRSA.portangle": 4.5},
+    "IIRPM,S,1,-120.5,80,A": {"IIRPM.rpm shaft 1 starboard": -120.5},
+    "IIRPM,E,2,1500,80,A": {"IIRPM.rpm engine 2 port": 1500.0},
+    "TIROT,-45.7,A": {"TIROT.rot": -45.7},
+    "TIROT,-45.7,V": {},
+    "HEHDT,271.25,T": {"HEHDT.headingT": 271.25},
+    "HETHS,271.25,A": {"HETHS.headt": 271.25},
+    "HCHDG,98.3,2.0,E,12.6,W": {"HCHDG.headingM": 98.3, "HCHDG.variation": -12.6, "HCHDG.deviation": 2.0},
+    "HCHDM,98.3,M": {"HCHDM.headingM": 98.3},
+    "GPVTG,54.7,T,34.4,M,5.5,N,10.2,K,A": {"GPVTG.cogt": 54.7, "GPVTG.sogn": 5.5},
+    "VDVBW,12.5,0.25,A,13.1,-0.5,A,,,,": {
+        "VDVBW.longwaterspd": 12.5, "VDVBW.transwaterspd": 0.25, "VDVBW.longgroundspd": 13.1,
+        "VDVBW.transgroundspd": -0.5,
+    },
+    "VWVHW,120.5,T,118.0,M,5.0,N,9.26,K": {"VWVHW.hdgT": 120.5, "VWVHW.hdgM": 118.0, "VWVHW.spdN": 5.0},
+    "GNGNS,120000.00,3722.425671,S,12258.856215,W,DAAA,14,0.9,1005.543,6.5,,,S": {
+        "GNGNS.lat": -(37 + 22.425671 / 60), "GNGNS.lon": -(122 + 58.856215 / 60),
+    },
+    "GPGLL,3722.425671,N,12258.856215,W,120000.00,V,N": {},
+    "WIMWV,214.8,R,10.0,N,A": {"WIMWV.angle.R": 214.8, "WIMWV.speed.R": 10.0 * KNOT},
+    "WIMWV,214.8,T,36.0,K,A": {"WIMWV.angle.T": 214.8, "WIMWV.speed.T": 10.0},
+    "SDDPT,12.4,-0.8,100": {"SDDPT.depth": 12.4, "SDDPT.offset": -0.8},
+    "SDDBT,40.7,f,12.4,M,6.8,F": {"SDDBT.depthm": 12.4},
+    "YXXDR,A,-5.5,D,PITCH,A,3.25,D,ROLL": {"YXXDR.PITCH": -5.5, "YXXDR.ROLL": 3.25},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", SENTENCES)
+def test_each_sentence_is_read_as_its_definition_says(body: str, tmp_path: Path) -> None:
+    clock = ["GPZDA,120000.00,09,10,2025,00,00", "GPZDA,120001.00,09,10,2025,00,00"]
+    (tmp_path / "a.log").write_text("\n".join(map(sentence, [clock[0], body, clock[1], body])) + "\n")
+    log = read_log(tmp_path / "a.log")
+    assert {channel.name: channel.values[0] for channel in log.channels} == pytest.approx(SENTENCES[body], abs=1e-9)
+    assert all(abs(channel.time_s[0] - 1_760_011_200.0) < 1e-6 for channel in log.channels)
+    assert log.clock == "satellite time"
+
+
+def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> None:
+    _, said = imported(write_own(tmp_path / "a.csv", trip))
+    rate = said["actuators"]["rudder1"]["rate"]  # type: ignore[index]
+    assert abs(rate["value"] - RATE_RADPS) < 0.002 * RATE_RADPS
+    assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "vessel-lines.toml").read_text()
+
+
+def test_the_folder_is_what_other_commands_take(
+    tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]
+) -> None:
+    imported(write_dialect(tmp_path / "a.csv", trip.every(10)))
+    (tmp_path / "ship.toml").write_text(SHIP)
+    ship = ["--vessel", str(tmp_path / "ship.toml"), "--json", "--out"]
+    assert main(["estimate", str(tmp_path / "out"), *ship, str(tmp_path / "e"), "--method", "ls", "--quiet"]) == 0
+    found = json.loads((tmp_path / "e" / "estimate.json").read_text())
+    assert main(["indices", str(tmp_path / "out"), *ship, str(tmp_path / "i"), "--quiet"]) == 0
+    assert (
+        main(["mine", str(tmp_path / "out"), *ship, str(tmp_path / "m"), "--keep", "1", "--mean", "none", "--quiet"])
+        == 0
+    )
+    for name, truth in (("N_ud", 0.0005), ("N_ur", -0.02), ("Y_ur", -0.3)):  # of differences over a second
+        assert found["ls"]["parameters"][name]["value"] == pytest.approx(truth, rel=0.02)
+
+
+SHIP = """
+[vessel]
+name = "field-50m"
+length_m = 50.0
+beam_m = 10.0
+draught_m = 3.0
+sample_time_s = 1.0
+[[actuators]]
+kind = "propeller"
+speed_min_rps = -4.0
+speed_max_rps = 4.0
+[[actuators]]
+kind = "rudder"
+forward_m = -25.0
+angle_min_rad = -0.62
+angle_max_rad = 0.62
+angle_rate_radps = 0.05
+[model]
+structure = "custom"
+form = "continuous"
+terms = [
+  {equation = "u", name = "X_uu", expression = "abs(u)*u"},
+  {equation = "u", name = "X_nn", expression = "abs(n1)*n1"},
+  {equation = "u", name = "X_vr", expression = "v*r"},
+  {equation = "v", name = "Y_uv", expression = "abs(u)*v"},
+  {equation = "v", name = "Y_ur", expression = "u*r"},
+  {equation = "r", name = "N_ur", expression = "abs(u)*r"},
+  {equation = "r", name = "N_ud", expression = "abs(u)*u*sin(rudder1)"},
+]
+[model.parameters]
+X_uu = -0.005
+X_nn = 0.007
+X_vr = 1.0
+Y_uv = -0.03
+Y_ur = -0.4
+N_ur = -0.03
+N_ud = 0.0006
+[sensors]
+position_m = 0.3
+heading_rad = 0.003
+velocity_mps = 0.02
+yaw_rate_radps = 0.001
+"""
