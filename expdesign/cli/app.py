@@ -218,7 +218,9 @@ def expdesign(
     allowed water, verifies it, and writes route files and a report. The other
     commands are its steps, and what follows when data have been measured.
 
-    Begin with: expdesign run scenarios/helsinki.toml
+    Begin with: expdesign new mytrial
+
+    then: expdesign run mytrial/scenario.toml
 
     What may stand in a file: expdesign explain
     """

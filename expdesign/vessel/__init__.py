@@ -18,9 +18,11 @@ from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import (
     Allocator,
     allocate,
+    by_force,
     direct_terms,
     force_matrix,
-    required_force,
+    pushed_everywhere,
+    required_push,
     within_limits,
 )
 from expdesign.vessel.masses import NOMINAL, Body, Load
