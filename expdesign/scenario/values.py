@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.errors import NoPlan
 from expdesign.growing import GrowSettings
@@ -98,10 +100,12 @@ class Scenario:
         wind = weather.wind_to.any() or weather.wind_std_mps or weather.wind_variation.std_mps
         current = weather.current_to.any() or weather.current_std_mps or weather.current_variation.std_mps
         still = [name for name in ("u", "v") if name not in model.read_signals(name)] if current else []
-        certain = [name for name, std in zip(model.names, model.parameter_std.tolist(), strict=True) if not std]
-        known = f"{', '.join(certain)} (no model.parameter_std)"
+        spread = (model.parameter_std, np.asarray(model.unstated_std))
+        certain = [name for name, *stds in zip(model.names, *spread, strict=True) if not any(stds)]
+        unstated = [name for name, std in zip(model.names, spread[1], strict=True) if std]
+        known = ", ".join(certain)
         if len(certain) == len(model.names):
-            known = f"every parameter of the model (no model.parameter_std): {', '.join(certain)}"
+            known = f"every parameter of the model: {known}"
         return (
             *(["environment.wind_to moves no ship here: no term of the vessel's model reads the wind"]
               if wind and not {"u_q", "v_q"} & model.read_signals() else []),
@@ -110,6 +114,9 @@ class Scenario:
             *([f"no term of the vessel's model reads {', '.join(unread)}, so that these commands and their limits move "
                "no ship"] if unread else []),
             *([f"exactly known in drawn trials: {known}"] if certain else []),
+            *([f"no model.parameter_std of {', '.join(unstated)}: ships of drawn trials differ in them by the share "
+               "model.parameter_std_unstated"]
+              if unstated else []),
             *(["plan.paths does not act: it is of ships that turn on the spot, and this one does not"]
               if self.plan.paths != PlanSettings.paths and not self._turns_on_the_spot else []),
         )  # fmt: skip

@@ -26,7 +26,7 @@ from expdesign.vessel.inverse import (
     within_limits,
 )
 from expdesign.vessel.masses import NOMINAL, Body, Load
-from expdesign.vessel.model import NOT_SUPPORTED, Inertia, VesselModel
+from expdesign.vessel.model import NOT_SUPPORTED, UNSTATED_SHARE, Inertia, VesselModel
 from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms

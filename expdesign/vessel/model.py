@@ -89,6 +89,8 @@ NOT_SUPPORTED = (
     "without that table"
 )
 
+UNSTATED_SHARE = 0.1
+"""Standard deviation, as a share of the value, with which drawn ships differ where none is stated."""
 FEWEST_DRAWN = 1000
 SHARE_DRAWN = 2500
 LEAST_KEPT = 1e-3
@@ -112,11 +114,16 @@ class VesselModel:
     # least and most value of parameters by name, on which the prior is conditioned: the signs of damping and thrust of
     # a vessel that is known to be stable, for example
     parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # (p,) what drawn ships have where no standard deviation is stated, zero elsewhere; None for zero everywhere. It is
+    # no prior: estimates and designs take nothing from it
+    unstated_std: Array | None = None
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", readonly(self.parameters))
         object.__setattr__(self, "parameter_std", readonly(self.parameter_std))
+        unstated = np.zeros(len(self.terms)) if self.unstated_std is None else self.unstated_std
+        object.__setattr__(self, "unstated_std", readonly(unstated))
         if not self.parameters.shape == self.parameter_std.shape == (len(self.terms),):
             raise InputError(f"VesselModel has {len(self.terms)} terms but {self.parameters.shape} parameters")
         names = self.names
@@ -227,6 +234,7 @@ class VesselModel:
         return replace(
             self,
             parameter_std=np.array([own.get(name, 0.0) for name in self.names]),
+            unstated_std=None,
             parameter_correlation={
                 (names[i], names[j]): float(correlation[i, j])
                 for i, j in zip(*np.nonzero(np.tril(correlation, -1)), strict=True)
@@ -234,7 +242,7 @@ class VesselModel:
         )
 
     def drawn_parameters(self, count: int, rng: np.random.Generator) -> Array:
-        """(count, p) parameters drawn from the normal prior, conditioned on `parameter_range`.
+        """(count, p) parameters drawn from the normal prior and `unstated_std`, conditioned on `parameter_range`.
 
         Raises:
             InputError: hardly any vessel of the prior is within the range.
@@ -268,8 +276,9 @@ class VesselModel:
         """(count, p) parameters drawn from the normal prior."""
         drawn = rng.standard_normal((count, len(self.terms)))
         if not self.parameter_correlation:
-            return np.asarray(self.parameters + self.parameter_std * drawn)
-        values, vectors = np.linalg.eigh(self.parameter_covariance)
+            return np.asarray(self.parameters + np.hypot(self.parameter_std, self.unstated_std) * drawn)
+        covariance = self.parameter_covariance + np.diag(np.square(self.unstated_std))
+        values, vectors = np.linalg.eigh(covariance)
         return np.asarray(self.parameters + drawn @ (vectors * np.sqrt(np.maximum(values, 0.0))).T)
 
     def regressors(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY) -> tuple[Any, ...]:

@@ -187,6 +187,8 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         terms=terms,
         parameters=np.array([table.parameters[name] for name in names]),
         parameter_std=np.array([table.parameter_std.get(name, 0.0) for name in names]),
+        unstated_std=table.parameter_std_unstated
+        * np.array([0.0 if name in table.parameter_std else abs(table.parameters[name]) for name in names]),
         form=table.form,
         sample_time_s=sample_time_s,
         actuators=actuators,

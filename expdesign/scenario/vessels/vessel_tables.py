@@ -10,7 +10,7 @@ from pydantic import Field
 
 from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.scenario.vessels.pendulum_table import PendulumTable
-from expdesign.vessel import STRUCTURES, Environment, Variation
+from expdesign.vessel import STRUCTURES, UNSTATED_SHARE, Environment, Variation
 
 # `[environment]` of scenario and vessel files: expected current and wind.
 
@@ -256,7 +256,14 @@ class ModelTable(Table):
     )
     parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
     parameter_std: dict[str, NonNegative] = Field(
-        default={}, description="the standard deviation of each parameter; 0, for known, when not given"
+        default={},
+        description="the standard deviation of each parameter, 0 for exactly known; parameter_std_unstated is for those not "
+        "given",
+    )
+    parameter_std_unstated: NonNegative = Field(
+        default=UNSTATED_SHARE,
+        description="the standard deviation, as a share of the value, with which ships of drawn trials differ in the "
+        "parameters that parameter_std does not name; 0 for exactly known. Estimates take nothing from it",
     )
     parameter_correlation: dict[str, dict[str, Number]] = Field(
         default={},

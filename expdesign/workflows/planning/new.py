@@ -41,7 +41,7 @@ README = """\
 {ship}, invented; every number is to be replaced by yours. From this folder's parent:
 
 1. `expdesign run {name}/scenario.toml --draft` takes a quick look; without `--draft` the plan is verified.
-2. `vessel.toml` is the ship: particulars, actuators with limits and rates, model, and how far its parameters may be off.
+2. `vessel.toml` is the ship: particulars, actuators with limits and rates, model, and how far parameters may be off.
 3. `dictionary.toml` lists candidate manoeuvres, `area.toml` and `area.geojson` the water.
 4. `scenario.toml` names the three and states time, start, goal, weather and what the plan must keep to.
 5. After the runs: `expdesign estimate RECORD.csv --vessel {name}/vessel.toml`, then `expdesign replan`.
