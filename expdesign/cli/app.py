@@ -31,6 +31,8 @@ from expdesign.progress import Progress, silent
 
 BUG = 1
 """Exit status of a defect of this program."""
+NO_ANSWER = 3
+"""Exit status where the input is fine but has no answer."""
 PLAIN_STEP = 0.1
 """Least share of the work between two plain lines about the same activity."""
 LEAST_SHARE = 0.1
@@ -163,6 +165,9 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
             elif not quiet:
                 print_summary(outcome)
             tell_gaps(outcome.files)
+            if outcome.unanswered:
+                typer.echo(f"expdesign: error: {outcome.unanswered}", err=True)
+                raise typer.Exit(NO_ANSWER)
 
         kind = inspect.Parameter.KEYWORD_ONLY
         own = inspect.signature(asking, eval_str=True).parameters.values()

@@ -172,23 +172,28 @@ def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
     """
     slopes = np.diff(desired, axis=-2) / vessel.sample_time_s
     middles = (desired[..., :-1, :] + desired[..., 1:, :]) / 2
-    if by_force(vessel.model) or pushed_everywhere(vessel.model):
+    if by_force(vessel.model):
         push = required_push(vessel.model, middles, slopes)
     else:
-        push = _drifting(vessel, middles, slopes, desired[..., 0, 1])
+        push = _from_sample_to_sample(vessel, middles, slopes, desired[..., 0, 1])
     entry = _ready(vessel, trim(vessel, desired[..., 0, :]), push)
     return entry, allocate(vessel.model, push, sample_time_s=vessel.sample_time_s, before=entry)
 
 
-def _drifting(vessel: Vessel, motions: Array, slopes: Array, sway: Array) -> Array:
-    """(..., k, c) what gives surge and yaw, of ships that drift as they do: sway (...,) at first, then by the model."""
-    given = []
+def _from_sample_to_sample(vessel: Vessel, motions: Array, slopes: Array, sway: Array) -> Array:
+    """(..., k, c) what gives accelerations (..., k, 3) at motions (..., k, 3), each sample near the one before.
+
+    Where the actuators do not push sideways, the ship drifts as she does: with a sway (...,) at first, then by the
+    model.
+    """
+    model, sample_s = vessel.model, vessel.sample_time_s
+    everywhere, before, given = pushed_everywhere(model), None, list[Array]()
     for motion, slope in zip(np.moveaxis(motions, -2, 0), np.moveaxis(slopes, -2, 0), strict=True):
-        at = np.stack([motion[..., 0], sway, motion[..., 2]], axis=-1)
-        given.append(required_push(vessel.model, at, slope, sway=False))
-        inputs = allocate(vessel.model, given[-1][..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :]
-        for _ in range(DRIFT_STEPS):
-            at[..., 1] += drift(vessel, at, inputs)[..., 1] * vessel.sample_time_s / DRIFT_STEPS
+        at = motion if everywhere else np.stack([motion[..., 0], sway, motion[..., 2]], axis=-1)
+        given.append(required_push(model, at, slope, sway=everywhere, near=before))
+        before = allocate(model, given[-1][..., None, :], sample_time_s=sample_s, near=before)[..., 0, :]
+        for _ in range(0 if everywhere else DRIFT_STEPS):
+            at[..., 1] += drift(vessel, at, before)[..., 1] * sample_s / DRIFT_STEPS
         sway = at[..., 1]
     return np.stack(given, axis=-2)
 

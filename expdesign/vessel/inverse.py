@@ -14,12 +14,12 @@ from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
-from expdesign.vessel.thrusts import SOLVED, required_thrust, thrusts
 from expdesign.vessel.thrusts import pushed_everywhere as pushed_everywhere_at_rest
+from expdesign.vessel.thrusts import required_thrust, thrusts
 
 
 def required_push(
-    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, tolerance: float = SOLVED
+    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, near: Array | None = None
 ) -> Array:
     """What gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air, for `allocate`.
 
@@ -30,10 +30,10 @@ def required_push(
         model: with the terms.
         velocity, acceleration: through the water.
         sway: whether sway counts; without, models not by force leave it to itself.
-        tolerance: acceleration that these may miss, in those of full thrust.
+        near: (..., m) commands a sample before, near to which models not by force seek others; None for any.
     """
     if not by_force(model):
-        return required_thrust(model, velocity, acceleration, sway=sway, tolerance=tolerance)
+        return required_thrust(model, velocity, acceleration, sway=sway, near=near)
     return required_force(model, velocity, acceleration)
 
 

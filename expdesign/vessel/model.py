@@ -276,8 +276,8 @@ class VesselModel:
         """(count, p) parameters drawn from the normal prior."""
         drawn = rng.standard_normal((count, len(self.terms)))
         if not self.parameter_correlation:
-            return np.asarray(self.parameters + np.hypot(self.parameter_std, self.unstated_std) * drawn)
-        covariance = self.parameter_covariance + np.diag(np.square(self.unstated_std))
+            return np.asarray(self.parameters + np.hypot(self.parameter_std, np.asarray(self.unstated_std)) * drawn)
+        covariance = self.parameter_covariance + np.diag(np.asarray(self.unstated_std) ** 2)
         values, vectors = np.linalg.eigh(covariance)
         return np.asarray(self.parameters + drawn @ (vectors * np.sqrt(np.maximum(values, 0.0))).T)
 

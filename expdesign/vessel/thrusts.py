@@ -13,6 +13,7 @@ effectors limit, AIAA Guidance, Navigation and Control Conference (1994): the re
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -25,14 +26,24 @@ from expdesign.vessel.model import VesselModel
 
 SECANTS = (0.05, 0.05, 0.02, 0.01, *([1e-3] * 8), *([1e-4] * 18))
 """Half widths of the secants of each iteration, as shares: wide ones see past thrust that vanishes."""
+NEAR_SECANTS = (0.02, 0.01, 1e-3, 1e-3)
+"""The same from commands a sample before."""
+EASED = 0.9
+"""Share of the commands a sample before that is kept where others give as much."""
 STARTS = (1.0, 2.0, 0.0)
 """Shares of the commands that would do at rest, from which the search begins anew where it has found no answer."""
 SHORTER = 0.3
 """Share of a step that is tried where the whole step leaves more missing."""
 SOLVED = 1e-11
 """Acceleration that may be missing, in those of full thrust."""
+NEARLY = 1e-4
+"""The same near commands a sample before: the next sample makes it good."""
+CLEARLY = 0.3
+"""Share of what is missing near those commands that must be missing elsewhere for commands to jump there."""
 DAMPING = 1e-12
 """Of directions in which nothing pushes, in squares of the mean push."""
+STILL = 1e-8
+"""Change of shares that makes no difference."""
 REST_WIDTH = 0.5
 """Half width of secants at rest."""
 LEAST_PUSH = 1e-3
@@ -52,6 +63,15 @@ class Thrusts:
     def scale(self) -> Array:
         """(c,) largest commands."""
         return np.repeat(self.full, [_width(actuator) for actuator in self.actuators])
+
+    def shares(self, inputs: Array) -> Array:
+        """(..., c) of commands (..., m)."""
+        values = np.array(inputs, dtype=float)
+        for actuator, place in self.each:
+            if actuator.kind == "azimuth":
+                speed, angle = np.moveaxis(inputs[..., place], -1, 0)
+                values[..., place] = np.stack([speed * np.cos(angle), speed * np.sin(angle)], axis=-1)
+        return values / self.scale
 
     def accelerations(self, motion: Array, shares: Array) -> Array:
         """(..., 3) at motions (..., 3) through calm water and air, for shares (..., c)."""
@@ -147,9 +167,9 @@ def pushed_everywhere(model: VesselModel) -> bool:
 
 
 def required_thrust(
-    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, tolerance: float = SOLVED
+    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, near: Array | None = None
 ) -> Array:
-    """(..., c) smallest thrusts that give an acceleration (..., 3) at a velocity (..., 3).
+    """(..., c) small thrusts that give an acceleration (..., 3) at a velocity (..., 3).
 
     The speed of propellers, that of azimuth thrusters ahead and to starboard, the angle of rudders.
 
@@ -157,22 +177,26 @@ def required_thrust(
         model: with the terms.
         velocity, acceleration: through calm water and air.
         sway: whether sway counts; without, it is left to itself.
-        tolerance: acceleration that may be missing, in those of full thrust; where it is coarse, one start will do.
+        near: (..., m) commands a sample before, that others are sought near to; a little may then be missing.
     """
     how, rest = thrusts(model), push_at_rest(model)
     shape = np.broadcast_shapes(velocity.shape, acceleration.shape)[:-1]
     motion, desired = (np.broadcast_to(x, (*shape, 3)).reshape(-1, 3) for x in (velocity, acceleration))
     how = replace(how, weights=how.weights * (1.0, float(sway), 1.0))
-    enough = tolerance * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
+    enough = (SOLVED if near is None else NEARLY) * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
     best, left = np.zeros((len(motion), rest.shape[1])), np.full(len(motion), np.inf)
-    like = _like_at_rest(how, motion, desired)
-    for share in STARTS if tolerance == SOLVED else STARTS[:1]:
+    starts, widths = STARTS, SECANTS
+    if near is not None:
+        before = how.within(how.shares(np.broadcast_to(near, (*shape, near.shape[-1])).reshape(len(motion), -1)))
+        best, left = _searched(how, motion, desired, before, enough, NEAR_SECANTS, eased=EASED)
+        starts, widths = STARTS[:1], NEAR_SECANTS
+    for share in starts:
         open_ = np.flatnonzero(left > enough)
         if not len(open_):
             break
-        start = how.within(share * like[open_])
-        found, missing = _searched(how, motion[open_], desired[open_], start, enough, tolerance**0.75)
-        better = missing < left[open_]
+        start = how.within(share * _like_at_rest(how, motion[open_], desired[open_]))
+        found, missing = _searched(how, motion[open_], desired[open_], start, enough, widths)
+        better = missing < CLEARLY * left[open_] if near is not None else missing < left[open_]
         best[open_[better]], left[open_[better]] = found[better], missing[better]
     return np.asarray((best * how.scale).reshape(*shape, -1))
 
@@ -189,11 +213,18 @@ def _like_at_rest(how: Thrusts, motion: Array, desired: Array) -> Array:
 
 
 def _searched(
-    how: Thrusts, motion: Array, desired: Array, best: Array, enough: float, still: float
+    how: Thrusts,
+    motion: Array,
+    desired: Array,
+    best: Array,
+    enough: float,
+    widths: Sequence[float],
+    *,
+    eased: float = 1.0,
 ) -> tuple[Array, Array]:
-    """Shares (n, c) found from others, and what of the accelerations is missing (n,); `still` is no change of one."""
+    """Shares (n, c) found from others, at first from a share of them, and what of the accelerations is missing (n,)."""
     open_, left, step = np.arange(len(motion)), np.full(len(motion), np.inf), np.zeros_like(best)
-    for width in SECANTS:
+    for width in widths:
         tried = best[open_] + step[open_]
         found, push = how.push(motion[open_], tried, width)
         missing = (desired[open_] - found) * how.weights
@@ -201,9 +232,10 @@ def _searched(
         better = (size < left[open_]) | (size <= enough)
         rows, push, tried = open_[better], push[better] * how.weights[:, None], tried[better]
         step[open_[~better]] *= SHORTER
-        aimed = _smallest(how, push, missing[better] + (push @ tried[..., None])[..., 0], near=tried)
+        aimed = _smallest(how, push, missing[better] + (push @ tried[..., None])[..., 0], near=eased * tried)
+        eased = 1.0
         best[rows], left[rows], step[rows] = tried, size[better], aimed - tried
-        open_ = open_[(left[open_] > enough) & (np.abs(step[open_]).max(axis=-1) > still)]
+        open_ = open_[(left[open_] > enough) & (np.abs(step[open_]).max(axis=-1) > STILL)]
         if not len(open_):
             break
     return best, left

@@ -33,7 +33,7 @@ SMALLNESS = 1e-4  # weight of squared commands: decides between commands that gi
 FREE_SAMPLES = (0.2, 3.0)  # least and largest time between samples while it is free, in sample times
 SETTLED = 1e-4  # miss of what lagging actuators deliver at the end, relative to the largest
 ITERATIONS = 100  # of IPOPT at most
-CORNERED = 6  # iterations that IPOPT spends about a good answer before it is taken, where the model has corners
+CORNERED = 4  # iterations that IPOPT spends about a good answer before it is taken, where the model has corners
 PROGRAMS = 24  # nonlinear programs kept built
 
 

@@ -257,8 +257,8 @@ class ModelTable(Table):
     parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
     parameter_std: dict[str, NonNegative] = Field(
         default={},
-        description="the standard deviation of each parameter, 0 for exactly known; parameter_std_unstated is for those not "
-        "given",
+        description="the standard deviation of each parameter, 0 for exactly known; of those not given see "
+        "parameter_std_unstated",
     )
     parameter_std_unstated: NonNegative = Field(
         default=UNSTATED_SHARE,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +16,12 @@ from expdesign.information import PrimitiveInformation, estimated_parameters, sc
 from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
-from expdesign.vessel import Environment, Vessel
+from expdesign.signals import Commands
+from expdesign.vessel import Environment, Vessel, column_name
 from expdesign.workflows.outcome import TextTable
+
+FAR_FROM_LIMIT = 0.5
+"""Share of an actuator's limit below which no run comes near it."""
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -54,6 +58,28 @@ def _scored(
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
         excitation=excitation,
+    )
+
+
+def actuation_remarks(vessel: Vessel, runs: Iterable[Commands], what: str) -> tuple[str, ...]:
+    """Actuators that no run uses, and limits that none comes near; one line each."""
+    peaks = np.max([np.abs(commands.values).max(axis=0) for commands in runs], axis=0)
+    used = dict(zip(vessel.model.inputs, peaks.tolist(), strict=True))
+    idle = [
+        column_name(signal)
+        for actuator in vessel.actuators
+        if not any(used[signal] for signal in actuator.signals)
+        for signal in actuator.signals
+    ]
+    sizes = [max(abs(limit.low), abs(limit.high)) for limit in vessel.limits]
+    far = [
+        f"{column_name(signal)} ({used[signal] / size:.0%})"
+        for signal, size in zip(vessel.model.inputs, sizes, strict=True)
+        if np.isfinite(size) and 0 < used[signal] < FAR_FROM_LIMIT * size
+    ]
+    return (
+        *([f"no {what} uses {', '.join(idle)}"] if idle else []),
+        *([f"far from its limit in every {what}: {', '.join(far)}; what lies beyond is extrapolated"] if far else []),
     )
 
 
