@@ -19,7 +19,13 @@ from expdesign.vessel.thrusts import required_thrust, thrusts
 
 
 def required_push(
-    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, near: Array | None = None
+    model: VesselModel,
+    velocity: Array,
+    acceleration: Array,
+    *,
+    sway: bool = True,
+    near: Array | None = None,
+    tolerance: float = 1e-4,
 ) -> Array:
     """What gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air, for `allocate`.
 
@@ -31,9 +37,10 @@ def required_push(
         velocity, acceleration: through the water.
         sway: whether sway counts; without, models not by force leave it to itself.
         near: (..., m) commands a sample before, near to which models not by force seek others; None for any.
+        tolerance: acceleration that may be missing with these, in those of full thrust.
     """
     if not by_force(model):
-        return required_thrust(model, velocity, acceleration, sway=sway, near=near)
+        return required_thrust(model, velocity, acceleration, sway=sway, near=near, tolerance=tolerance)
     return required_force(model, velocity, acceleration)
 
 

@@ -36,8 +36,6 @@ SHORTER = 0.3
 """Share of a step that is tried where the whole step leaves more missing."""
 SOLVED = 1e-11
 """Acceleration that may be missing, in those of full thrust."""
-NEARLY = 1e-4
-"""The same near commands a sample before: the next sample makes it good."""
 CLEARLY = 0.3
 """Share of what is missing near those commands that must be missing elsewhere for commands to jump there."""
 DAMPING = 1e-12
@@ -107,7 +105,7 @@ class Thrusts:
         c = shares.shape[-1]
         offsets = width * np.concatenate([np.zeros((1, c)), np.eye(c), -np.eye(c)])
         spread = shares + offsets.reshape(-1, *[1] * (shares.ndim - 1), c)
-        found = self.accelerations(np.broadcast_to(motion, (*spread.shape[:-1], 3)), spread)
+        found = self.accelerations(motion, spread)
         return found[0], np.moveaxis(found[1 : c + 1] - found[c + 1 :], 0, -1) / (2.0 * width)
 
     @cached_property
@@ -167,7 +165,13 @@ def pushed_everywhere(model: VesselModel) -> bool:
 
 
 def required_thrust(
-    model: VesselModel, velocity: Array, acceleration: Array, *, sway: bool = True, near: Array | None = None
+    model: VesselModel,
+    velocity: Array,
+    acceleration: Array,
+    *,
+    sway: bool = True,
+    near: Array | None = None,
+    tolerance: float = 1e-4,
 ) -> Array:
     """(..., c) small thrusts that give an acceleration (..., 3) at a velocity (..., 3).
 
@@ -177,21 +181,23 @@ def required_thrust(
         model: with the terms.
         velocity, acceleration: through calm water and air.
         sway: whether sway counts; without, it is left to itself.
-        near: (..., m) commands a sample before, that others are sought near to; a little may then be missing.
+        near: (..., m) commands a sample before, that others are sought near to.
+        tolerance: acceleration that may be missing with these, in those of full thrust.
     """
     how, rest = thrusts(model), push_at_rest(model)
     shape = np.broadcast_shapes(velocity.shape, acceleration.shape)[:-1]
     motion, desired = (np.broadcast_to(x, (*shape, 3)).reshape(-1, 3) for x in (velocity, acceleration))
     how = replace(how, weights=how.weights * (1.0, float(sway), 1.0))
-    enough = (SOLVED if near is None else NEARLY) * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
+    enough = (SOLVED if near is None else tolerance) * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
     best, left = np.zeros((len(motion), rest.shape[1])), np.full(len(motion), np.inf)
-    starts, widths = STARTS, SECANTS
+    starts, widths, most = STARTS, SECANTS, enough
     if near is not None:
         before = how.within(how.shares(np.broadcast_to(near, (*shape, near.shape[-1])).reshape(len(motion), -1)))
+        missed = np.linalg.norm((desired - how.accelerations(motion, before)) * how.weights, axis=-1)
         best, left = _searched(how, motion, desired, before, enough, NEAR_SECANTS, eased=EASED)
-        starts, widths = STARTS[:1], NEAR_SECANTS
+        starts, widths, most = STARTS[:1], NEAR_SECANTS, np.maximum(enough, missed / 2)
     for share in starts:
-        open_ = np.flatnonzero(left > enough)
+        open_ = np.flatnonzero(left > most)
         if not len(open_):
             break
         start = how.within(share * _like_at_rest(how, motion[open_], desired[open_]))

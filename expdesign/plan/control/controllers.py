@@ -16,6 +16,7 @@ from expdesign.vessel import Allocator, Vessel, required_push
 
 # natural frequency of courses in that of a hull length at transit speed, and their damping
 COURSE_FREQUENCY, COURSE_DAMPING = 1.2, 0.9
+COARSE = 1e-2  # acceleration that commands may miss, in those of full thrust: the next sample makes it good
 HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 
@@ -66,7 +67,7 @@ class ForceController:
             ]
         ).T
         acceleration = (desired - demand.moving) / self.answer_s - demand.unexplained
-        push = required_push(self.vessel.model, demand.moving, acceleration, near=demand.near)
+        push = required_push(self.vessel.model, demand.moving, acceleration, near=demand.near, tolerance=COARSE)
         return self._allocator.commands(push, near=demand.near)
 
     @cached_property
