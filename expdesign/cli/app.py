@@ -24,7 +24,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 from expdesign import __version__
-from expdesign.cli.summary import as_json, print_summary
+from expdesign.cli.summary import as_json, print_summary, unverified
 from expdesign.errors import NotDrawn
 from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
@@ -165,8 +165,8 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
             elif not quiet:
                 print_summary(outcome)
             tell_gaps(outcome.files)
-            if outcome.unanswered:
-                typer.echo(f"expdesign: error: {outcome.unanswered}", err=True)
+            if doubt := unverified(outcome.summary):
+                typer.echo(f"expdesign: error: {doubt}", err=True)
                 raise typer.Exit(NO_ANSWER)
 
         kind = inspect.Parameter.KEYWORD_ONLY

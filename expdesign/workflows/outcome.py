@@ -22,12 +22,6 @@ class Outcome:
     tables: tuple[TextTable, ...] = ()  # the same for people where key numbers are many
     notes: tuple[str, ...] = ()  # all that the page notes and warns of, so that nobody has to open it to be warned
 
-    @property
-    def unanswered(self) -> str:
-        """Why a plan that was asked for whole is written but not verified; "" for all other results."""
-        whole = self.summary.get("verified") is False and not self.summary.get("draft")
-        return f"the plan is not verified: {self.summary['verdict']}" if whole else ""
-
 
 @dataclass(frozen=True, kw_only=True)
 class TextTable:

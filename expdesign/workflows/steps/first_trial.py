@@ -29,7 +29,7 @@ WIDE = 0.25  # median standard deviation of parameters, in their values, from wh
 NEAR_HULLS = 0.75  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
 KEPT = 0.9  # share of the ships that do
 DRAWN = 200  # ships drawn of each run
-CUTS = (1.0, 0.5, 0.25)  # shares of a run that are tried where ships of the prior run away
+CUT = (0.5, 0.9)  # least and most share of a run that is tried next
 SHORTEST = 0.15  # share of a run below which it is left out
 TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
 
@@ -71,37 +71,32 @@ def _length_s(case: Scenario, spec: PrimitiveSpec) -> float:
 
 def _cut(case: Scenario, spec: PrimitiveSpec, rng: np.random.Generator) -> PrimitiveSpec | None:
     """A specification that lasts as long as most ships keep near the track; None where that is too short."""
-    centres, _ = covering_discs(case.vessel.length_m, case.vessel.beam_m)
-    for share in CUTS:
-        shorter = _of_length(spec, share * spec.settings["duration_s"], case.vessel.sample_time_s)
-        try:
-            item = build_primitive(case.vessel, shorter)
-            apart = dispersion_m(
-                case.vessel, item, case.environment, centres_m=centres, confidence=KEPT, rng=rng, draws=DRAWN
-            )
-        except (NoPlan, InputError, Unreachable):
-            continue
-        near = np.flatnonzero(apart <= NEAR_HULLS * case.vessel.length_m)[-1] / (len(apart) - 1)
+    vessel, share = case.vessel, 1.0
+    while share >= SHORTEST:
+        shorter = _of_length(spec, share * spec.settings["duration_s"], vessel.sample_time_s)
+        near = _near(case, shorter, rng)
         if near >= 1.0:
             return shorter
-        if share * near >= SHORTEST:
-            shorter = _of_length(shorter, near * item.duration_s, case.vessel.sample_time_s)
-            return shorter if _runs(case, shorter) else None
-        return None
+        share *= np.clip(near, *CUT)
     return None
+
+
+def _near(case: Scenario, spec: PrimitiveSpec, rng: np.random.Generator) -> float:
+    """The share of a run in which most ships of the prior keep near its track; 0 where it cannot be run."""
+    centres, _ = covering_discs(case.vessel.length_m, case.vessel.beam_m)
+    try:
+        item = build_primitive(case.vessel, spec)
+        apart = dispersion_m(
+            case.vessel, item, case.environment, centres_m=centres, confidence=KEPT, rng=rng, draws=DRAWN
+        )
+    except (NoPlan, InputError, Unreachable):
+        return 0.0
+    return float(np.flatnonzero(apart <= NEAR_HULLS * case.vessel.length_m)[-1] / (len(apart) - 1))
 
 
 def _of_length(spec: PrimitiveSpec, length_s: float, sample_time_s: float) -> PrimitiveSpec:
     samples = max(2, int(length_s / sample_time_s))
     return replace(spec, settings={**spec.settings, "duration_s": samples * sample_time_s})
-
-
-def _runs(case: Scenario, spec: PrimitiveSpec) -> bool:
-    try:
-        build_primitive(case.vessel, spec)
-    except (InputError, Unreachable):
-        return False
-    return True
 
 
 def first_note(runs: Sequence[Primitive], asked: Sequence[PrimitiveSpec]) -> str:
