@@ -13,7 +13,7 @@ from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
 from expdesign.workflows.planning.new import KINDS
 from expdesign.workflows.steps.first_trial import NEAR_HULLS, calibration, is_wide
-from expdesign.workflows.steps.scored import actuation_remarks
+from expdesign.workflows.steps.scored import actuation_remarks, speed_remarks
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -88,6 +88,19 @@ def test_a_thruster_that_no_candidate_uses_and_limits_far_off_are_named(tmp_path
     (far,) = [line for line in actuation_remarks(case.vessel, half, "candidate") if "far from its limit" in line]
     assert "n1_rps" in far
     assert "n3_rps" not in far
+
+
+def test_speeds_beyond_those_of_the_data_are_named(tmp_path: Path) -> None:
+    new(tmp_path / "trial")
+    path = tmp_path / "trial" / "vessel.toml"
+    text = path.read_text("utf-8")
+    for high, told in ((6.0, False), (2.0, True)):
+        stated = f'form = "continuous"\nspeeds_mps = [-1.0, {high}]'
+        path.write_text(text.replace('form = "continuous"', stated), "utf-8")
+        case = load_scenario(tmp_path / "trial" / "scenario.toml")
+        tracks = [item.primitive.trajectory for item in scored(case)]
+        assert max(track.velocity[:, 0].max() for track in tracks) > 2.2
+        assert bool(speed_remarks(case.vessel, tracks, "candidate")) is told
 
 
 def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Path) -> None:

@@ -117,6 +117,9 @@ class VesselModel:
     # (p,) what drawn ships have where no standard deviation is stated, zero elsewhere; None for zero everywhere. It is
     # no prior: estimates and designs take nothing from it
     unstated_std: Array | None = None
+    speeds_mps: tuple[float, float] | None = (
+        None  # least and most surge speed of the data that determined the parameters
+    )
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -190,7 +190,9 @@ def required_thrust(
     how = replace(how, weights=how.weights * (1.0, float(sway), 1.0))
     enough = (SOLVED if near is None else tolerance) * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
     best, left = np.zeros((len(motion), rest.shape[1])), np.full(len(motion), np.inf)
-    starts, widths, most = STARTS, SECANTS, enough
+    starts: Sequence[float] = STARTS
+    widths: Sequence[float] = SECANTS
+    most: Array | float = enough
     if near is not None:
         before = how.within(how.shares(np.broadcast_to(near, (*shape, near.shape[-1])).reshape(len(motion), -1)))
         missed = np.linalg.norm((desired - how.accelerations(motion, before)) * how.weights, axis=-1)

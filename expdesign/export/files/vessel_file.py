@@ -118,6 +118,8 @@ def _model(model: VesselModel) -> Iterator[str]:
     structure = next((name for name, terms in STRUCTURES.items() if terms == model.terms), "custom")
     unstated = _unstated(model)
     yield from ("", *_table("[model]", {"structure": structure, "form": model.form, **unstated}))
+    if model.speeds_mps is not None:
+        yield f"speeds_mps = [{', '.join(f'{speed:.4g}' for speed in model.speeds_mps)}]"
     if structure == "custom":
         for term in model.terms:
             yield from ("", *_table("[[model.terms]]", vars(term)))

@@ -280,6 +280,13 @@ class ModelTable(Table):
         description="the most value that a parameter is known to have, likewise: 0 for damping, without which drawn "
         "vessels run away; any when not given",
     )
+    speeds_mps: list[Number] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="the least and the most surge speed of the data that determined the parameters, as estimate writes "
+        "them: a dictionary or a plan that goes beyond is told of",
+    )
     terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
     roll: RollTable | None = Field(
         default=None, description="a table [model.roll]; simulations follow it, estimates and plans do not"

@@ -8,7 +8,14 @@ from expdesign.dictionary.build import deviating
 from expdesign.progress import Progress, silent, within
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
-from expdesign.workflows.steps.scored import actuation_remarks, parameters_of, ranking, score_files, scored
+from expdesign.workflows.steps.scored import (
+    actuation_remarks,
+    parameters_of,
+    ranking,
+    score_files,
+    scored,
+    speed_remarks,
+)
 
 
 def score(
@@ -31,6 +38,7 @@ def score(
         "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
     }
     told = actuation_remarks(case.vessel, [item.primitive.commands for item in information], "candidate")
+    told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
     if case.remarks or told:
         summary["remarks"] = [*case.remarks, *told]
     return written(case, out, score_files(case, information), summary, progress, (ranking(case, information),))

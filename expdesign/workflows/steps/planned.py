@@ -39,7 +39,7 @@ from expdesign.scenario import Scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.signals import AUXILIARY
 from expdesign.vessel import NOT_SUPPORTED
-from expdesign.workflows.steps.scored import actuation_remarks, growth_files, score_files
+from expdesign.workflows.steps.scored import actuation_remarks, growth_files, score_files, speed_remarks
 
 MOST_RUNS = 1000  # runs in one plan
 
@@ -122,7 +122,9 @@ def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
 
 def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
     """What the files state and the trial does not use, or takes as certain; one line each."""
-    return (*case.remarks, *actuation_remarks(case.vessel, [plan.commands], "run or leg of this plan"))
+    what = "run or leg of this plan"
+    told = actuation_remarks(case.vessel, [plan.commands], what), speed_remarks(case.vessel, [plan.trajectory], what)
+    return (*case.remarks, *told[0], *told[1])
 
 
 def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:

@@ -16,10 +16,12 @@ from expdesign.information import PrimitiveInformation, estimated_parameters, sc
 from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
-from expdesign.signals import Commands
+from expdesign.signals import Commands, Trajectory
 from expdesign.vessel import Environment, Vessel, column_name
 from expdesign.workflows.outcome import TextTable
 
+SPEED_SLACK = 0.1
+"""Share of the largest speed of the data by which a run may go beyond them."""
 FAR_FROM_LIMIT = 0.5
 """Share of an actuator's limit below which no run comes near it."""
 
@@ -58,6 +60,21 @@ def _scored(
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
         excitation=excitation,
+    )
+
+
+def speed_remarks(vessel: Vessel, runs: Iterable[Trajectory], what: str) -> tuple[str, ...]:
+    """Surge speeds beyond those of the data that determined the model; one line."""
+    if vessel.model.speeds_mps is None:
+        return ()
+    surge = np.concatenate([run.velocity[:, 0] for run in runs])
+    (low, high), (least, most) = vessel.model.speeds_mps, (float(surge.min()), float(surge.max()))
+    slack = SPEED_SLACK * max(abs(low), abs(high))
+    if least >= low - slack and most <= high + slack:
+        return ()
+    return (
+        f"a {what} goes from {least:.3g} to {most:.3g} m/s, but the data that determined the model from {low:.3g} to "
+        f"{high:.3g} m/s (model.speeds_mps): what lies beyond is extrapolated",
     )
 
 
