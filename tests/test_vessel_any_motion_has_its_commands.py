@@ -12,7 +12,7 @@ from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.trim import drift, hold, lost, trim
 from expdesign.errors import Unreachable
 from expdesign.scenario import load_vessel
-from expdesign.vessel import VesselModel, allocate, by_force, pushed_everywhere, required_push
+from expdesign.vessel import VesselModel, by_force, commands_for, pushed_everywhere, required_push
 from expdesign.vessel.thrusts import required_thrust, thrusts
 from expdesign.workflows.planning.new import KINDS
 
@@ -43,7 +43,7 @@ def test_commands_for_an_acceleration_that_some_commands_give_give_it(kind: str)
     given = 0.5 * rng.uniform(low, high, (count, len(limits)))
     wanted = drift(vessel, motion, given)
     push = required_push(vessel.model, motion, wanted)
-    found = allocate(vessel.model, push[:, None], sample_time_s=vessel.sample_time_s)[:, 0]
+    found = commands_for(vessel.model, push[:, None], sample_time_s=vessel.sample_time_s)[:, 0]
     missed = np.abs(drift(vessel, motion, found) - wanted) / np.abs(wanted).max(axis=0)
     assert ((found >= low - 1e-9) | free).all()
     assert ((found <= high + 1e-9) | free).all()

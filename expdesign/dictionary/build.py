@@ -18,8 +18,8 @@ from expdesign.values import Array, seal
 from expdesign.vessel import (
     NUMPY,
     Vessel,
-    allocate,
     by_force,
+    commands_for,
     generalised_force,
     pushed_everywhere,
     required_push,
@@ -177,7 +177,7 @@ def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
     else:
         push = _from_sample_to_sample(vessel, middles, slopes, desired[..., 0, 1])
     entry = _ready(vessel, trim(vessel, desired[..., 0, :]), push)
-    return entry, allocate(vessel.model, push, sample_time_s=vessel.sample_time_s, before=entry)
+    return entry, commands_for(vessel.model, push, sample_time_s=vessel.sample_time_s, before=entry)
 
 
 def _from_sample_to_sample(vessel: Vessel, motions: Array, slopes: Array, sway: Array) -> Array:
@@ -191,7 +191,7 @@ def _from_sample_to_sample(vessel: Vessel, motions: Array, slopes: Array, sway: 
     for motion, slope in zip(np.moveaxis(motions, -2, 0), np.moveaxis(slopes, -2, 0), strict=True):
         at = motion if everywhere else np.stack([motion[..., 0], sway, motion[..., 2]], axis=-1)
         given.append(required_push(model, at, slope, sway=everywhere, near=before))
-        before = allocate(model, given[-1][..., None, :], sample_time_s=sample_s, near=before)[..., 0, :]
+        before = commands_for(model, given[-1][..., None, :], sample_time_s=sample_s, near=before)[..., 0, :]
         for _ in range(0 if everywhere else DRIFT_STEPS):
             at[..., 1] += drift(vessel, at, before)[..., 1] * sample_s / DRIFT_STEPS
         sway = at[..., 1]
@@ -203,7 +203,7 @@ def _ready(vessel: Vessel, entry: Array, push: Array) -> Array:
     size = np.linalg.norm(push, axis=-1)
     pushes = size > 1e-3 * np.maximum(size.max(axis=-1, keepdims=True), 1e-12)
     first = np.take_along_axis(push, np.argmax(pushes, axis=-1)[..., None, None], axis=-2)
-    turned = allocate(vessel.model, first, sample_time_s=vessel.sample_time_s)[..., 0, :]
+    turned = commands_for(vessel.model, first, sample_time_s=vessel.sample_time_s)[..., 0, :]
     ready, place = entry.copy(), 0
     for actuator in vessel.actuators:
         if actuator.kind == "azimuth":

@@ -6,7 +6,7 @@ import numpy as np
 
 from expdesign.errors import Unreachable
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Vessel, allocate, required_push
+from expdesign.vessel import NUMPY, Vessel, commands_for, required_push
 
 STEADY_CHANGE = 1e-6  # largest relative change of speed per sample of a steady state
 # shares of a desired velocity from which the search for the largest one that can be held begins
@@ -16,7 +16,7 @@ SHARE_STARTS = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
 def trim(vessel: Vessel, velocity: Array) -> Array:
     """Commands (..., m) that hold a velocity (..., 3) through calm water, as far as the actuators can."""
     push = required_push(vessel.model, velocity, np.zeros(3))
-    return np.asarray(allocate(vessel.model, push[..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :])
+    return np.asarray(commands_for(vessel.model, push[..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :])
 
 
 def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from expdesign.dictionary.spec import PrimitiveSpec
 from expdesign.errors import NoPlan
 from expdesign.growing import GrowSettings
@@ -100,9 +98,12 @@ class Scenario:
         wind = weather.wind_to.any() or weather.wind_std_mps or weather.wind_variation.std_mps
         current = weather.current_to.any() or weather.current_std_mps or weather.current_variation.std_mps
         still = [name for name in ("u", "v") if name not in model.read_signals(name)] if current else []
-        spread = (model.parameter_std, np.asarray(model.unstated_std))
-        certain = [name for name, *stds in zip(model.names, *spread, strict=True) if not any(stds)]
-        unstated = [name for name, std in zip(model.names, spread[1], strict=True) if std]
+        certain = [name for name, std in zip(model.names, model.drawn_std.tolist(), strict=True) if not std]
+        unstated = [
+            name
+            for name, std in zip(model.names, model.parameter_std.tolist(), strict=True)
+            if not std and name not in certain
+        ]
         known = ", ".join(certain)
         if len(certain) == len(model.names):
             known = f"every parameter of the model: {known}"

@@ -9,13 +9,14 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
+from expdesign.errors import InputError
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
+from expdesign.vessel.thrusts import LEAST_PUSH, required_thrust, thrusts
 from expdesign.vessel.thrusts import pushed_everywhere as pushed_everywhere_at_rest
-from expdesign.vessel.thrusts import required_thrust, thrusts
 
 
 def required_push(
@@ -45,7 +46,16 @@ def required_push(
 
 
 def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
-    """Generalised force (..., 3) that gives an acceleration (..., 3) at a velocity (..., 3), of models `by_force`."""
+    """Generalised force (..., 3) that gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air.
+
+    Directions that the model cannot push (no equation, no gain) get the least-squares answer.
+
+    Raises:
+        InputError: the model is not `by_force`.
+    """
+    if not by_force(model):
+        read = direct_terms(model) or ("the model is not affine in them",)
+        raise InputError(f"term {read[0]}: no {', '.join(FORCE_SIGNALS)} alone gives a motion")
     if model.inertia is not None:
         sway, yaw = model.inertia.uncoupled(acceleration[..., 1], acceleration[..., 2])
         acceleration = np.stack(np.broadcast_arrays(acceleration[..., 0], sway, yaw), axis=-1)
@@ -119,11 +129,14 @@ def by_force(model: VesselModel) -> bool:
     return bool(np.allclose(other - zero, -2.0 * (one - zero), rtol=1e-9, atol=1e-12 * np.abs(one).max(initial=0.0)))
 
 
-def pushed_everywhere(model: VesselModel) -> bool:
-    """Whether the actuators push ahead, sideways and round at once, at rest."""
+def pushed_everywhere(model: VesselModel, least: float = LEAST_PUSH) -> bool:
+    """Whether the actuators push ahead, sideways and round at once, at rest.
+
+    In models not by force, the weakest push is at least a share of the strongest.
+    """
     if by_force(model):
         return bool(np.linalg.matrix_rank(force_matrix(model.actuators)) == 3)
-    return pushed_everywhere_at_rest(model)
+    return pushed_everywhere_at_rest(model, least)
 
 
 @lru_cache(maxsize=16)
@@ -162,6 +175,30 @@ def _inverse_force_matrix(actuators: tuple[Actuator, ...]) -> Array:
 
 
 def allocate(
+    actuators: tuple[Actuator, ...],
+    force: Array,
+    *,
+    sample_time_s: float,
+    before: Array | None = None,
+    near: Array | None = None,
+) -> Array:
+    """Commands (..., k, m) for desired generalised forces (..., k, 3): smallest thrusts, then limits and rates.
+
+    An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
+    it keeps its angle. A saturated thruster is not relieved by the others. Rudders stay amidships.
+
+    Args:
+        actuators: in command order.
+        force: (..., k, 3) tau_x, tau_y, tau_psi.
+        sample_time_s: time between rows [s].
+        before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
+        near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
+    """
+    desired = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
+    return _row_by_row(actuators, desired, _bounds(actuators, sample_time_s), before, near)
+
+
+def commands_for(
     model: VesselModel,
     push: Array,
     *,
@@ -169,21 +206,19 @@ def allocate(
     before: Array | None = None,
     near: Array | None = None,
 ) -> Array:
-    """Commands (..., k, m) for what `required_push` gives: smallest thrusts, then limits and rates.
+    """Commands (..., k, m) for what `required_push` gives (..., k, 3 or c), as of `allocate`."""
+    desired, actuators = _thrusts(model, push)
+    return _row_by_row(actuators, desired, _bounds(model.actuators, sample_time_s), before, near)
 
-    An azimuth turns the shorter way, reversing its propeller where that is nearer and gives as much; near zero thrust
-    it keeps its angle. Of generalised forces, a saturated thruster is not relieved by the others, and rudders stay
-    amidships.
 
-    Args:
-        model: with its actuators, in command order.
-        push: (..., k, 3) generalised forces, or thrusts (..., k, c).
-        sample_time_s: time between rows [s].
-        before: (..., m) commands standing before the first row, from which rates count; None for no rate limit there.
-        near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
-    """
-    desired, actuators = _thrusts(model, push)  # (..., k, c)
-    bounds = _bounds(model.actuators, sample_time_s)
+def _row_by_row(
+    actuators: tuple[Actuator, ...],
+    desired: Array,
+    bounds: tuple[Array, Array, Array],
+    before: Array | None,
+    near: Array | None,
+) -> Array:
+    """Commands (..., k, m) for thrusts (..., k, c), each row within a sample's change from the one before."""
     rows, last = [], before
     for row in np.moveaxis(desired, -2, 0):
         last = _reached(bounds, _desired_commands(actuators, row, last if near is None else near), last)

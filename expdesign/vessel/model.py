@@ -114,9 +114,9 @@ class VesselModel:
     # least and most value of parameters by name, on which the prior is conditioned: the signs of damping and thrust of
     # a vessel that is known to be stable, for example
     parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # (p,) what drawn ships have where no standard deviation is stated, zero elsewhere; None for zero everywhere. It is
-    # no prior: estimates and designs take nothing from it
-    unstated_std: Array | None = None
+    speeds_mps: tuple[float, float] | None = None  # least and most surge speed of the data behind it, where known
+    # and designs take nothing from it. Names that have a standard deviation, or are no parameters, are ignored
+    unstated_std: Mapping[str, float] = field(default_factory=dict)
     speeds_mps: tuple[float, float] | None = (
         None  # least and most surge speed of the data that determined the parameters
     )
@@ -125,8 +125,6 @@ class VesselModel:
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", readonly(self.parameters))
         object.__setattr__(self, "parameter_std", readonly(self.parameter_std))
-        unstated = np.zeros(len(self.terms)) if self.unstated_std is None else self.unstated_std
-        object.__setattr__(self, "unstated_std", readonly(unstated))
         if not self.parameters.shape == self.parameter_std.shape == (len(self.terms),):
             raise InputError(f"VesselModel has {len(self.terms)} terms but {self.parameters.shape} parameters")
         names = self.names
@@ -146,6 +144,12 @@ class VesselModel:
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(term.name for term in self.terms)
+
+    @property
+    def drawn_std(self) -> Array:
+        """(p,) standard deviations of drawn ships: `parameter_std`, or else `unstated_std`."""
+        stated = zip(self.names, self.parameter_std.tolist(), strict=True)
+        return np.array([std or self.unstated_std.get(name, 0.0) for name, std in stated])
 
     @property
     def parameter_covariance(self) -> Array:
@@ -237,7 +241,7 @@ class VesselModel:
         return replace(
             self,
             parameter_std=np.array([own.get(name, 0.0) for name in self.names]),
-            unstated_std=None,
+            unstated_std={},
             parameter_correlation={
                 (names[i], names[j]): float(correlation[i, j])
                 for i, j in zip(*np.nonzero(np.tril(correlation, -1)), strict=True)
@@ -279,8 +283,8 @@ class VesselModel:
         """(count, p) parameters drawn from the normal prior."""
         drawn = rng.standard_normal((count, len(self.terms)))
         if not self.parameter_correlation:
-            return np.asarray(self.parameters + np.hypot(self.parameter_std, np.asarray(self.unstated_std)) * drawn)
-        covariance = self.parameter_covariance + np.diag(np.asarray(self.unstated_std) ** 2)
+            return np.asarray(self.parameters + self.drawn_std * drawn)
+        covariance = self.parameter_covariance + np.diag(self.drawn_std**2 - self.parameter_std**2)
         values, vectors = np.linalg.eigh(covariance)
         return np.asarray(self.parameters + drawn @ (vectors * np.sqrt(np.maximum(values, 0.0))).T)
 

@@ -36,6 +36,8 @@ SHORTER = 0.3
 """Share of a step that is tried where the whole step leaves more missing."""
 SOLVED = 1e-11
 """Acceleration that may be missing, in those of full thrust."""
+COARSE = 1e-2
+"""Acceleration, in those of full thrust, from which on two iterations do."""
 CLEARLY = 0.3
 """Share of what is missing near those commands that must be missing elsewhere for commands to jump there."""
 DAMPING = 1e-12
@@ -158,10 +160,10 @@ def push_at_rest(model: VesselModel) -> Array:
     return readonly(push * how.weights[:, None])
 
 
-def pushed_everywhere(model: VesselModel) -> bool:
-    """Whether the actuators push ahead, sideways and round at once, at rest."""
+def pushed_everywhere(model: VesselModel, least: float) -> bool:
+    """Whether the actuators push in every direction at rest, in the weakest by a share of the strongest."""
     sizes = np.linalg.svd(push_at_rest(model), compute_uv=False)
-    return bool(len(sizes) == 3 and sizes[2] > LEAST_PUSH * sizes[0])
+    return bool(len(sizes) == 3 and sizes[2] > least * sizes[0])
 
 
 def required_thrust(
@@ -195,15 +197,15 @@ def required_thrust(
     most: Array | float = enough
     if near is not None:
         before = how.within(how.shares(np.broadcast_to(near, (*shape, near.shape[-1])).reshape(len(motion), -1)))
-        missed = np.linalg.norm((desired - how.accelerations(motion, before)) * how.weights, axis=-1)
-        best, left = _searched(how, motion, desired, before, enough, NEAR_SECANTS, eased=EASED)
-        starts, widths, most = STARTS[:1], NEAR_SECANTS, np.maximum(enough, missed / 2)
+        widths = NEAR_SECANTS if tolerance < COARSE else NEAR_SECANTS[:2]
+        best, left, missed = _searched(how, motion, desired, before, enough, widths, eased=EASED)
+        starts, most = STARTS[:1], np.maximum(enough, missed / 2)
     for share in starts:
         open_ = np.flatnonzero(left > most)
         if not len(open_):
             break
         start = how.within(share * _like_at_rest(how, motion[open_], desired[open_]))
-        found, missing = _searched(how, motion[open_], desired[open_], start, enough, widths)
+        found, missing, _ = _searched(how, motion[open_], desired[open_], start, enough, widths)
         better = missing < CLEARLY * left[open_] if near is not None else missing < left[open_]
         best[open_[better]], left[open_[better]] = found[better], missing[better]
     return np.asarray((best * how.scale).reshape(*shape, -1))
@@ -229,9 +231,13 @@ def _searched(
     widths: Sequence[float],
     *,
     eased: float = 1.0,
-) -> tuple[Array, Array]:
-    """Shares (n, c) found from others, at first from a share of them, and what of the accelerations is missing (n,)."""
+) -> tuple[Array, Array, Array]:
+    """Shares (n, c) found from others, at first from a share of them.
+
+    Besides, what of the accelerations is missing (n,), and what was missing at first.
+    """
     open_, left, step = np.arange(len(motion)), np.full(len(motion), np.inf), np.zeros_like(best)
+    first: Array | None = None
     for width in widths:
         tried = best[open_] + step[open_]
         found, push = how.push(motion[open_], tried, width)
@@ -240,13 +246,14 @@ def _searched(
         better = (size < left[open_]) | (size <= enough)
         rows, push, tried = open_[better], push[better] * how.weights[:, None], tried[better]
         step[open_[~better]] *= SHORTER
+        first = size if first is None else first
         aimed = _smallest(how, push, missing[better] + (push @ tried[..., None])[..., 0], near=eased * tried)
         eased = 1.0
         best[rows], left[rows], step[rows] = tried, size[better], aimed - tried
         open_ = open_[(left[open_] > enough) & (np.abs(step[open_]).max(axis=-1) > STILL)]
         if not len(open_):
             break
-    return best, left
+    return best, left, left if first is None else first
 
 
 def _smallest(how: Thrusts, push: Array, wanted: Array, *, near: Array | float = 0.0) -> Array:

@@ -125,12 +125,9 @@ def _model(model: VesselModel) -> Iterator[str]:
             yield from ("", *_table("[[model.terms]]", vars(term)))
     values, stds = model.parameters.tolist(), model.parameter_std.tolist()
     yield from ("", *_table("[model.parameters]", dict(zip(model.names, values, strict=True))))
-    assumed = np.asarray(model.unstated_std) > 0
-    known = {
-        name: std
-        for name, std, open_ in zip(model.names, stds, assumed.tolist(), strict=True)
-        if std > 0 or (assumed.any() and not open_)
-    }
+    open_ = model.drawn_std > model.parameter_std
+    rows = zip(model.names, stds, open_.tolist(), strict=True)
+    known = {name: std for name, std, unstated in rows if std > 0 or (open_.any() and not unstated)}
     if known:
         yield from ("", *_table("[model.parameter_std]", known))
     yield from _correlation(model)
@@ -148,10 +145,10 @@ def _model(model: VesselModel) -> Iterator[str]:
 
 def _unstated(model: VesselModel) -> dict[str, float]:
     """The share of their values with which parameters without a standard deviation differ, if it is not the usual."""
-    open_ = np.asarray(model.unstated_std) > 0
+    open_ = model.drawn_std > model.parameter_std
     if not open_.any():
         return {} if (model.parameter_std > 0).all() else {"parameter_std_unstated": 0.0}
-    share = float(np.median(np.asarray(model.unstated_std)[open_] / np.abs(model.parameters[open_])))
+    share = float(np.median(model.drawn_std[open_] / np.abs(model.parameters[open_])))
     return {} if math.isclose(share, UNSTATED_SHARE) else {"parameter_std_unstated": share}
 
 

@@ -26,6 +26,9 @@ from expdesign.vessel import Limit, Vessel, pushed_everywhere
 USABLE_SHARE = 0.9  # of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on
 # largest yaw rate on the way into a turn, in those of the steady one: a rule of thumb that bounds the search
 HELM_OVERSHOOT = 1.3
+# weakest push at rest, in the strongest, with which thrusters steer a ship on legs: a tunnel thruster beside two
+# propellers does not
+STEERING_PUSH = 0.1
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -82,7 +85,7 @@ def _reach(limit: Limit) -> float:
 
 def needs_helm(vessel: Vessel) -> bool:
     """Whether no inverse model steers it: its actuators do not push in every direction at rest."""
-    return not pushed_everywhere(vessel.model)
+    return not pushed_everywhere(vessel.model, STEERING_PUSH)
 
 
 def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_mps: float) -> float:

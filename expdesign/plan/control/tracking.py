@@ -197,7 +197,6 @@ class Helmsman:
             terms=tuple(term for term, acts in zip(model.terms, acting, strict=True) if acts),
             parameters=model.parameters[acting],
             parameter_std=model.parameter_std[acting],
-            unstated_std=None,
         )
 
     def _velocity_through_water(self, desired: Array, states: Array) -> Array:

@@ -12,7 +12,7 @@ from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
-from expdesign.vessel import Vessel, allocate, required_push
+from expdesign.vessel import Vessel, commands_for, required_push
 
 # margins of the boxes searched for Dubins paths round a leg's ends, in turning radii plus hull lengths
 SEARCH_BOXES = (4.0, 40.0)
@@ -98,4 +98,4 @@ def _guessed_inputs(vessel: Vessel, reference: Array, before: Array, duration_s:
     """Commands (j + 1, m) that would hold each node's speed and turn."""
     push = required_push(vessel.model, reference[1:, 3:], np.zeros(3))
     step_s = duration_s / (len(reference) - 1)
-    return np.vstack([before, allocate(vessel.model, push, sample_time_s=step_s, before=before)])
+    return np.vstack([before, commands_for(vessel.model, push, sample_time_s=step_s, before=before)])

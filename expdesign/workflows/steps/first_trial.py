@@ -36,7 +36,7 @@ TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
 
 def is_wide(model: VesselModel) -> bool:
     """Whether the prior of the parameters is wide."""
-    spread, size = np.hypot(model.parameter_std, np.asarray(model.unstated_std)), np.abs(model.parameters)
+    spread, size = model.drawn_std, np.abs(model.parameters)
     return bool(np.median(spread[size > 0] / size[size > 0]) >= WIDE) if (size > 0).any() else False
 
 
