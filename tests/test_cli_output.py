@@ -82,13 +82,14 @@ class Workflows:
     """Stands in for the workflows: notes what it is asked for and reports progress."""
 
     calls: list[tuple[str, tuple[object, ...], dict[str, object]]] = field(default_factory=list)
+    summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
 
     def __getattr__(self, name: str) -> object:
         def workflow(*arguments: object, progress: object, **options: object) -> Finished:
             self.calls.append((name, arguments, options))
             for fraction in (0.0, 0.01, 0.5, 1.0):
                 progress("at work", fraction)  # type: ignore[operator]
-            return Finished()
+            return Finished(summary=self.summary)
 
         return workflow
 
@@ -276,6 +277,17 @@ def test_numbers_come_with_their_units_and_files_with_their_folder(
     assert said["parameters"] == "X_u, X_mu"
     assert "Written to runs/a/: plan.json, report.html" in said
     assert "Open runs/a/report.html in a browser." in said
+
+
+@pytest.mark.parametrize(("draft", "status"), [(False, 3), (True, 0)])
+def test_a_plan_that_is_not_verified_ends_with_the_status_of_no_answer(
+    workflows: Workflows, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], draft: bool, status: int
+) -> None:
+    facts = {"verified": False, "verdict": "20 % were aborted", **({"draft": True} if draft else {})}
+    monkeypatch.setattr(workflows, "summary", facts)
+    assert main(["run", "a.toml", "--quiet"]) == status
+    told = "expdesign: error: the plan is written but not verified: 20 % were aborted\n"
+    assert capsys.readouterr().err == (told if status else "")
 
 
 def test_quiet_says_nothing(workflows: Workflows, capsys: pytest.CaptureFixture[str]) -> None:

@@ -92,15 +92,17 @@ def test_helm_that_the_actuators_cannot_give_is_refused_with_file_and_key():
 
 
 @pytest.mark.parametrize("kind", [item for item in FAMILIES if item.reference is not None], ids=lambda kind: kind.name)
-def test_desired_velocities_are_refused_for_direct_models_with_file_and_key(kind, tmp_path: Path):
+def test_motions_out_of_reach_of_direct_models_are_refused_with_file_and_key(kind, tmp_path: Path):
     path = tmp_path / "requests.toml"
     needed = {item.name: 1.0 for item in kind.settings if item.default is None} | {"duration_s": 30.0}
+    needed |= {item.name: 50.0 for item in kind.settings if item.name.endswith("speed_mps")}
     given = {**needed, **({"period_s": 10.0} if "period_s" in needed else {})}
     lines = "\n".join(f"{name} = {value}" for name, value in given.items())
     path.write_text(f'[dictionary]\nname = "d"\n[[primitives]]\nfamily = "{kind.name}"\n{lines}\n', encoding="utf-8")
     (request_,) = load_dictionary(path)
     with pytest.raises(
-        InputError, match=r"requests.toml: primitives\[1\]: primitive .*X_n reads n1.*families with commands"
+        InputError,
+        match=r"requests.toml: primitives\[1\]: primitive .*the actuators cannot hold its entry state u = 50",
     ):
         build_primitive(rudder_ship(), request_)
 

@@ -47,7 +47,7 @@ def carried_out(commands: list[list[str]], folder: Path, monkeypatch: pytest.Mon
 
 def test_what_the_tutorials_ask_before_a_plan_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = [command for command in tutorial("first-plan") if command[0] not in LONG]
-    assert {command[0] for command in commands} == {"explain", "score", "durations"}
+    assert {command[0] for command in commands} == {"new", "explain", "score", "durations"}
     carried_out(commands, tmp_path, monkeypatch)
 
 

@@ -24,13 +24,15 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 from expdesign import __version__
-from expdesign.cli.summary import as_json, print_summary
+from expdesign.cli.summary import as_json, print_summary, unverified
 from expdesign.errors import NotDrawn
 from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
 
 BUG = 1
 """Exit status of a defect of this program."""
+NO_ANSWER = 3
+"""Exit status where the input is fine but has no answer."""
 PLAIN_STEP = 0.1
 """Least share of the work between two plain lines about the same activity."""
 LEAST_SHARE = 0.1
@@ -163,6 +165,9 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
             elif not quiet:
                 print_summary(outcome)
             tell_gaps(outcome.files)
+            if doubt := unverified(outcome.summary):
+                typer.echo(f"expdesign: error: {doubt}", err=True)
+                raise typer.Exit(NO_ANSWER)
 
         kind = inspect.Parameter.KEYWORD_ONLY
         own = inspect.signature(asking, eval_str=True).parameters.values()
@@ -218,7 +223,9 @@ def expdesign(
     allowed water, verifies it, and writes route files and a report. The other
     commands are its steps, and what follows when data have been measured.
 
-    Begin with: expdesign run scenarios/helsinki.toml
+    Begin with: expdesign new mytrial
+
+    then: expdesign run mytrial/scenario.toml
 
     What may stand in a file: expdesign explain
     """

@@ -18,7 +18,7 @@ import typer
 from rich.markup import escape
 from typer.main import get_command
 
-from expdesign.cli.app import BUG
+from expdesign.cli.app import BUG, NO_ANSWER
 from expdesign.cli.commands import app
 from expdesign.cli.options import repeat_option
 from expdesign.errors import InputError, NoAnswer
@@ -43,7 +43,7 @@ FILE_LISTS = ("--test", "--data", "--reference")
 LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")
 """Within a paragraph."""
 Program = TypeVar("Program")
-DONE, WRONG_INPUT, NO_ANSWER, INTERRUPTED = 0, 2, 3, 130
+DONE, WRONG_INPUT, INTERRUPTED = 0, 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -24,6 +24,23 @@ from expdesign.cli.options import (
 )
 
 
+@command("new")
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="NAME", help="The folder to make; also the scenario's name.")],
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--kind", metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw, asv or model-ship."
+        ),
+    ] = "azimuth",
+) -> Asked:
+    """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship.
+
+    Example: expdesign new mytrial --kind twin-screw
+    """
+    return ask("new", folder, kind=kind)
+
+
 @command("run")
 def run(
     scenario: ScenarioFile,
@@ -45,7 +62,7 @@ def run(
 ) -> Asked:
     """Do everything: score, durations, plan, verification, route files, report.
 
-    Example: expdesign run scenarios/helsinki.toml
+    Example: expdesign run mytrial/scenario.toml
     """
     return ask(
         "run",

@@ -54,6 +54,12 @@ def _known(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def unverified(summary: Mapping[str, object]) -> str:
+    """Why a plan that was asked for whole is written but not verified; "" for all other results."""
+    whole = summary.get("verified") is False and not summary.get("draft")
+    return f"the plan is written but not verified: {summary.get('verdict')}" if whole else ""
+
+
 def print_summary(outcome: Outcome) -> None:
     """Key numbers and tables, what the page finds and warns of beside them, then the files and the page to open."""
     console = Console(highlight=False, markup=False, soft_wrap=True)

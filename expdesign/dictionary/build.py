@@ -10,15 +10,25 @@ import numpy as np
 
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.spec import Excitation, Family, Primitive, PrimitiveSpec
-from expdesign.dictionary.trim import STEADY_CHANGE, lost, motion_text, reach_text, trim
+from expdesign.dictionary.trim import STEADY_CHANGE, drift, lost, motion_text, reach_text, trim
 from expdesign.errors import InputError, NoAnswer, SpeedOutOfReach, UnknownName, Unreachable
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.values import Array, seal
-from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, generalised_force, required_force, within_limits
+from expdesign.vessel import (
+    NUMPY,
+    Vessel,
+    by_force,
+    commands_for,
+    generalised_force,
+    pushed_everywhere,
+    required_push,
+    within_limits,
+)
 
 # deviation, as a share of the largest desired speed or yaw rate, above which a primitive is reported
 REPORTED_DEVIATION = 0.1
+DRIFT_STEPS = 4  # of a sample, in which the sway of ships that drift is integrated
 FOLLOWED_SAMPLES = 300_000  # samples of desired velocities whose commands are found at a time
 
 
@@ -80,8 +90,6 @@ def _simulated(vessel: Vessel, spec: PrimitiveSpec, found: Excitation) -> Primit
 def _followed(vessel: Vessel, specs: tuple[PrimitiveSpec, ...]) -> dict[int, Excitation]:
     """Excitation by index of the specifications with desired velocities; those that cannot be had are left out."""
     lengths: dict[int, dict[int, Array]] = {}
-    if direct_terms(vessel.model):
-        return {}
     for index, spec in enumerate(specs):
         with suppress(InputError):
             if family(spec.family).reference is not None:
@@ -160,22 +168,42 @@ def desired_velocities(vessel: Vessel, spec: PrimitiveSpec) -> Array:
 def follow(vessel: Vessel, desired: Array) -> tuple[Array, Array]:
     """Entry commands (..., m) and commands (..., k, m) for desired velocities (..., k + 1, 3), by the inverse model.
 
-    Raises:
-        InputError: the model has no generalised forces.
+    A ship whose actuators do not push sideways at rest is given surge and yaw rate, and drifts as she does.
     """
     slopes = np.diff(desired, axis=-2) / vessel.sample_time_s
     middles = (desired[..., :-1, :] + desired[..., 1:, :]) / 2
-    force = required_force(vessel.model, middles, slopes)
-    entry = _ready(vessel, trim(vessel, desired[..., 0, :]), force)
-    return entry, allocate(vessel.actuators, force, sample_time_s=vessel.sample_time_s, before=entry)
+    if by_force(vessel.model):
+        push = required_push(vessel.model, middles, slopes)
+    else:
+        push = _from_sample_to_sample(vessel, middles, slopes, desired[..., 0, 1])
+    entry = _ready(vessel, trim(vessel, desired[..., 0, :]), push)
+    return entry, commands_for(vessel.model, push, sample_time_s=vessel.sample_time_s, before=entry)
 
 
-def _ready(vessel: Vessel, entry: Array, force: Array) -> Array:
+def _from_sample_to_sample(vessel: Vessel, motions: Array, slopes: Array, sway: Array) -> Array:
+    """(..., k, c) what gives accelerations (..., k, 3) at motions (..., k, 3), each sample near the one before.
+
+    Where the actuators do not push sideways, the ship drifts as she does: with a sway (...,) at first, then by the
+    model.
+    """
+    model, sample_s = vessel.model, vessel.sample_time_s
+    everywhere, before, given = pushed_everywhere(model), None, list[Array]()
+    for motion, slope in zip(np.moveaxis(motions, -2, 0), np.moveaxis(slopes, -2, 0), strict=True):
+        at = motion if everywhere else np.stack([motion[..., 0], sway, motion[..., 2]], axis=-1)
+        given.append(required_push(model, at, slope, sway=everywhere, near=before))
+        before = commands_for(model, given[-1][..., None, :], sample_time_s=sample_s, near=before)[..., 0, :]
+        for _ in range(0 if everywhere else DRIFT_STEPS):
+            at[..., 1] += drift(vessel, at, before)[..., 1] * sample_s / DRIFT_STEPS
+        sway = at[..., 1]
+    return np.stack(given, axis=-2)
+
+
+def _ready(vessel: Vessel, entry: Array, push: Array) -> Array:
     """Entry commands with idle azimuths turned to the first direction that the run needs."""
-    size = np.linalg.norm(force, axis=-1)
+    size = np.linalg.norm(push, axis=-1)
     pushes = size > 1e-3 * np.maximum(size.max(axis=-1, keepdims=True), 1e-12)
-    first = np.take_along_axis(force, np.argmax(pushes, axis=-1)[..., None, None], axis=-2)
-    turned = allocate(vessel.actuators, first, sample_time_s=vessel.sample_time_s)[..., 0, :]
+    first = np.take_along_axis(push, np.argmax(pushes, axis=-1)[..., None, None], axis=-2)
+    turned = commands_for(vessel.model, first, sample_time_s=vessel.sample_time_s)[..., 0, :]
     ready, place = entry.copy(), 0
     for actuator in vessel.actuators:
         if actuator.kind == "azimuth":
@@ -186,13 +214,14 @@ def _ready(vessel: Vessel, entry: Array, force: Array) -> Array:
 
 
 def _not_held(vessel: Vessel, velocity: Array) -> str:
-    wanted = required_force(vessel.model, velocity, np.zeros(3))
     inputs = trim(vessel, velocity)
+    found = f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}: "
+    if not by_force(vessel.model):
+        left = drift(vessel, velocity, inputs)
+        return f"{found}they leave du/dt = {left[0]:.3g} m/s2, dv/dt = {left[1]:.3g} m/s2, dr/dt = {left[2]:.3g} rad/s2"
+    wanted = required_push(vessel.model, velocity, np.zeros(3))
     given = generalised_force(vessel.actuators, dict(zip(vessel.model.inputs, inputs, strict=True)), NUMPY)
-    return (
-        f"the actuators cannot hold its entry state {motion_text(velocity)}; {reach_text(vessel, velocity)}: "
-        f"needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
-    )
+    return f"{found}needed tau_x = {wanted[0]:.4g}, tau_y = {wanted[1]:.4g}, they give {given[0]:.4g}, {given[1]:.4g}"
 
 
 # Commands and entry states of many specifications of one duration, without building primitives.

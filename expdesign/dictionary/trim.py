@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from expdesign.errors import Unreachable
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Vessel, allocate, direct_terms, required_force
+from expdesign.vessel import NUMPY, Vessel, commands_for, required_push
 
 STEADY_CHANGE = 1e-6  # largest relative change of speed per sample of a steady state
 # shares of a desired velocity from which the search for the largest one that can be held begins
 SHARE_STARTS = (0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01)
-THRUST_STARTS = (0.05, 0.4, 0.9)  # shares of full thrust from which the search for commands of a direct model begins
 
 
 def trim(vessel: Vessel, velocity: Array) -> Array:
     """Commands (..., m) that hold a velocity (..., 3) through calm water, as far as the actuators can."""
-    if direct_terms(vessel.model):
-        flat = velocity.reshape(-1, 3)
-        return np.array([_direct_trim(vessel, row) for row in flat]).reshape(*velocity.shape[:-1], -1)
-    force = required_force(vessel.model, velocity, np.zeros(3))
-    return np.asarray(allocate(vessel.actuators, force[..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :])
+    push = required_push(vessel.model, velocity, np.zeros(3))
+    return np.asarray(commands_for(vessel.model, push[..., None, :], sample_time_s=vessel.sample_time_s)[..., 0, :])
 
 
 def drift(vessel: Vessel, velocity: Array, inputs: Array) -> Array:
@@ -82,24 +77,3 @@ def reach_text(vessel: Vessel, velocity: Array) -> str:
         if share
         else "they reach no motion in that direction"
     )
-
-
-def _direct_trim(vessel: Vessel, velocity: Array) -> Array:
-    """Least accelerations within limits, by commands as small as do it, for a model that reads its actuators."""
-    scale = np.array(
-        [max(abs(x.low), abs(x.high)) if np.isfinite([x.low, x.high]).all() else 1.0 for x in vessel.limits]
-    )
-    low, high = (np.array([getattr(x, side) for x in vessel.limits]) / scale for side in ("low", "high"))
-    free = np.maximum(np.abs(drift(vessel, velocity, 0 * scale)).max(), 1e-12)
-
-    def excess(share: Array) -> Array:
-        return np.asarray(np.r_[drift(vessel, velocity, share * scale) / free, 1e-9 * share])
-
-    ahead = np.array([name.startswith(("n", "tau_x")) for name in vessel.model.inputs])
-    tries = [np.clip(start * np.sign(velocity[0]) * ahead, low + 1e-9, high - 1e-9) for start in THRUST_STARTS]
-    found = [
-        scipy.optimize.least_squares(excess, start, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        for start in tries
-    ]
-    best: Array = min(found, key=lambda item: float(item.cost)).x
-    return np.asarray(best * scale)

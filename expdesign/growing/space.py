@@ -12,7 +12,7 @@ from expdesign.errors import InputError
 from expdesign.information import PrimitiveInformation
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array, seal
-from expdesign.vessel import Vessel, direct_terms
+from expdesign.vessel import Vessel
 
 DRAWS = 100_000  # random draws of a family among which the search chooses
 HEADING_RAD = (0.05, 1.0)  # range of searched heading changes
@@ -59,16 +59,13 @@ class FamilySpace:
 def family_spaces(vessel: Vessel, families: tuple[Family, ...], limits: Array, run_s: float) -> tuple[FamilySpace, ...]:
     """The search spaces of the families that the vessel can run.
 
-    Families with a reference motion need a model with generalised forces; families of helm orders need a helm that
-    turns the ship; recorded commands are not searched.
+    Families of helm orders need a helm that turns the ship; recorded commands are not searched.
 
     Raises:
         InputError: no family is left.
     """
-    direct, steers = bool(direct_terms(vessel.model)), _steers(vessel, limits)
-    chosen = [
-        item for item in families if item.name != "recorded" and (not direct if item.reference is not None else steers)
-    ]
+    steers = _steers(vessel, limits)
+    chosen = [item for item in families if item.name != "recorded" and (item.reference is not None or steers)]
     if not chosen:
         raise InputError(f"vessel {vessel.name!r} can run no searched manoeuvre family within the limits")
     return tuple(_space(vessel, item, limits, run_s) for item in chosen)

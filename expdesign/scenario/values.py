@@ -98,10 +98,15 @@ class Scenario:
         wind = weather.wind_to.any() or weather.wind_std_mps or weather.wind_variation.std_mps
         current = weather.current_to.any() or weather.current_std_mps or weather.current_variation.std_mps
         still = [name for name in ("u", "v") if name not in model.read_signals(name)] if current else []
-        certain = [name for name, std in zip(model.names, model.parameter_std.tolist(), strict=True) if not std]
-        known = f"{', '.join(certain)} (no model.parameter_std)"
+        certain = [name for name, std in zip(model.names, model.drawn_std.tolist(), strict=True) if not std]
+        unstated = [
+            name
+            for name, std in zip(model.names, model.parameter_std.tolist(), strict=True)
+            if not std and name not in certain
+        ]
+        known = ", ".join(certain)
         if len(certain) == len(model.names):
-            known = f"every parameter of the model (no model.parameter_std): {', '.join(certain)}"
+            known = f"every parameter of the model: {known}"
         return (
             *(["environment.wind_to moves no ship here: no term of the vessel's model reads the wind"]
               if wind and not {"u_q", "v_q"} & model.read_signals() else []),
@@ -110,6 +115,9 @@ class Scenario:
             *([f"no term of the vessel's model reads {', '.join(unread)}, so that these commands and their limits move "
                "no ship"] if unread else []),
             *([f"exactly known in drawn trials: {known}"] if certain else []),
+            *([f"no model.parameter_std of {', '.join(unstated)}: ships of drawn trials differ in them by the share "
+               "model.parameter_std_unstated"]
+              if unstated else []),
             *(["plan.paths does not act: it is of ships that turn on the spot, and this one does not"]
               if self.plan.paths != PlanSettings.paths and not self._turns_on_the_spot else []),
         )  # fmt: skip

@@ -18,13 +18,17 @@ from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import (
     Allocator,
     allocate,
+    by_force,
+    commands_for,
     direct_terms,
     force_matrix,
+    pushed_everywhere,
     required_force,
+    required_push,
     within_limits,
 )
 from expdesign.vessel.masses import NOMINAL, Body, Load
-from expdesign.vessel.model import NOT_SUPPORTED, Inertia, VesselModel
+from expdesign.vessel.model import NOT_SUPPORTED, UNSTATED_SHARE, Inertia, VesselModel
 from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms

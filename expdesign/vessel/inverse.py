@@ -15,23 +15,47 @@ from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
+from expdesign.vessel.thrusts import LEAST_PUSH, required_thrust, thrusts
+from expdesign.vessel.thrusts import pushed_everywhere as pushed_everywhere_at_rest
+
+
+def required_push(
+    model: VesselModel,
+    velocity: Array,
+    acceleration: Array,
+    *,
+    sway: bool = True,
+    near: Array | None = None,
+    tolerance: float = 1e-4,
+) -> Array:
+    """What gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air, for `allocate`.
+
+    The generalised force (..., 3) where the model is affine in it, the thrusts of all actuators (..., c) elsewhere.
+    Directions that it cannot push (no equation, no gain) get the least-squares answer.
+
+    Args:
+        model: with the terms.
+        velocity, acceleration: through the water.
+        sway: whether sway counts; without, models not by force leave it to itself.
+        near: (..., m) commands a sample before, near to which models not by force seek others; None for any.
+        tolerance: acceleration that may be missing with these, in those of full thrust.
+    """
+    if not by_force(model):
+        return required_thrust(model, velocity, acceleration, sway=sway, near=near, tolerance=tolerance)
+    return required_force(model, velocity, acceleration)
 
 
 def required_force(model: VesselModel, velocity: Array, acceleration: Array) -> Array:
     """Generalised force (..., 3) that gives an acceleration (..., 3) at a velocity (..., 3) in calm water and air.
 
-    The model must be affine in the generalised force. Directions that it cannot push (no equation, no gain) get the
-    least-squares answer.
+    Directions that the model cannot push (no equation, no gain) get the least-squares answer.
 
     Raises:
-        InputError: a term reads an actuator signal directly, so force alone does not determine the motion.
+        InputError: the model is not `by_force`.
     """
-    direct = direct_terms(model)
-    if direct:
-        raise InputError(
-            f"term {direct[0]}: desired velocities need a model whose inputs are "
-            f"{', '.join(FORCE_SIGNALS)}; use families with commands"
-        )
+    if not by_force(model):
+        read = direct_terms(model) or ("the model is not affine in them",)
+        raise InputError(f"term {read[0]}: no {', '.join(FORCE_SIGNALS)} alone gives a motion")
     if model.inertia is not None:
         sway, yaw = model.inertia.uncoupled(acceleration[..., 1], acceleration[..., 2])
         acceleration = np.stack(np.broadcast_arrays(acceleration[..., 0], sway, yaw), axis=-1)
@@ -91,6 +115,31 @@ def _push_at_rest(model: VesselModel) -> Array:
 
 
 @lru_cache(maxsize=16)
+def by_force(model: VesselModel) -> bool:
+    """Whether the accelerations are affine in the generalised force, and no term reads an actuator signal itself."""
+    if direct_terms(model):
+        return False
+    motion = dict(zip(MOTION_SIGNALS, (0.7, -0.3, 0.2, 0.5, -0.4, 0.1), strict=True))
+
+    def values(size: float) -> Array:
+        table = motion | {name: size * (1.0 + place) for place, name in enumerate(FORCE_SIGNALS)}
+        return np.array([float(value * x.evaluate(table, NUMPY)) for _, x, value in _acting(model)])
+
+    zero, one, other = values(0.0), values(1.0), values(-2.0)
+    return bool(np.allclose(other - zero, -2.0 * (one - zero), rtol=1e-9, atol=1e-12 * np.abs(one).max(initial=0.0)))
+
+
+def pushed_everywhere(model: VesselModel, least: float = LEAST_PUSH) -> bool:
+    """Whether the actuators push ahead, sideways and round at once, at rest.
+
+    In models not by force, the weakest push is at least a share of the strongest.
+    """
+    if by_force(model):
+        return bool(np.linalg.matrix_rank(force_matrix(model.actuators)) == 3)
+    return pushed_everywhere_at_rest(model, least)
+
+
+@lru_cache(maxsize=16)
 def direct_terms(model: VesselModel) -> tuple[str, ...]:
     """Terms that read actuator signals themselves instead of the generalised force they give, as "X_n reads n1"."""
     seen = {*MOTION_SIGNALS, *FORCE_SIGNALS}
@@ -101,7 +150,7 @@ def direct_terms(model: VesselModel) -> tuple[str, ...]:
 def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
     """(3, c) generalised force of unit commands.
 
-    Two columns (ahead, starboard) per azimuth, one per tunnel or propeller, the identity for plain forces.
+    Two columns (ahead, starboard) per azimuth, one per tunnel, propeller or rudder, the identity for plain forces.
     """
     columns: list[tuple[float, float, float]] = []
     for actuator in actuators:
@@ -114,6 +163,8 @@ def force_matrix(actuators: tuple[Actuator, ...]) -> Array:
             columns.append((0.0, 1.0, x))
         elif actuator.kind == "propeller":
             columns.append((1.0, 0.0, -y))
+        elif actuator.kind == "rudder":  # what it gives is a matter of the model
+            columns.append((0.0, 0.0, 0.0))
     return np.array(columns).T if columns else np.zeros((3, 0))
 
 
@@ -144,12 +195,42 @@ def allocate(
         near: (..., m) commands to whose angles azimuths keep as near as they can; None for those of the row before.
     """
     desired = force @ _inverse_force_matrix(actuators).T  # (..., k, c)
-    bounds = _bounds(actuators, sample_time_s)
+    return _row_by_row(actuators, desired, _bounds(actuators, sample_time_s), before, near)
+
+
+def commands_for(
+    model: VesselModel,
+    push: Array,
+    *,
+    sample_time_s: float,
+    before: Array | None = None,
+    near: Array | None = None,
+) -> Array:
+    """Commands (..., k, m) for what `required_push` gives (..., k, 3 or c), as of `allocate`."""
+    desired, actuators = _thrusts(model, push)
+    return _row_by_row(actuators, desired, _bounds(model.actuators, sample_time_s), before, near)
+
+
+def _row_by_row(
+    actuators: tuple[Actuator, ...],
+    desired: Array,
+    bounds: tuple[Array, Array, Array],
+    before: Array | None,
+    near: Array | None,
+) -> Array:
+    """Commands (..., k, m) for thrusts (..., k, c), each row within a sample's change from the one before."""
     rows, last = [], before
     for row in np.moveaxis(desired, -2, 0):
         last = _reached(bounds, _desired_commands(actuators, row, last if near is None else near), last)
         rows.append(last)
     return np.stack(rows, axis=-2)
+
+
+def _thrusts(model: VesselModel, push: Array) -> tuple[Array, tuple[Actuator, ...]]:
+    """Thrusts (..., c) for pushes, and the actuators that angles are chosen for."""
+    if by_force(model):
+        return push @ _inverse_force_matrix(model.actuators).T, model.actuators
+    return push, thrusts(model).actuators
 
 
 def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time_s: float, before: Array) -> Array:
@@ -165,17 +246,17 @@ def within_limits(actuators: tuple[Actuator, ...], values: Array, *, sample_time
 class Allocator:
     """`allocate` and `within_limits` for n ships at once, sample by sample."""
 
-    def __init__(self, actuators: tuple[Actuator, ...], *, sample_time_s: float) -> None:
-        """Prepare the allocation to these actuators, in command order."""
-        self._actuators, self._bounds = actuators, _bounds(actuators, sample_time_s)
-        self._inverse = _inverse_force_matrix(actuators).T
+    def __init__(self, model: VesselModel, *, sample_time_s: float) -> None:
+        """Prepare the allocation to a model's actuators, in command order."""
+        self._model, self._bounds = model, _bounds(model.actuators, sample_time_s)
 
-    def commands(self, force: Array, *, near: Array) -> Array:
-        """(n, m) commands within limits for generalised forces (n, 3), whatever stands before.
+    def commands(self, push: Array, *, near: Array) -> Array:
+        """(n, m) commands within limits for what `required_push` gives (n, ...), whatever stands before.
 
         Azimuths keep as near as they can to the angles of `near` (n, m).
         """
-        return _reached(self._bounds, _desired_commands(self._actuators, force @ self._inverse, near), None)
+        desired, actuators = _thrusts(self._model, push)
+        return _reached(self._bounds, _desired_commands(actuators, desired, near), None)
 
     def within_limits(self, values: Array, *, before: Array) -> Array:
         """(n, m) commands nearest to the desired ones within limits and rates, one sample after others (n, m)."""
@@ -203,17 +284,13 @@ def _reached(bounds: tuple[Array, Array, Array], desired: Array, last: Array | N
 def _desired_commands(actuators: tuple[Actuator, ...], row: Array, last: Array | None) -> Array:
     """Commands (..., m) that give thrusts (..., c), by the shortest turn of azimuths; limits of speeds come later."""
     parts: list[Array] = []
-    taken, place = 0, 0
     for actuator in actuators:
+        place = len(parts)
         if actuator.kind == "azimuth":
             old = np.zeros(row.shape[:-1]) if last is None else last[..., place + 1]
-            parts += _polar(row[..., taken], row[..., taken + 1], old, actuator)
-        elif actuator.kind == "rudder":
-            parts.append(np.zeros(row.shape[:-1]))
+            parts += _polar(row[..., place], row[..., place + 1], old, actuator)
         else:
-            parts += [row[..., taken + index] for index in range(len(actuator.limits))]
-        taken += {"azimuth": 2, "rudder": 0}.get(actuator.kind, len(actuator.limits))
-        place += len(actuator.limits)
+            parts += [row[..., place + index] for index in range(len(actuator.limits))]
     return _columns(np.array(parts))
 
 

@@ -89,6 +89,8 @@ NOT_SUPPORTED = (
     "without that table"
 )
 
+UNSTATED_SHARE = 0.1
+"""Standard deviation, as a share of the value, with which drawn ships differ where none is stated."""
 FEWEST_DRAWN = 1000
 SHARE_DRAWN = 2500
 LEAST_KEPT = 1e-3
@@ -112,6 +114,12 @@ class VesselModel:
     # least and most value of parameters by name, on which the prior is conditioned: the signs of damping and thrust of
     # a vessel that is known to be stable, for example
     parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    speeds_mps: tuple[float, float] | None = None  # least and most surge speed of the data behind it, where known
+    # and designs take nothing from it. Names that have a standard deviation, or are no parameters, are ignored
+    unstated_std: Mapping[str, float] = field(default_factory=dict)
+    speeds_mps: tuple[float, float] | None = (
+        None  # least and most surge speed of the data that determined the parameters
+    )
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -136,6 +144,12 @@ class VesselModel:
     def names(self) -> tuple[str, ...]:
         """Parameter names in order."""
         return tuple(term.name for term in self.terms)
+
+    @property
+    def drawn_std(self) -> Array:
+        """(p,) standard deviations of drawn ships: `parameter_std`, or else `unstated_std`."""
+        stated = zip(self.names, self.parameter_std.tolist(), strict=True)
+        return np.array([std or self.unstated_std.get(name, 0.0) for name, std in stated])
 
     @property
     def parameter_covariance(self) -> Array:
@@ -227,6 +241,7 @@ class VesselModel:
         return replace(
             self,
             parameter_std=np.array([own.get(name, 0.0) for name in self.names]),
+            unstated_std={},
             parameter_correlation={
                 (names[i], names[j]): float(correlation[i, j])
                 for i, j in zip(*np.nonzero(np.tril(correlation, -1)), strict=True)
@@ -234,7 +249,7 @@ class VesselModel:
         )
 
     def drawn_parameters(self, count: int, rng: np.random.Generator) -> Array:
-        """(count, p) parameters drawn from the normal prior, conditioned on `parameter_range`.
+        """(count, p) parameters drawn from the normal prior and `unstated_std`, conditioned on `parameter_range`.
 
         Raises:
             InputError: hardly any vessel of the prior is within the range.
@@ -268,8 +283,9 @@ class VesselModel:
         """(count, p) parameters drawn from the normal prior."""
         drawn = rng.standard_normal((count, len(self.terms)))
         if not self.parameter_correlation:
-            return np.asarray(self.parameters + self.parameter_std * drawn)
-        values, vectors = np.linalg.eigh(self.parameter_covariance)
+            return np.asarray(self.parameters + self.drawn_std * drawn)
+        covariance = self.parameter_covariance + np.diag(self.drawn_std**2 - self.parameter_std**2)
+        values, vectors = np.linalg.eigh(covariance)
         return np.asarray(self.parameters + drawn @ (vectors * np.sqrt(np.maximum(values, 0.0))).T)
 
     def regressors(self, velocity_r: Any, velocity_q: Any, inputs: Any, ops: Operators = NUMPY) -> tuple[Any, ...]:

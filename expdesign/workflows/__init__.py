@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.outcome import Outcome, TextTable
     from expdesign.workflows.planning.durations import durations
     from expdesign.workflows.planning.export import check_routes, export
+    from expdesign.workflows.planning.new import new
     from expdesign.workflows.planning.nominal import nominal
     from expdesign.workflows.planning.plan import plan
     from expdesign.workflows.planning.roll_plan import roll_plan

@@ -341,7 +341,10 @@ def estimated_vessel(found: Assessment, vessel: Vessel, *, command: str) -> str:
         *(["Dead times and lags in [std] are those that output error found."] if best.std != vessel.std else []),
         f"Made by: {command}",
     ]
-    return vessel_toml(replace(vessel, model=best.model, std=best.std), comments=comments)
+    surge = np.concatenate([batch.velocity[:, 0] for batch in found.record.batches])
+    speeds = (float(np.nanmin(surge)), float(np.nanmax(surge)))
+    model = replace(best.model, speeds_mps=speeds if np.isfinite(speeds).all() else None)
+    return vessel_toml(replace(vessel, model=model, std=best.std), comments=comments)
 
 
 def limit_entries(found: Assessment) -> dict[str, Any]:

@@ -7,6 +7,8 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from expdesign.errors import InputError
 from expdesign.values import Array
 from expdesign.vessel import (
@@ -14,6 +16,7 @@ from expdesign.vessel import (
     KINDS,
     SENSORS,
     STRUCTURES,
+    UNSTATED_SHARE,
     Actuator,
     Environment,
     RollPendulum,
@@ -113,13 +116,18 @@ def _flow(to: Array, std_mps: float, variation: Variation) -> dict[str, float]:
 
 def _model(model: VesselModel) -> Iterator[str]:
     structure = next((name for name, terms in STRUCTURES.items() if terms == model.terms), "custom")
-    yield from ("", *_table("[model]", {"structure": structure, "form": model.form}))
+    unstated = _unstated(model)
+    yield from ("", *_table("[model]", {"structure": structure, "form": model.form, **unstated}))
+    if model.speeds_mps is not None:
+        yield f"speeds_mps = [{', '.join(f'{speed:.4g}' for speed in model.speeds_mps)}]"
     if structure == "custom":
         for term in model.terms:
             yield from ("", *_table("[[model.terms]]", vars(term)))
     values, stds = model.parameters.tolist(), model.parameter_std.tolist()
     yield from ("", *_table("[model.parameters]", dict(zip(model.names, values, strict=True))))
-    known = {name: std for name, std in zip(model.names, stds, strict=True) if std > 0}
+    open_ = model.drawn_std > model.parameter_std
+    rows = zip(model.names, stds, open_.tolist(), strict=True)
+    known = {name: std for name, std, unstated in rows if std > 0 or (open_.any() and not unstated)}
     if known:
         yield from ("", *_table("[model.parameter_std]", known))
     yield from _correlation(model)
@@ -133,6 +141,15 @@ def _model(model: VesselModel) -> Iterator[str]:
     if model.inertia is not None:
         stated = {key: value for key, value in vars(model.inertia).items() if value is not None}
         yield from ("", *_table("[model.inertia]", stated))
+
+
+def _unstated(model: VesselModel) -> dict[str, float]:
+    """The share of their values with which parameters without a standard deviation differ, if it is not the usual."""
+    open_ = model.drawn_std > model.parameter_std
+    if not open_.any():
+        return {} if (model.parameter_std > 0).all() else {"parameter_std_unstated": 0.0}
+    share = float(np.median(model.drawn_std[open_] / np.abs(model.parameters[open_])))
+    return {} if math.isclose(share, UNSTATED_SHARE) else {"parameter_std_unstated": share}
 
 
 def _pendulum(pendulum: RollPendulum) -> Iterator[str]:

@@ -21,11 +21,14 @@ from expdesign.plan.control.ships import AgileShip, Capability, DubinsShip, Helm
 from expdesign.plan.control.tuning import CONTROL
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import steady_ahead
-from expdesign.vessel import Limit, Vessel, direct_terms, force_matrix
+from expdesign.vessel import Limit, Vessel, pushed_everywhere
 
 USABLE_SHARE = 0.9  # of the largest steady speed, and of the largest steady yaw rate, that repositioning counts on
 # largest yaw rate on the way into a turn, in those of the steady one: a rule of thumb that bounds the search
 HELM_OVERSHOOT = 1.3
+# weakest push at rest, in the strongest, with which thrusters steer a ship on legs: a tunnel thruster beside two
+# propellers does not
+STEERING_PUSH = 0.1
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -58,7 +61,7 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
             what="radius",
         )
     spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
-    agile = bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) == 3) and spot > transit / vessel.length_m / 10
+    agile = pushed_everywhere(vessel.model) and spot > transit / vessel.length_m / 10
     radius = settings.turning_radius_m or max(transit / (USABLE_SHARE * yaw), 1.5 * vessel.length_m)
     rate = min(USABLE_SHARE * yaw, 2.0 * transit / radius)
     return (AgileShip if agile else DubinsShip)(
@@ -81,8 +84,8 @@ def _reach(limit: Limit) -> float:
 
 
 def needs_helm(vessel: Vessel) -> bool:
-    """Whether no inverse model steers it: its model reads actuators directly, or cannot push in every direction."""
-    return bool(direct_terms(vessel.model)) or bool(np.linalg.matrix_rank(force_matrix(vessel.actuators)) < 3)
+    """Whether no inverse model steers it: its actuators do not push in every direction at rest."""
+    return not pushed_everywhere(vessel.model, STEERING_PUSH)
 
 
 def _transit_speed(vessel: Vessel, settings: PlanSettings, top: float, current_mps: float) -> float:

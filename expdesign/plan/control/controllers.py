@@ -12,10 +12,11 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.control.helm_capability import SteadyTurn
 from expdesign.simulation import Approach
 from expdesign.values import Array
-from expdesign.vessel import Allocator, Vessel, required_force
+from expdesign.vessel import Allocator, Vessel, required_push
 
 # natural frequency of courses in that of a hull length at transit speed, and their damping
 COURSE_FREQUENCY, COURSE_DAMPING = 1.2, 0.9
+COARSE = 1e-2  # acceleration that commands may miss, in those of full thrust: the next sample makes it good
 HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 
@@ -66,12 +67,12 @@ class ForceController:
             ]
         ).T
         acceleration = (desired - demand.moving) / self.answer_s - demand.unexplained
-        force = required_force(self.vessel.model, demand.moving, acceleration)
-        return self._allocator.commands(force, near=demand.near)
+        push = required_push(self.vessel.model, demand.moving, acceleration, near=demand.near, tolerance=COARSE)
+        return self._allocator.commands(push, near=demand.near)
 
     @cached_property
     def _allocator(self) -> Allocator:
-        return Allocator(self.vessel.actuators, sample_time_s=self.vessel.sample_time_s)
+        return Allocator(self.vessel.model, sample_time_s=self.vessel.sample_time_s)
 
 
 # The controller of helm-steered ships: helm and engine orders, for many ships at once.

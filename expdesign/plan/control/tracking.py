@@ -155,7 +155,7 @@ class Helmsman:
 
     @cached_property
     def _allocator(self) -> Allocator:
-        return Allocator(self.vessel.actuators, sample_time_s=self.vessel.sample_time_s)
+        return Allocator(self.vessel.model, sample_time_s=self.vessel.sample_time_s)
 
     @cached_property
     def _lags(self) -> bool:

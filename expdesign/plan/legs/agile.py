@@ -18,7 +18,7 @@ from expdesign.plan.legs.optimise import solve_leg, solve_transition
 from expdesign.plan.legs.problem import LegProblem, hull_discs, leg_problem
 from expdesign.plan.legs.water import CORRIDOR_HULLS, FoundLeg, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
-from expdesign.vessel import allocate, required_force
+from expdesign.vessel import commands_for, required_push
 
 GUESS_NODES = 40  # of first guesses of agile legs
 TRANSITION_NODES = 24  # of optimised transitions at most
@@ -163,8 +163,8 @@ def _steady(water: LegWater, line: Line, first_m: float, last_m: float, heading:
         [place[:, :2], pointing, ground[:, 0] * c + ground[:, 1] * s, ground[:, 1] * c - ground[:, 0] * s, yaw_rate]
     )
     relative = np.r_[np.hypot(*through[0]), 0.0, yaw_rate[0]]
-    force = required_force(vessel.model, relative, np.zeros(3))
-    return states, allocate(vessel.actuators, force[None], sample_time_s=vessel.sample_time_s)[0]
+    push = required_push(vessel.model, relative, np.zeros(3))
+    return states, commands_for(vessel.model, push[None], sample_time_s=vessel.sample_time_s)[0]
 
 
 def _steered(water: LegWater, reference: Reference, state: Array, before: Array) -> tuple[Array, Array]:
@@ -301,8 +301,8 @@ def _guess(task: LegTask, line: Line, turn: float, duration_s: float) -> Array:
 def _guessed_inputs(task: LegTask, water: LegWater, states: Array, duration_s: float) -> Array:
     """Commands (j + 1, m) that would give the guessed motion."""
     vessel, step_s = water.vessel, duration_s / GUESS_NODES
-    force = required_force(vessel.model, states[1:, 3:], np.gradient(states[:, 3:], step_s, axis=0)[1:])
-    values = allocate(vessel.actuators, force, sample_time_s=step_s, before=task.start_inputs)
+    push = required_push(vessel.model, states[1:, 3:], np.gradient(states[:, 3:], step_s, axis=0)[1:])
+    values = commands_for(vessel.model, push, sample_time_s=step_s, before=task.start_inputs)
     inputs = np.vstack([task.start_inputs, values])
     inputs[-1] = nearest_turns(vessel, task.end_inputs, inputs[-2])
     return inputs

@@ -12,7 +12,7 @@ from expdesign.plan.legs.optimise import solve_leg
 from expdesign.plan.legs.problem import LegProblem, leg_problem
 from expdesign.plan.legs.water import FoundLeg, LegPath, LegTask, LegWater, acceptable, nearest_turns
 from expdesign.values import Array
-from expdesign.vessel import Vessel, allocate, required_force
+from expdesign.vessel import Vessel, commands_for, required_push
 
 # margins of the boxes searched for Dubins paths round a leg's ends, in turning radii plus hull lengths
 SEARCH_BOXES = (4.0, 40.0)
@@ -96,6 +96,6 @@ def _timed(path: Array, first_mps: float, last_mps: float, ship: Capability, len
 
 def _guessed_inputs(vessel: Vessel, reference: Array, before: Array, duration_s: float) -> Array:
     """Commands (j + 1, m) that would hold each node's speed and turn."""
-    force = np.array([required_force(vessel.model, row[3:], np.zeros(3)) for row in reference[1:]])
+    push = required_push(vessel.model, reference[1:, 3:], np.zeros(3))
     step_s = duration_s / (len(reference) - 1)
-    return np.vstack([before, allocate(vessel.actuators, force, sample_time_s=step_s, before=before)])
+    return np.vstack([before, commands_for(vessel.model, push, sample_time_s=step_s, before=before)])

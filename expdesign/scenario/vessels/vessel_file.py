@@ -187,6 +187,12 @@ def _model(table: ModelTable, actuators: tuple[Actuator, ...], sample_time_s: fl
         terms=terms,
         parameters=np.array([table.parameters[name] for name in names]),
         parameter_std=np.array([table.parameter_std.get(name, 0.0) for name in names]),
+        unstated_std={
+            name: table.parameter_std_unstated * abs(value)
+            for name, value in table.parameters.items()
+            if name not in table.parameter_std and table.parameter_std_unstated * value
+        },
+        speeds_mps=None if table.speeds_mps is None else (table.speeds_mps[0], table.speeds_mps[1]),
         form=table.form,
         sample_time_s=sample_time_s,
         actuators=actuators,

@@ -10,7 +10,17 @@ from pydantic import Field, create_model
 
 from expdesign.scenario.tables import NonNegative, Number, Positive, Table, Text
 from expdesign.scenario.vessels.pendulum_table import PendulumTable
-from expdesign.vessel import KINDS, RATE_UNITS, SENSORS, STRUCTURES, Environment, Variation, limit_keys, response_keys
+from expdesign.vessel import (
+    KINDS,
+    RATE_UNITS,
+    SENSORS,
+    STRUCTURES,
+    UNSTATED_SHARE,
+    Environment,
+    Variation,
+    limit_keys,
+    response_keys,
+)
 from expdesign.vessel.sensors import GAINS_AND_OFFSETS, NOISE, PLACED
 
 # `[environment]` of scenario and vessel files: expected current and wind.
@@ -229,7 +239,14 @@ class ModelTable(Table):
     )
     parameters: dict[str, Number] = Field(description="a table [model.parameters] with a value for each parameter")
     parameter_std: dict[str, NonNegative] = Field(
-        default={}, description="the standard deviation of each parameter; 0, for known, when not given"
+        default={},
+        description="the standard deviation of each parameter, 0 for exactly known; of those not given see "
+        "parameter_std_unstated",
+    )
+    parameter_std_unstated: NonNegative = Field(
+        default=UNSTATED_SHARE,
+        description="the standard deviation, as a share of the value, with which ships of drawn trials differ in the "
+        "parameters that parameter_std does not name; 0 for exactly known. Estimates take nothing from it",
     )
     parameter_correlation: dict[str, dict[str, Number]] = Field(
         default={},
@@ -245,6 +262,13 @@ class ModelTable(Table):
         default={},
         description="the most value that a parameter is known to have, likewise: 0 for damping, without which drawn "
         "vessels run away; any when not given",
+    )
+    speeds_mps: list[Number] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="the least and the most surge speed of the data that determined the parameters, as estimate writes "
+        "them: a dictionary or a plan that goes beyond is told of",
     )
     terms: list[TermTable] = Field(default=[], description="the tables [[model.terms]] of structure 'custom'")
     roll: RollTable | None = Field(

@@ -256,6 +256,7 @@ def _force_corners(actuators: Sequence[Actuator]) -> Array:
     unit_forces, column, corners = force_matrix(tuple(actuators)), 0, np.zeros((1, 3))
     for actuator in actuators:
         if actuator.kind == "rudder":
+            column += 1
             continue
         driving = actuator.limits if actuator.kind == "force" else actuator.limits[:1]
         ranges = [(min(limit.low, 0.0), max(limit.high, 0.0)) for limit in driving]

@@ -8,7 +8,14 @@ from expdesign.dictionary.build import deviating
 from expdesign.progress import Progress, silent, within
 from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, written
-from expdesign.workflows.steps.scored import parameters_of, ranking, score_files, scored
+from expdesign.workflows.steps.scored import (
+    actuation_remarks,
+    parameters_of,
+    ranking,
+    score_files,
+    scored,
+    speed_remarks,
+)
 
 
 def score(
@@ -22,7 +29,7 @@ def score(
     """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
     case = loaded(scenario, progress, vessel=vessel)
     information = scored(case, progress=within(progress, 0.05, 0.95))
-    summary = {
+    summary: dict[str, object] = {
         "primitives": len(information),
         "parameters": len(parameters_of(case)),
         "meet_excitation_condition": sum(item.excitation_condition for item in information),
@@ -30,4 +37,8 @@ def score(
         "most_beside_the_others": ranking(case, information).rows[0][1],
         "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
     }
+    told = actuation_remarks(case.vessel, [item.primitive.commands for item in information], "candidate")
+    told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
+    if case.remarks or told:
+        summary["remarks"] = [*case.remarks, *told]
     return written(case, out, score_files(case, information), summary, progress, (ranking(case, information),))

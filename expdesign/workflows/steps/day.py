@@ -27,6 +27,7 @@ from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.vessel import VesselModel
 from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.design_problem import design_summary, designed
+from expdesign.workflows.steps.first_trial import calibration, first_note, is_wide, whole_trial
 from expdesign.workflows.steps.planned import plan_problem, planned
 from expdesign.workflows.steps.scored import STEM, scored
 
@@ -49,6 +50,7 @@ class Day:
     plan: Plan  # the trial
     shortest: ShortestDay | None = None  # how it was found to be the shortest, or None where total_s decides
     added: tuple[PrimitiveSpec, ...] = ()  # manoeuvres of it that the scenario's dictionary has not
+    note: str = ""  # why it is another trial than the one asked for
 
 
 def planned_day(
@@ -77,6 +79,8 @@ def planned_day(
         NoAnswer: the accuracy cannot be reached, or there is no plan.
     """
     asked, information = case.design.accuracy, tuple(information)
+    if asked is None and is_wide(case.vessel.model):
+        return _first_day(case, information, design, stated=stated, seed=seed, progress=progress)
     if asked is None:
         plan = planned(case, information, design, seed=seed, progress=progress)
         return Day(information=information, design=design, plan=plan)
@@ -93,6 +97,37 @@ def planned_day(
     if asked.starts == 1 or case.plan.draft:
         return _searched(case, information, design, accuracy, stated, seed, 0, progress)
     return _shortest_of(asked.starts, (case, information, design, accuracy, stated, seed), progress)
+
+
+def _first_day(
+    case: Scenario,
+    information: tuple[PrimitiveInformation, ...],
+    design: DurationDesign,
+    *,
+    stated: VesselModel | None,
+    seed: int,
+    progress: Progress,
+) -> Day:
+    """The trial of a ship with a wide prior: as asked for, or else a first one of shorter runs.
+
+    Raises:
+        NoAnswer: neither has a plan; what the one that is asked for says.
+    """
+    trying, cutting, again = in_phases(progress, 0.4, 0.1, 0.5)
+    plan = whole_trial(plan_problem(case, information, design, seed=seed), trying)
+    if plan is not None:
+        return Day(information=information, design=design, plan=plan)
+    try:
+        cutting("cutting runs to what is safe for all ships of the prior", 0.0)
+        first = calibration(case, seed=seed)
+        told = scored(first)
+        shared = designed(first, told, stated=stated, seed=seed)
+        plan = planned(first, told, shared, seed=seed, progress=again)
+    except NoAnswer:
+        plan = planned(case, information, design, seed=seed, progress=again)
+        return Day(information=information, design=design, plan=plan)
+    note = first_note([item.primitive for item in told], case.dictionary)
+    return Day(information=told, design=shared, plan=plan, note=note)
 
 
 def search_additions(
@@ -324,6 +359,7 @@ def compared_criteria(case: Scenario, design: DurationDesign) -> tuple[Efficienc
 def day_summary(day: Day) -> dict[str, object]:
     """Key numbers of the durations and of the day."""
     found, summary = day.shortest, design_summary(day.design)
+    summary = {**summary, "note_on_this_trial": day.note} if day.note else summary
     if found is None:
         return summary
     return {

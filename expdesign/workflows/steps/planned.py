@@ -38,8 +38,8 @@ from expdesign.progress import Progress, silent
 from expdesign.scenario import Scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.signals import AUXILIARY
-from expdesign.vessel import NOT_SUPPORTED, column_name
-from expdesign.workflows.steps.scored import growth_files, score_files
+from expdesign.vessel import NOT_SUPPORTED
+from expdesign.workflows.steps.scored import actuation_remarks, growth_files, score_files, speed_remarks
 
 MOST_RUNS = 1000  # runs in one plan
 
@@ -122,15 +122,9 @@ def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
 
 def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
     """What the files state and the trial does not use, or takes as certain; one line each."""
-    columns = [column_name(name) for name in plan.commands.names]
-    used = dict(zip(columns, (plan.commands.values != 0).any(axis=0).tolist(), strict=True))
-    idle = [
-        name
-        for actuator in case.vessel.actuators
-        if not any(used[column_name(signal)] for signal in actuator.signals)
-        for name in map(column_name, actuator.signals)
-    ]
-    return (*case.remarks, *([f"no run or leg of this plan uses {', '.join(idle)}"] if idle else []))
+    what = "run or leg of this plan"
+    told = actuation_remarks(case.vessel, [plan.commands], what), speed_remarks(case.vessel, [plan.trajectory], what)
+    return (*case.remarks, *told[0], *told[1])
 
 
 def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +16,14 @@ from expdesign.information import PrimitiveInformation, estimated_parameters, sc
 from expdesign.memory import recalled
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
-from expdesign.vessel import Environment, Vessel
+from expdesign.signals import Commands, Trajectory
+from expdesign.vessel import Environment, Vessel, column_name
 from expdesign.workflows.outcome import TextTable
+
+SPEED_SLACK = 0.1
+"""Share of the largest speed of the data by which a run may go beyond them."""
+FAR_FROM_LIMIT = 0.5
+"""Share of an actuator's limit below which no run comes near it."""
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -54,6 +60,43 @@ def _scored(
         fixed_parameters=fixed_parameters,
         mean_subtraction=mean_subtraction,
         excitation=excitation,
+    )
+
+
+def speed_remarks(vessel: Vessel, runs: Iterable[Trajectory], what: str) -> tuple[str, ...]:
+    """Surge speeds beyond those of the data that determined the model; one line."""
+    if vessel.model.speeds_mps is None:
+        return ()
+    surge = np.concatenate([run.velocity[:, 0] for run in runs])
+    (low, high), (least, most) = vessel.model.speeds_mps, (float(surge.min()), float(surge.max()))
+    slack = SPEED_SLACK * max(abs(low), abs(high))
+    if least >= low - slack and most <= high + slack:
+        return ()
+    return (
+        f"a {what} goes from {least:.3g} to {most:.3g} m/s, but the data that determined the model from {low:.3g} to "
+        f"{high:.3g} m/s (model.speeds_mps): what lies beyond is extrapolated",
+    )
+
+
+def actuation_remarks(vessel: Vessel, runs: Iterable[Commands], what: str) -> tuple[str, ...]:
+    """Actuators that no run uses, and limits that none comes near; one line each."""
+    peaks = np.max([np.abs(commands.values).max(axis=0) for commands in runs], axis=0)
+    used = dict(zip(vessel.model.inputs, peaks.tolist(), strict=True))
+    idle = [
+        column_name(signal)
+        for actuator in vessel.actuators
+        if not any(used[signal] for signal in actuator.signals)
+        for signal in actuator.signals
+    ]
+    sizes = [max(abs(limit.low), abs(limit.high)) for limit in vessel.limits]
+    far = [
+        f"{column_name(signal)} ({used[signal] / size:.0%})"
+        for signal, size in zip(vessel.model.inputs, sizes, strict=True)
+        if np.isfinite(size) and 0 < used[signal] < FAR_FROM_LIMIT * size
+    ]
+    return (
+        *([f"no {what} uses {', '.join(idle)}"] if idle else []),
+        *([f"far from its limit in every {what}: {', '.join(far)}; what lies beyond is extrapolated"] if far else []),
     )
 
 

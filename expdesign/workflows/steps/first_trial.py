@@ -1,0 +1,108 @@
+"""From wide to narrow: the first trial of a ship of which little is known.
+
+Where the standard deviations of the parameters are wide, runs as long as a dictionary asks for lead the ships of the
+prior too far apart to be safe, or to come to the next run. The first trial then takes each run only as long as these
+ships keep to its planned track. What it tells narrows the prior, and `replan` goes on with longer runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
+from expdesign.errors import InputError, NoAnswer, NoPlan, Unreachable
+from expdesign.plan.checked import promising
+from expdesign.plan.problem import PlanProblem
+from expdesign.plan.runs import dispersion_m
+from expdesign.plan.solve import draft_trial, plan_drafted
+from expdesign.plan.values import Plan
+from expdesign.plan.work_budget import WorkBudget
+from expdesign.progress import Progress
+from expdesign.scenario import Scenario
+from expdesign.vessel import VesselModel
+from expdesign.vessel.hull import covering_discs
+
+WIDE = 0.25  # median standard deviation of parameters, in their values, from which a prior is wide
+NEAR_HULLS = 0.75  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
+KEPT = 0.9  # share of the ships that do
+DRAWN = 200  # ships drawn of each run
+CUT = (0.5, 0.9)  # least and most share of a run that is tried next
+SHORTEST = 0.15  # share of a run below which it is left out
+TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
+
+
+def is_wide(model: VesselModel) -> bool:
+    """Whether the prior of the parameters is wide."""
+    spread, size = model.drawn_std, np.abs(model.parameters)
+    return bool(np.median(spread[size > 0] / size[size > 0]) >= WIDE) if (size > 0).any() else False
+
+
+def whole_trial(problem: PlanProblem, progress: Progress) -> Plan | None:
+    """The trial as asked for, or None where few drawn trials already say that it would be refused."""
+    try:
+        draft = draft_trial(problem, progress=progress)
+        work = WorkBudget(most_s=problem.settings.time_budget_s)
+        likely = problem.settings.draft or promising(problem, draft.water, draft.sailed, budget=work)
+        return plan_drafted(problem, draft, progress=progress) if likely else None
+    except NoPlan:
+        return None
+
+
+def calibration(case: Scenario, *, seed: int) -> Scenario:
+    """The scenario with each run cut to the time in which ships of the prior keep near its planned track.
+
+    Raises:
+        NoAnswer: no run is safe for so long that it tells anything.
+    """
+    rng = np.random.default_rng((seed, len(case.dictionary)))
+    cut = [spec for given in case.dictionary if (spec := _cut(case, given, rng)) is not None]
+    if not cut:
+        raise NoAnswer("the ships of the prior keep to the track of no run: state less uncertainty, or shorter runs")
+    total_s = max(TIME_SHARE * case.design.total_s, max(_length_s(case, spec) for spec in cut))
+    return replace(case, dictionary=tuple(cut), design=replace(case.design, total_s=total_s))
+
+
+def _length_s(case: Scenario, spec: PrimitiveSpec) -> float:
+    return spec.settings["duration_s"] or build_primitive(case.vessel, spec).duration_s
+
+
+def _cut(case: Scenario, spec: PrimitiveSpec, rng: np.random.Generator) -> PrimitiveSpec | None:
+    """A specification that lasts as long as most ships keep near the track; None where that is too short."""
+    vessel, share = case.vessel, 1.0
+    while share >= SHORTEST:
+        shorter = _of_length(spec, share * spec.settings["duration_s"], vessel.sample_time_s)
+        near = _near(case, shorter, rng)
+        if near >= 1.0:
+            return shorter
+        share *= np.clip(near, *CUT)
+    return None
+
+
+def _near(case: Scenario, spec: PrimitiveSpec, rng: np.random.Generator) -> float:
+    """The share of a run in which most ships of the prior keep near its track; 0 where it cannot be run."""
+    centres, _ = covering_discs(case.vessel.length_m, case.vessel.beam_m)
+    try:
+        item = build_primitive(case.vessel, spec)
+        apart = dispersion_m(
+            case.vessel, item, case.environment, centres_m=centres, confidence=KEPT, rng=rng, draws=DRAWN
+        )
+    except (NoPlan, InputError, Unreachable):
+        return 0.0
+    return float(np.flatnonzero(apart <= NEAR_HULLS * case.vessel.length_m)[-1] / (len(apart) - 1))
+
+
+def _of_length(spec: PrimitiveSpec, length_s: float, sample_time_s: float) -> PrimitiveSpec:
+    samples = max(2, int(length_s / sample_time_s))
+    return replace(spec, settings={**spec.settings, "duration_s": samples * sample_time_s})
+
+
+def first_note(runs: Sequence[Primitive], asked: Sequence[PrimitiveSpec]) -> str:
+    """What a first trial is, in one sentence."""
+    return (
+        "a first trial: the standard deviations of the parameters are too wide for the runs asked for, so "
+        f"{len(runs)} of {len(asked)} are taken, none longer than ships of the prior keep within {NEAR_HULLS:g} hull "
+        "lengths of the track; expdesign replan goes on with what it tells"
+    )

@@ -1,0 +1,133 @@
+"""`new` makes a folder of each kind whose trial is planned and verified, and says what acts in it and what does not."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from expdesign.scenario import load_scenario, load_vessel
+from expdesign.vessel import UNSTATED_SHARE
+from expdesign.workflows import new, scored
+from expdesign.workflows.planning.new import KINDS
+from expdesign.workflows.steps.first_trial import NEAR_HULLS, calibration, is_wide
+from expdesign.workflows.steps.scored import actuation_remarks, speed_remarks
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_folder_of_each_kind_is_whole_and_its_own(kind: str, tmp_path: Path) -> None:
+    folder = tmp_path / "mytrial"
+    paths = new(folder, kind=kind).files
+    assert {path.name for path in paths} == {path.name for path in folder.iterdir()}
+    case = load_scenario(folder / "scenario.toml")
+    assert case.name == "mytrial"
+    assert case.remarks == ()  # everything stated acts, and nothing is taken as certain
+    assert len((folder / "README.md").read_text("utf-8").splitlines()) <= 12
+    width_m, height_m = np.diff(np.reshape(case.area.water.bounds, (2, 2)), axis=0)[0]
+    assert 100 < width_m / case.vessel.length_m < 120  # room of the same size for every ship
+    assert 100 < height_m / case.vessel.length_m < 120
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_candidates_of_each_kind_tell_of_every_parameter(kind: str, tmp_path: Path) -> None:
+    case = load_scenario(new(tmp_path / kind, kind=kind).files[0])
+    whole = sum(item.X for item in scored(case))
+    scale = np.sqrt(np.diag(whole))
+    assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 1e-6
+
+
+def test_a_folder_that_exists_and_a_kind_that_does_not_are_refused(tmp_path: Path, capsys) -> None:
+    there = tmp_path / "there"
+    there.mkdir()
+    assert main(["new", str(there), "--quiet"]) == 2
+    assert "exists, expected the name of a folder to be made" in capsys.readouterr().err
+    assert list(there.iterdir()) == []
+    assert main(["new", str(tmp_path / "other"), "--kind", "submarine", "--quiet"]) == 2
+    assert "submarine" in (said := capsys.readouterr().err)
+    assert all(kind in said for kind in KINDS)
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_trial_of_each_kind_is_verified(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mytrial", "--kind", kind, "--quiet"]) == 0
+    assert main(["run", "mytrial/scenario.toml", "--quiet"]) == 0
+    plan = json.loads(Path("runs/mytrial/plan.json").read_text("utf-8"))
+    assert plan["verified"] is True
+
+
+def test_ships_differ_in_what_nobody_stated_and_the_file_can_say_that_they_do_not(tmp_path: Path) -> None:
+    new(tmp_path / "trial", kind="asv")
+    path = tmp_path / "trial" / "vessel.toml"
+    head, _, rest = path.read_text("utf-8").partition("[model.parameter_std]\n")
+    rest = rest[rest.index("\n#") :]
+    path.write_text(head + "[model.parameter_std]\nX_vr = 0.0\n" + rest, "utf-8")
+    model, rng = load_vessel(path).model, np.random.default_rng(0)
+    drawn = model.drawn_parameters(4000, rng)
+    spread = np.where(np.array(model.names) == "X_vr", 0.0, UNSTATED_SHARE) * np.abs(model.parameters)
+    assert np.allclose(drawn.std(axis=0), spread, rtol=5 / np.sqrt(2 * 4000), atol=1e-9)
+    assert not model.parameter_std.any()  # estimates and designs take nothing from it
+    remarks = load_scenario(tmp_path / "trial" / "scenario.toml").remarks
+    assert [line for line in remarks if line.startswith("exactly known") and line.endswith("X_vr")]
+    assert [line for line in remarks if line.startswith("no model.parameter_std of") and "X_vr" not in line]
+    path.write_text(head.replace('form = "continuous"', 'form = "continuous"\nparameter_std_unstated = 0.0') + rest)
+    assert not np.ptp(load_vessel(path).model.drawn_parameters(5, rng), axis=0).any()
+
+
+def test_a_thruster_that_no_candidate_uses_and_limits_far_off_are_named(tmp_path: Path) -> None:
+    case = load_scenario(new(tmp_path / "trial").files[0])
+    ahead = [item for item in case.dictionary if item.family == "crash_stop"]
+    commands = [item.primitive.commands for item in scored(replace(case, dictionary=tuple(ahead)))]
+    (idle,) = [line for line in actuation_remarks(case.vessel, commands, "candidate") if "uses" in line]
+    assert idle == "no candidate uses n3_rps"
+    half = [replace(each, values=0.4 * each.values) for each in commands]
+    (far,) = [line for line in actuation_remarks(case.vessel, half, "candidate") if "far from its limit" in line]
+    assert "n1_rps" in far
+    assert "n3_rps" not in far
+
+
+def test_speeds_beyond_those_of_the_data_are_named(tmp_path: Path) -> None:
+    new(tmp_path / "trial")
+    path = tmp_path / "trial" / "vessel.toml"
+    text = path.read_text("utf-8")
+    for high, told in ((6.0, False), (2.0, True)):
+        stated = f'form = "continuous"\nspeeds_mps = [-1.0, {high}]'
+        path.write_text(text.replace('form = "continuous"', stated), "utf-8")
+        case = load_scenario(tmp_path / "trial" / "scenario.toml")
+        tracks = [item.primitive.trajectory for item in scored(case)]
+        assert max(track.velocity[:, 0].max() for track in tracks) > 2.2
+        assert bool(speed_remarks(case.vessel, tracks, "candidate")) is told
+
+
+def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Path) -> None:
+    """Runs are cut to the time that most ships stay near; other ships, drawn anew, do as well."""
+    from expdesign.dictionary import build_primitive
+    from expdesign.plan.runs import dispersion_m
+    from expdesign.vessel.hull import covering_discs
+
+    case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
+    assert not is_wide(case.vessel.model)
+    model = case.vessel.model
+    wide = replace(model, parameter_std=0.4 * np.abs(model.parameters))
+    assert is_wide(wide)
+    case = replace(case, vessel=replace(case.vessel, model=wide))
+    first = calibration(case, seed=1)
+    asked = {spec.name: spec.settings["duration_s"] for spec in case.dictionary}
+    assert 0 < len(first.dictionary) <= len(asked)
+    assert any(spec.settings["duration_s"] < asked[spec.name] for spec in first.dictionary)
+    centres, _ = covering_discs(case.vessel.length_m, case.vessel.beam_m)
+    for spec in first.dictionary:
+        apart = dispersion_m(
+            case.vessel,
+            build_primitive(case.vessel, spec),
+            case.environment,
+            centres_m=centres,
+            confidence=0.8,
+            rng=np.random.default_rng(7),
+            draws=300,
+        )
+        assert apart[-1] <= 1.1 * NEAR_HULLS * case.vessel.length_m
