@@ -26,6 +26,7 @@ from expdesign.diagnosis.motion import (
     start_responses,
 )
 from expdesign.monitoring.changes import Change
+from expdesign.monitoring.noise import WHITE, Noise, learnt_noise, whitened
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 
@@ -92,7 +93,13 @@ class Grams:
 
 
 def grams_of(
-    ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+    ship: ExtendedModel,
+    record: Record,
+    changes: Sequence[Change],
+    *,
+    begins_s: Sequence[float],
+    stretch_s: float,
+    noise: Noise = WHITE,
 ) -> Grams:
     """Inner products of all stretches of a record.
 
@@ -104,18 +111,14 @@ def grams_of(
         changes: watched for.
         begins_s: time of the first sample of each batch [s].
         stretch_s: length of a stretch [s].
+        noise: within stretches.
 
     Raises:
         InputError: batches of different sample times.
     """
-    parts, begins = _whole_stretches(record, begins_s, stretch_s)
-    windows = cut_windows(ship.model, parts, longest_s=stretch_s)
-    linear = linearise(simulate_from_measured(ship, windows))
-    known = effect_disturbances(linear, [change.effect for change in changes])
-    columns = _columns(linear, known, changes)
-    error = _compared(linear)
-    seen = np.isfinite(error)
-    columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
+    linear, known, columns, seen, begins = _simulated(ship, record, changes, begins_s, stretch_s)
+    windows = linear.motion.windows
+    columns = whitened(columns, seen, linear.transition, noise, step_s=windows.step_s)
     table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
     budget = _budget(linear, known, changes)
     keep = _usable(linear, seen) & ~_still(linear, budget, changes)
@@ -129,6 +132,34 @@ def grams_of(
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
     )
+
+
+def noise_of(
+    ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+) -> Noise:
+    """The noise within the stretches of a reference; arguments as of `grams_of`."""
+    linear, known, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
+    keep = _usable(linear, seen) & ~_still(linear, _budget(linear, known, changes), changes)
+    windows = linear.motion.windows
+    return learnt_noise(
+        columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), step_s=windows.step_s,
+        sample_s=windows.sample_s,
+    )  # fmt: skip
+
+
+def _simulated(
+    ship: ExtendedModel, record: Record, changes: Sequence[Change], begins_s: Sequence[float], stretch_s: float
+) -> tuple[LinearisedMotion, Sequence[Disturbance], Array, NDArray[np.bool_], Array]:
+    """All stretches: motion, changes, columns X, S, F and e (c, w, s, 4), what is measured, and where batches begin."""
+    parts, begins = _whole_stretches(record, begins_s, stretch_s)
+    windows = cut_windows(ship.model, parts, longest_s=stretch_s)
+    linear = linearise(simulate_from_measured(ship, windows))
+    known = effect_disturbances(linear, [change.effect for change in changes])
+    columns = _columns(linear, known, changes)
+    error = _compared(linear)
+    seen = np.isfinite(error)
+    columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
+    return linear, known, columns, seen, begins
 
 
 def _whole_stretches(record: Record, begins_s: Sequence[float], stretch_s: float) -> tuple[Record, Array]:

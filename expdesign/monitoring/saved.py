@@ -10,6 +10,7 @@ import numpy as np
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.changes import Change
 from expdesign.monitoring.force import Force, Known
+from expdesign.monitoring.noise import Noise
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
 COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "weather")
@@ -59,6 +60,11 @@ def restored_state(table: dict[str, Any]) -> State:
 def restored_alarm(table: dict[str, Any]) -> Alarm:
     """An alarm, read from what `saved` made of it."""
     return Alarm(**{**table, "as_likely": tuple(table["as_likely"])})
+
+
+def restored_noise(table: dict[str, Any]) -> Noise:
+    """Noise, read from what `saved` made of it."""
+    return Noise(**{name: _array(value) if isinstance(value, list) else value for name, value in table.items()})
 
 
 def restored_changes(tables: list[dict[str, Any]]) -> tuple[Change, ...]:

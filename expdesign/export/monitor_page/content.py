@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.roll_words import change_words, stability_words
@@ -237,12 +238,23 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     return text
 
 
+def known_std(calibration: Calibration) -> Array:
+    """(m,) standard errors of the baseline, with the correlation of neighbouring stretches."""
+    return np.asarray(calibration.baseline_std * np.sqrt(calibration.inflation))
+
+
+def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
+    """(m,) differences of the ship from its file in the reference that are clear enough to be said."""
+    size = np.abs(calibration.baseline)
+    return np.asarray((size > CLEAR * known_std(calibration)) & (size > LARGE))
+
+
 def _baseline(content: MonitorContent) -> Iterator[str]:
     c = content.calibration
-    clear = (np.abs(c.baseline) > CLEAR * c.baseline_std) & (np.abs(c.baseline) > LARGE)
-    off = [(i, content.changes[i]) for i in np.flatnonzero(clear).tolist()]
+    off = [(i, content.changes[i]) for i in np.flatnonzero(said_of_reference(c)).tolist()]
     if off:
-        sizes = [(change, c.baseline[i] * change.size, c.baseline_std[i] * change.size) for i, change in off]
+        std = known_std(c)
+        sizes = [(change, c.baseline[i] * change.size, std[i] * change.size) for i, change in off]
         parts = ", ".join(f"{change.words} {change.in_words(value, std)}" for change, value, std in sizes)
         yield f"Already in the reference the ship differs from its file: {parts}. Changes are counted from there."
 
