@@ -33,7 +33,7 @@ LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
 LEAST_SURPRISE = 0.1
 """Of a stretch on average, where the reference shows no force."""
-STEPS = np.array([-4.0, -2.0, -1.0, 1.0, 2.0])
+STEPS = np.array([-4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
 """By which logarithms of variances and times are changed in a round of the search, to base two."""
 
 
@@ -174,7 +174,7 @@ def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[
 
 
 def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
-    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and the quick time."""
+    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and quick times."""
     part = replace(
         stretches,
         time_s=stretches.time_s[:SEARCHED_STRETCHES],
@@ -182,13 +182,13 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
         counts=stretches.counts[:SEARCHED_STRETCHES],
     )
     q = len(variance)
-    best = np.log2(np.concatenate([variance / 2, variance / 2, [QUICK_S]]))
+    best = np.log2(np.concatenate([variance / 2, variance / 2, np.full(q, QUICK_S)]))
     cost = float(likelihood(part, _force(best, q, stretch_s)))
     for _ in range(SEARCH_ROUNDS):
-        tried = best + np.concatenate([step * np.eye(2 * q + 1) for step in STEPS])
+        tried = best + np.concatenate([step * np.eye(3 * q) for step in STEPS])
         costs = likelihood(part, _force(tried, q, stretch_s))
         gains = cost - costs
-        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(2 * q + 1)]
+        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(3 * q)]
         together = best + np.array(better)
         whole = float(likelihood(part, _force(together, q, stretch_s)))
         single = int(np.argmin(costs))
@@ -213,10 +213,10 @@ def _best_step(gains: Array) -> float:
 
 
 def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
-    """The force whose parameters have these logarithms (..., 2 q + 1)."""
+    """The force whose parameters have these logarithms (..., 3 q)."""
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
-    quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, SLOW_S / 4), variance[..., :q].shape)
+    quick = np.clip(values[..., 2 * q :], stretch_s / 2, SLOW_S / 4)
     return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1))
 
 

@@ -30,12 +30,13 @@ from expdesign.monitoring.evidence import STRETCH_S
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.export.monitor_page.content import said_of_reference
 from expdesign.monitoring import (
+    WHITE,
     Alarm,
     Calibration,
     Change,
     Grams,
-    WHITE,
     Noise,
     Rules,
     State,
@@ -48,12 +49,13 @@ from expdesign.monitoring import (
     watch,
     watched_changes,
 )
-from expdesign.export.monitor_page.content import said_of_reference
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from monitoring_case import TENDER, tender, voyage_csv, voyage_record
-from sea_case import CALM, CASES as SEA_CASES, NAMES as SEA_COLUMNS, Sea, Ship, sailed, vessel_file
+from sea_case import CALM, Sea, Ship, sailed, vessel_file
+from sea_case import CASES as SEA_CASES
+from sea_case import NAMES as SEA_COLUMNS
 
 HOUR, DAY = 3600, 86400
 

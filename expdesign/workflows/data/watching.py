@@ -33,7 +33,6 @@ from expdesign.records import STREAM, Piece, Taken
 from expdesign.roll import Run
 from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
 from expdesign.signals import Record
-from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unread
 
