@@ -222,7 +222,9 @@ def watch(
         state = _waited(state, nuisance, begin_s + duration_s)
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
-        if misfit_of(float(one.quadratic), one.score, one.information, count) > calibration.misfit_limit:
+        unlinear = UNEXPLAINED_SHARE * float(one.quadratic) / max(count, 1.0) if state.alarm is not None else 0.0
+        misfit = misfit_of(float(one.quadratic), one.score, one.information, count)
+        if misfit > calibration.misfit_limit + unlinear:
             state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
         surprised = surprise(own, stretches.changes, state.known, one, loads) / calibration.surprise

@@ -135,15 +135,21 @@ def grams_of(
 
 
 def noise_of(
-    ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+    ship: ExtendedModel,
+    record: Record,
+    changes: Sequence[Change],
+    *,
+    begins_s: Sequence[float],
+    stretch_s: float,
+    known: Noise | None = None,
 ) -> Noise:
-    """The noise within the stretches of a reference; arguments as of `grams_of`."""
-    linear, known, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
-    keep = _usable(linear, seen) & ~_still(linear, _budget(linear, known, changes), changes)
+    """The noise within the stretches of a record, the known one where it fits; arguments as of `grams_of`."""
+    linear, acting, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
+    keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
     windows = linear.motion.windows
     return learnt_noise(
-        columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), step_s=windows.step_s,
-        sample_s=windows.sample_s,
+        columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
+        known=known,
     )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ PERIODS_S = (4.0, 6.0, 9.0, 14.0)  # of waves, where the search begins [s]
 # waves: shortest period in samples, least and largest share of their motion that a second leaves
 SHORTEST_PERIOD, KEPT = 2.5, (0.5, 0.995)
 GAIN = 15.0  # log-likelihood by which forces, and then waves, have to explain the spectra better
+OTHER_SEA = 2.0  # deviance, in that of the data that noise was learnt from, beyond which it is learnt anew
 LEAST_SHARE = 1e-8  # of the variance in the variance of a source
 AXES = 3
 
@@ -41,6 +42,7 @@ class Noise:
     waves: Array  # (3,) variance of u, v and r by waves
     period_s: float  # of the waves [s]
     kept: float  # share of their motion that a second leaves
+    unlike: float = 0.0  # deviance of a stretch's spectra from these sources, beyond chance, where they were learnt
 
     def __post_init__(self) -> None:
         seal(self, std="4", pushes="3", waves="3")
@@ -113,25 +115,35 @@ def whitened(columns: Array, seen: NDArray[np.bool_], transition: Array, noise: 
 
 
 def learnt_noise(
-    columns: Array, seen: NDArray[np.bool_], transition: Array, *, changes: int, step_s: float, sample_s: float
+    columns: Array,
+    seen: NDArray[np.bool_],
+    transition: Array,
+    *,
+    changes: int,
+    sample_s: float,
+    known: Noise | None = None,
 ) -> Noise:
-    """The noise with the largest likelihood of the spectra that a reference's errors have.
+    """The noise with the largest likelihood of the spectra that the errors have; the known one where it fits them.
+
+    Weather is no property of the ship: later data may show another sea than the reference.
 
     Args:
         columns: (c, w, s, 4) responses to changes, starts and forces, and the error last; zero where not measured.
         seen: (w, s, 4).
         transition: (w, k, n, n).
         changes: their number, the first of the columns.
-        step_s: of the integrator [s].
         sample_s: between samples [s].
+        known: of earlier data.
     """
     whole = seen[..., :AXES].all(axis=(1, 2))
     if whole.sum() < FEWEST:
-        return WHITE
+        return known or WHITE
     power = _power(_residuals(columns[:, whole], seen[whole], changes))
     per_sample = (transition.shape[1] + 1) // seen.shape[1]
     matrix = np.linalg.matrix_power(transition[whole].mean(axis=(0, 1))[:AXES, :AXES], per_sample)
     fit = _Spectra(power=power, count=int(whole.sum()), matrix=matrix, sample_s=sample_s)
+    if known is not None and fit.fitted_by(known):
+        return known
     return fit.best()
 
 
@@ -216,6 +228,25 @@ class _Spectra:
             waving = True
         return self._noise(theta, pushed, waving)
 
+    def fitted_by(self, known: Noise) -> bool:
+        """Whether sources explain the spectra as well as those that they were learnt from."""
+        waving = bool(known.waves.any())
+        floor = np.log(LEAST_SHARE * self.power.mean(axis=1))
+        logarithms = [
+            np.log(np.maximum(values, np.exp(floor)))
+            for values in (known.std[:AXES] ** 2, known.pushes * self.sample_s, known.waves)
+        ]
+        low, high = KEPT
+        kept = (min(max(known.kept, low + 1e-6), high - 1e-6) - low) / (high - low)
+        theta = np.concatenate([*logarithms, [np.log(known.period_s), np.log(kept / (1.0 - kept))]])
+        allowed = self.count * known.unlike + self.power.size
+        return self._deviance(theta, bool(known.pushes.any()), waving) < OTHER_SEA * allowed
+
+    def _deviance(self, theta: Array, pushed: bool, waving: bool) -> float:
+        """Twice the log-likelihood that the spectra's own values gain; by chance, one for each of them."""
+        ratio = self.power / self._shape(theta, pushed, waving)
+        return float(2.0 * self.count * (ratio - np.log(ratio) - 1.0).sum())
+
     def _noise(self, theta: Array, pushed: bool, waving: bool) -> Noise:
         total = self.power.mean(axis=1)
 
@@ -229,4 +260,5 @@ class _Spectra:
             waves=kept(np.exp(theta[-2 - AXES : -2])) if waving else np.zeros(AXES),
             period_s=float(np.exp(theta[-2])) if waving else WHITE.period_s,
             kept=self._kept(theta[-1]) ** (1.0 / self.sample_s) if waving else WHITE.kept,
+            unlike=max(self._deviance(theta, pushed, waving) - self.power.size, 0.0) / self.count,
         )

@@ -379,6 +379,9 @@ def sea_trial(
     changes, noise, calibration = known
     rules = Rules(limit=threshold(int(calibration.watched.sum()), 30.0 * DAY / calibration.stretch_s))
     record = as_record(vessel, table)
+    if not noise.white:
+        words = {"begins_s": [0.0], "stretch_s": calibration.stretch_s, "known": noise}
+        noise = noise_of(extended_model(vessel, record), record, changes, **words)
     state, alarms = gone_on(
         State.begun(calibration, time_s=0.0), vessel, record, changes, calibration, rules, begin_s=0.0, noise=noise
     )

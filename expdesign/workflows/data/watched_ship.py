@@ -185,15 +185,17 @@ def _linearised(
 ) -> tuple[Grams, Known, tuple[str, ...]]:
     """Inner products with what they are for, and notes on the ship.
 
-    Where no changes are known, those of the ship of this record, and its noise.
+    Where no changes are known, those of the ship of this record, and its noise. Where another noise is clear in the
+    record, as in another sea, that is the one of the inner products.
     """
     ship, changes, notes = ship_and_changes(
         asked.model, asked.vessel, record, known.changes, size=asked.size, stretch_s=asked.stretch_s
     )
-    if not known.changes:
-        noise = WHITE
-        if not isinstance(ship, YawShip):
-            noise = noise_of(ship, record, changes, begins_s=begins_s, stretch_s=asked.stretch_s)
+    first, noise = not known.changes, known.noise
+    if not isinstance(ship, YawShip):
+        before = None if first else known.noise
+        noise = noise_of(ship, record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, known=before)
+    if first:
         known = Known(changes=changes, shift=np.zeros(len(changes)), noise=noise)
     effects = {
         change.effect: ship.get(change.effect) + change.size * value
@@ -201,6 +203,6 @@ def _linearised(
         if value
     }
     found = ship_grams(
-        ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, noise=known.noise
+        ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, noise=noise
     )
     return found, known, notes
