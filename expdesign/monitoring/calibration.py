@@ -31,6 +31,8 @@ SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gai
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
+PUSHES = 3
+"""Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
 """Of a stretch on average, where the reference shows no force."""
 STEPS = np.array([-4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
@@ -52,11 +54,23 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
-    surprise: float  # of a stretch on average, see `force.surprise`: how well the weather is predicted
+    weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
+    surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
 
     def __post_init__(self) -> None:
-        seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m", load="m")
+        seal(
+            self,
+            std="4",
+            baseline="m",
+            baseline_std="m",
+            inflation="m",
+            rate="m",
+            alike="m m",
+            load="m",
+            weights="m q",
+            surprise="m",
+        )
 
     @property
     def loads(self) -> NDArray[np.int64]:
@@ -111,6 +125,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     inflation = _inflation(*_filtered(after, force))
     own = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     misfit, surprises = _misfits(after, force)
+    weights = _weights(stretches)
     middle = float(np.median(misfit))
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
     return Calibration(
@@ -124,7 +139,8 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + MISFIT_DEVIATIONS * spread,
-        surprise=max(float(surprises.mean()), LEAST_SURPRISE),
+        weights=weights,
+        surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
     )
 
@@ -238,16 +254,29 @@ def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
 
 
 def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
-    """(w,) `misfit_of` every stretch of a reference, and (w,) `surprise`."""
-    known, found, surprises = Known.nothing(force), np.empty(len(stretches)), np.empty(len(stretches))
+    """(w,) `misfit_of` every stretch of a reference, and (w, q) squared `surprise`."""
+    known, found = Known.nothing(force), np.empty(len(stretches))
+    surprises = np.empty((len(stretches), len(force.variance) // 2))
     for index, products in enumerate(stretches.products):
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
-        surprises[index] = surprise(products, stretches.changes, known, one)
+        surprises[index] = surprise(products, stretches.changes, known).squared
         known = after_stretch(known, one)
     return found, surprises
+
+
+def _weights(stretches: Stretches) -> Array:
+    """(m, q) how much of every change's effect each component of the force resembles; rows add up to one.
+
+    Of components, only the accelerations count: a current takes what they do, in every direction.
+    """
+    m, q = stretches.changes, stretches.products.shape[-1] - stretches.changes - 1
+    across = (stretches.products[:, :m, m:-1] ** 2).sum(axis=0)
+    own = np.einsum("wqq->q", stretches.products[:, m:-1, m:-1])
+    alike = across / np.maximum(own, 1e-300) * (np.arange(q) >= q - PUSHES) + 1e-300
+    return np.asarray(alike / alike.sum(axis=1, keepdims=True))
 
 
 def _inflation(score: Array, information: Array) -> Array:

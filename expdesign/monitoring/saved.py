@@ -13,7 +13,7 @@ from expdesign.monitoring.force import Force, Known
 from expdesign.monitoring.noise import Noise
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
-COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "weather")
+COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather")
 """Numbers of a state that are added up."""
 
 
@@ -31,7 +31,7 @@ def saved(value: Any) -> Any:
 def restored_calibration(table: dict[str, Any]) -> Calibration:
     """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
-    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "surprise")}
+    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 
@@ -48,6 +48,8 @@ def restored_state(table: dict[str, Any]) -> State:
         whole=Sums(**_arrays(table["whole"])),
         load=Load(**{**table["load"], "taken": _array(table["load"]["taken"])}),
         budget=Budget(**_arrays(table["budget"])),
+        weather=_array(table["weather"]),
+        beyond_of_s=_array(table["beyond_of_s"]),
         calls=tuple(
             Call(**{**call, "value": _array(call["value"]), "std": _array(call["std"])}) for call in table["calls"]
         ),
