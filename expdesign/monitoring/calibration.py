@@ -25,6 +25,7 @@ QUICK_S, SLOW_S = 300.0, 43200.0
 # variance of the slow part beside what the reference shows, as a multiple of it and by the number of times `slow_s`
 # that the reference covers
 SPARE = 8.0
+SLOW_SHARE = 1 / 16  # of the variance, in the slow part where the search begins; it never is more than the whole
 SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the force is learnt
 SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gain of twice the log-likelihood in one
 
@@ -198,14 +199,15 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
         counts=stretches.counts[:SEARCHED_STRETCHES],
     )
     q = len(variance)
-    best = np.log2(np.concatenate([variance / 2, variance / 2, np.full(q, QUICK_S)]))
+    best = np.log2(np.concatenate([variance / 2, variance * SLOW_SHARE, np.full(q, QUICK_S)]))
+    most = np.concatenate([np.full(q, np.inf), np.log2(variance), np.full(q, np.inf)])
     cost = float(likelihood(part, _force(best, q, stretch_s)))
     for _ in range(SEARCH_ROUNDS):
-        tried = best + np.concatenate([step * np.eye(3 * q) for step in STEPS])
+        tried = np.minimum(best + np.concatenate([step * np.eye(3 * q) for step in STEPS]), most)
         costs = likelihood(part, _force(tried, q, stretch_s))
         gains = cost - costs
         better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(3 * q)]
-        together = best + np.array(better)
+        together = np.minimum(best + np.array(better), most)
         whole = float(likelihood(part, _force(together, q, stretch_s)))
         single = int(np.argmin(costs))
         new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
@@ -216,9 +218,15 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
 
 
 def _spared(force: Force, time_s: Array) -> Force:
-    """The force with more variance of its slow processes, of which a short reference shows few independent values."""
+    """The force with more variance of its slow currents, of which a short reference shows few independent values.
+
+    The accelerations get none: a ship meets another mean current in every water, while slow wind and waves vary within
+    a reference, too.
+    """
+    q = len(force.variance) // 2
     seen = len(np.unique(np.floor((time_s - time_s[0]) / SLOW_S)))
-    spare = np.repeat([1.0, 1.0 + SPARE / seen], len(force.variance) // 2)
+    spare = np.ones(2 * q)
+    spare[q : 2 * q - PUSHES if q > PUSHES else 2 * q] += SPARE / seen
     return replace(force, variance=spare * force.variance)
 
 
