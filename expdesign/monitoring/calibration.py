@@ -18,6 +18,7 @@ FEWEST_STRETCHES = 40  # of a reference
 # blocks into which the reference is cut to measure how scores of neighbouring stretches correlate; the largest
 # inflation counts
 BLOCK_COUNTS = (160, 80, 40, 20)
+SHOALER = 0.12  # by which draught over depth is beyond the reference's before the water counts as shallower
 MISFIT_DEVIATIONS = 6.0  # standard deviations of the reference's misfit beyond which a stretch is not judged
 LARGEST_SIZE = 10.0  # of changes that are told from errors unlike the reference's, in sizes that matter
 # correlation times of the unmeasured force: first guess of the quick one, and the slow one [s]
@@ -58,6 +59,7 @@ class Calibration:
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
+    shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
 
     def __post_init__(self) -> None:
         seal(
@@ -143,6 +145,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         weights=weights,
         surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
+        shoal_limit=float(grams.shoal.max()) + SHOALER,
     )
 
 

@@ -224,6 +224,10 @@ def watch(
         if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
         state = _waited(state, nuisance, begin_s + duration_s)
+        if (shoal := float(grams.shoal[index])) > calibration.shoal_limit:
+            shoalest, shoal_s = max(state.shoalest, shoal), state.shoal_s + duration_s
+            state = replace(state, left_out_s=state.left_out_s + duration_s, shoal_s=shoal_s, shoalest=shoalest)
+            continue
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
         unlinear = UNEXPLAINED_SHARE * float(one.quadratic) / max(count, 1.0) if state.alarm is not None else 0.0

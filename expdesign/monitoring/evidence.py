@@ -8,7 +8,7 @@ current and steady accelerations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +62,13 @@ class Grams:
     budget: Array
     kind: NDArray[np.int64]  # (w,) number in `KINDS`
     stretch_s: float  # length of a whole one [s]
+    # (w,) draught over depth, where it is measured and the model does not read it; else zero
+    shoal: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3")
+        if not len(self.shoal):
+            object.__setattr__(self, "shoal", np.zeros(len(self.time_s)))
+        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3", shoal="w")
 
     @property
     def changes(self) -> int:
@@ -84,6 +88,7 @@ class Grams:
             counts=self.counts[:, stretches],
             budget=self.budget[stretches],
             kind=self.kind[stretches],
+            shoal=self.shoal[stretches],
         )
 
     @property
@@ -131,7 +136,17 @@ def grams_of(
         budget=budget[keep],
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
+        shoal=_shoal(linear)[keep],
     )
+
+
+def _shoal(linear: LinearisedMotion) -> Array:
+    """(w,) of `Grams`."""
+    ship, windows = linear.motion.ship, linear.motion.windows
+    read = ship.model.reads_depth or any(key.startswith("shallow:") for key in ship.effects)
+    if read or not windows.has_depth:
+        return np.zeros(len(windows.depth_m))
+    return np.asarray((ship.draught_m / windows.depth_m).mean(axis=1))
 
 
 def noise_of(
@@ -241,6 +256,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         counts=np.concatenate([part.counts for part in parts], axis=1),
         budget=np.concatenate([part.budget for part in parts]),
         kind=np.concatenate([part.kind for part in parts]),
+        shoal=np.concatenate([part.shoal for part in parts]),
         stretch_s=parts[0].stretch_s,
     )
 

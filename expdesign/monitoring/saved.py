@@ -13,7 +13,7 @@ from expdesign.monitoring.force import Force, Known
 from expdesign.monitoring.noise import Noise
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
-COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather")
+COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "shoal_s", "shoalest")
 """Numbers of a state that are added up."""
 
 
@@ -31,7 +31,7 @@ def saved(value: Any) -> Any:
 def restored_calibration(table: dict[str, Any]) -> Calibration:
     """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
-    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit")}
+    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "shoal_limit")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 

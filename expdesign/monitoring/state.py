@@ -219,6 +219,9 @@ class State:
     left_out_s: float = 0.0
     # the latest of that left out for its weather; a change that is noticed may explain it yet [s]
     beyond_s: float = 0.0
+    # shoal_s, shoalest: that left out for water shallower than in the reference [s], and draught over depth there
+    shoal_s: float = 0.0
+    shoalest: float = 0.0
     undecided_s: float = 0.0  # how long the largest sum has been above the threshold and too short to be judged [s]
     # brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged
     brief: int = 0

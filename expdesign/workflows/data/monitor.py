@@ -116,7 +116,7 @@ WRITTEN_EVERY_S = 20.0
 """Time between writing files, from which a watch that is ended by force goes on [s]."""
 USUAL = {
     "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
-    "--port-h": 6.0, "--velocity": "auto", "--model": VESSEL,
+    "--port-h": 1.0, "--velocity": "auto", "--model": VESSEL,
 }  # fmt: skip
 
 
@@ -130,7 +130,7 @@ def monitor(
     false_alarm_days: float = 30.0,
     size: float = TUNING.relative_size,
     every_s: float = 3600.0,
-    port_h: float = 6.0,
+    port_h: float = 1.0,
     velocity: str = "auto",
     model: str = VESSEL,
     resume: bool = False,

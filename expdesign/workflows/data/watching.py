@@ -38,6 +38,8 @@ from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unr
 
 BETWEEN_FILES_S = 3600.0
 """Time from the end of a file to the beginning of the next, where its times begin again [s]."""
+CORRECTION_S = 120.0
+"""Time by which a clock that is put back is taken to have been corrected [s]."""
 MOST_SAVED_ROWS = 7200
 """Largest number of rows saved since a change, for a diagnosis."""
 MOST_MOMENTS = 1000
@@ -140,8 +142,12 @@ def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch
 
 def _continued(reading: Reading, piece: Piece) -> Reading:
     """The reading with times that go on where those of the piece begin again."""
-    if not piece.time_s[0] + reading.offset_s <= reading.now_s:
+    back_s = reading.now_s - float(piece.time_s[0]) - reading.offset_s
+    if not back_s >= 0.0:
         return reading
+    if back_s < CORRECTION_S and any(taken.continues(piece.taken) for taken in reading.taken):
+        note = f"{piece.source.name}: its clock was put back by {back_s:.0f} s or so; it is taken to go on"
+        return replace(reading.noted(note), offset_s=reading.offset_s + back_s + float(np.diff(piece.time_s[:2]).sum()))
     note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
     offset_s = reading.now_s + BETWEEN_FILES_S - float(piece.time_s[0])
     return replace(reading.noted(note), offset_s=offset_s)
