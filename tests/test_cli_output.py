@@ -47,7 +47,7 @@ MONITOR = {
     "false_alarm_days": 30.0,
     "size": 0.1,
     "every_s": 3600.0,
-    "port_h": 6.0,
+    "port_h": 1.0,
     "jobs": 0,
     "velocity": "auto",
     "model": "vessel",

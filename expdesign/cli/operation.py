@@ -60,7 +60,7 @@ def monitor(
             help="Hours without way and propulsion, or without data, that count as a port call: the ship may carry "
             "another load afterwards, which is estimated anew and raises no alarm. inf: its load never changes.",
         ),
-    ] = 6.0,
+    ] = 1.0,
     resume: Resume = False,
     velocity: Velocity = "auto",
     out: OutByData = None,

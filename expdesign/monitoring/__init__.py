@@ -16,8 +16,16 @@ M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), chapters 
 from expdesign.monitoring.calibration import Calibration, calibrate
 from expdesign.monitoring.changes import Change, watched_changes
 from expdesign.monitoring.cusum import calls_of, estimates, threshold, watch
-from expdesign.monitoring.evidence import KINDS, Grams, grams_of, joined, stretch_length
+from expdesign.monitoring.evidence import KINDS, Grams, grams_of, joined, noise_of, stretch_length
+from expdesign.monitoring.noise import WHITE, Noise
 from expdesign.monitoring.rolled import RollEvent, RollWatch, restored_roll, roll_learnt, roll_watched
-from expdesign.monitoring.saved import restored_alarm, restored_calibration, restored_changes, restored_state, saved
+from expdesign.monitoring.saved import (
+    restored_alarm,
+    restored_calibration,
+    restored_changes,
+    restored_noise,
+    restored_state,
+    saved,
+)
 from expdesign.monitoring.state import Alarm, Call, Rules, State, Step
 from expdesign.monitoring.tuning import TUNING

@@ -18,6 +18,7 @@ FEWEST_STRETCHES = 40  # of a reference
 # blocks into which the reference is cut to measure how scores of neighbouring stretches correlate; the largest
 # inflation counts
 BLOCK_COUNTS = (160, 80, 40, 20)
+SHOALER = 0.12  # by which draught over depth is beyond the reference's before the water counts as shallower
 MISFIT_DEVIATIONS = 6.0  # standard deviations of the reference's misfit beyond which a stretch is not judged
 LARGEST_SIZE = 10.0  # of changes that are told from errors unlike the reference's, in sizes that matter
 # correlation times of the unmeasured force: first guess of the quick one, and the slow one [s]
@@ -25,15 +26,18 @@ QUICK_S, SLOW_S = 300.0, 43200.0
 # variance of the slow part beside what the reference shows, as a multiple of it and by the number of times `slow_s`
 # that the reference covers
 SPARE = 8.0
+SLOW_SHARE = 1 / 16  # of the variance, in the slow part where the search begins; it never is more than the whole
 SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the force is learnt
 SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gain of twice the log-likelihood in one
 
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
+PUSHES = 3
+"""Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
 """Of a stretch on average, where the reference shows no force."""
-STEPS = np.array([-4.0, -2.0, -1.0, 1.0, 2.0])
+STEPS = np.array([-4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
 """By which logarithms of variances and times are changed in a round of the search, to base two."""
 
 
@@ -52,11 +56,24 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
-    surprise: float  # of a stretch on average, see `force.surprise`: how well the weather is predicted
+    weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
+    surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
+    shoal_limit: float  # draught over depth beyond which the water is shallower than the reference's
 
     def __post_init__(self) -> None:
-        seal(self, std="4", baseline="m", baseline_std="m", inflation="m", rate="m", alike="m m", load="m")
+        seal(
+            self,
+            std="4",
+            baseline="m",
+            baseline_std="m",
+            inflation="m",
+            rate="m",
+            alike="m m",
+            load="m",
+            weights="m q",
+            surprise="m",
+        )
 
     @property
     def loads(self) -> NDArray[np.int64]:
@@ -111,6 +128,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     inflation = _inflation(*_filtered(after, force))
     own = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     misfit, surprises = _misfits(after, force)
+    weights = _weights(stretches)
     middle = float(np.median(misfit))
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
     return Calibration(
@@ -124,8 +142,10 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + MISFIT_DEVIATIONS * spread,
-        surprise=max(float(surprises.mean()), LEAST_SURPRISE),
+        weights=weights,
+        surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
+        shoal_limit=float(grams.shoal.max()) + SHOALER,
     )
 
 
@@ -174,7 +194,7 @@ def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[
 
 
 def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
-    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and the quick time."""
+    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and quick times."""
     part = replace(
         stretches,
         time_s=stretches.time_s[:SEARCHED_STRETCHES],
@@ -182,14 +202,15 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
         counts=stretches.counts[:SEARCHED_STRETCHES],
     )
     q = len(variance)
-    best = np.log2(np.concatenate([variance / 2, variance / 2, [QUICK_S]]))
+    best = np.log2(np.concatenate([variance / 2, variance * SLOW_SHARE, np.full(q, QUICK_S)]))
+    most = np.concatenate([np.full(q, np.inf), np.log2(variance), np.full(q, np.inf)])
     cost = float(likelihood(part, _force(best, q, stretch_s)))
     for _ in range(SEARCH_ROUNDS):
-        tried = best + np.concatenate([step * np.eye(2 * q + 1) for step in STEPS])
+        tried = np.minimum(best + np.concatenate([step * np.eye(3 * q) for step in STEPS]), most)
         costs = likelihood(part, _force(tried, q, stretch_s))
         gains = cost - costs
-        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(2 * q + 1)]
-        together = best + np.array(better)
+        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(3 * q)]
+        together = np.minimum(best + np.array(better), most)
         whole = float(likelihood(part, _force(together, q, stretch_s)))
         single = int(np.argmin(costs))
         new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
@@ -200,9 +221,15 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
 
 
 def _spared(force: Force, time_s: Array) -> Force:
-    """The force with more variance of its slow processes, of which a short reference shows few independent values."""
+    """The force with more variance of its slow currents, of which a short reference shows few independent values.
+
+    The accelerations get none: a ship meets another mean current in every water, while slow wind and waves vary within
+    a reference, too.
+    """
+    q = len(force.variance) // 2
     seen = len(np.unique(np.floor((time_s - time_s[0]) / SLOW_S)))
-    spare = np.repeat([1.0, 1.0 + SPARE / seen], len(force.variance) // 2)
+    spare = np.ones(2 * q)
+    spare[q : 2 * q - PUSHES if q > PUSHES else 2 * q] += SPARE / seen
     return replace(force, variance=spare * force.variance)
 
 
@@ -213,10 +240,10 @@ def _best_step(gains: Array) -> float:
 
 
 def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
-    """The force whose parameters have these logarithms (..., 2 q + 1)."""
+    """The force whose parameters have these logarithms (..., 3 q)."""
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
-    quick = np.broadcast_to(np.clip(values[..., -1:], stretch_s / 2, SLOW_S / 4), variance[..., :q].shape)
+    quick = np.clip(values[..., 2 * q :], stretch_s / 2, SLOW_S / 4)
     return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1))
 
 
@@ -238,16 +265,29 @@ def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
 
 
 def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
-    """(w,) `misfit_of` every stretch of a reference, and (w,) `surprise`."""
-    known, found, surprises = Known.nothing(force), np.empty(len(stretches)), np.empty(len(stretches))
+    """(w,) `misfit_of` every stretch of a reference, and (w, q) squared `surprise`."""
+    known, found = Known.nothing(force), np.empty(len(stretches))
+    surprises = np.empty((len(stretches), len(force.variance) // 2))
     for index, products in enumerate(stretches.products):
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
-        surprises[index] = surprise(products, stretches.changes, known, one)
+        surprises[index] = surprise(products, stretches.changes, known).squared
         known = after_stretch(known, one)
     return found, surprises
+
+
+def _weights(stretches: Stretches) -> Array:
+    """(m, q) how much of every change's effect each component of the force resembles; rows add up to one.
+
+    Of components, only the accelerations count: a current takes what they do, in every direction.
+    """
+    m, q = stretches.changes, stretches.products.shape[-1] - stretches.changes - 1
+    across = (stretches.products[:, :m, m:-1] ** 2).sum(axis=0)
+    own = np.einsum("wqq->q", stretches.products[:, m:-1, m:-1])
+    alike = across / np.maximum(own, 1e-300) * (np.arange(q) >= q - PUSHES) + 1e-300
+    return np.asarray(alike / alike.sum(axis=1, keepdims=True))
 
 
 def _inflation(score: Array, information: Array) -> Array:

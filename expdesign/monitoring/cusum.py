@@ -22,7 +22,7 @@ import numpy as np
 
 from expdesign.monitoring.calibration import LARGEST_SIZE, Calibration, misfit_of
 from expdesign.monitoring.evidence import Grams, stretches_of
-from expdesign.monitoring.force import Force, Judged, after_gap, after_stretch, judged, surprise
+from expdesign.monitoring.force import Force, Judged, Surprise, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step, Sums
 from expdesign.values import Array
 
@@ -32,6 +32,9 @@ WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond w
 # stretches of a sum from which weather beyond the reference is told from a change of the ship, and the same where the
 # sum began in such weather
 TOLD_APART = (7, 20)
+CHANCE = 3.0  # standard deviations by which what is left of the surprises has to be beyond chance, too
+APART = 0.02  # common weight below which a change cannot have raised the alarm of another
+ALIKE = 0.3  # share of a change's weights from which another sees the same weather
 UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
 SETTLING_STRETCHES = 20  # fewest from which the size of a change is told
 REFINED = 0.2  # change of the size, in sizes that matter, below which it is refined no further
@@ -98,9 +101,9 @@ def calls_of(state: State, calibration: Calibration) -> tuple[Call, ...]:
 # Alarms: which change explains the data best, and how large it is once that is known.
 
 
-def raised(state: State, step: Step, calibration: Calibration) -> tuple[State, Alarm]:
-    """Raise an alarm of the largest sum."""
-    pending = state.largest
+def raised(state: State, step: Step, place: int, calibration: Calibration) -> tuple[State, Alarm]:
+    """Raise an alarm of the sum with a number."""
+    pending = state.sums.one(place)
     alarm = Alarm(time_s=state.until_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change)
     alarm = _attributed(alarm, pending, calibration, state.until_s)
     return replace(state, alarm=alarm, pending=pending, before=state.shift), alarm
@@ -164,7 +167,8 @@ def _attributed(
         so_far: (m,) by which the ship was changed since the alarm.
     """
     score, information = pending.score[0], pending.information[0]
-    watched = np.flatnonzero(calibration.watched)
+    seen = calibration.weights @ calibration.weights[alarm.change] > APART
+    watched = np.flatnonzero(calibration.watched & seen)
     known = np.maximum(np.diag(information)[watched], 1e-300)
     gain = score[watched] ** 2 / known / (2.0 * calibration.common)
     order = np.argsort(-gain)
@@ -220,43 +224,51 @@ def watch(
         if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
         state = _waited(state, nuisance, begin_s + duration_s)
+        if (shoal := float(grams.shoal[index])) > calibration.shoal_limit:
+            shoalest, shoal_s = max(state.shoalest, shoal), state.shoal_s + duration_s
+            state = replace(state, left_out_s=state.left_out_s + duration_s, shoal_s=shoal_s, shoalest=shoalest)
+            continue
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
-        if misfit_of(float(one.quadratic), one.score, one.information, count) > calibration.misfit_limit:
+        unlinear = UNEXPLAINED_SHARE * float(one.quadratic) / max(count, 1.0) if state.alarm is not None else 0.0
+        misfit = misfit_of(float(one.quadratic), one.score, one.information, count)
+        if misfit > calibration.misfit_limit + unlinear:
             state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
-        surprised = surprise(own, stretches.changes, state.known, one, loads) / calibration.surprise
+        surprised = surprise(own, stretches.changes, state.known, loads)
         before = state.weather
-        state = _counted(state, one, surprised, duration_s, int(grams.kind[index]), grams.budget[index])
+        weather = before + (calibration.weights @ surprised.squared / calibration.surprise - before) / WEATHER_STRETCHES
+        state = _counted(state, one, weather, calibration, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
             state = settling(state, state.alarm, one, calibration)
             if state.alarm is not None and state.alarm.settled:
                 alarms.append(state.alarm)
-                state = replace(state, alarm=None, pending=None, weather=1.0)
+                state = replace(state, alarm=None, pending=None, weather=np.ones(len(weather)))
         else:
             state, step = _summed(state, one, surprised, before, begin_s, calibration)
-            state, alarm, compared = _noticed(
-                state, step, calibration, rules.limit, len(own) - 1 - stretches.changes, duration_s
-            )
-            steps.append(replace(step, compared=compared))
+            state, alarm, step = _noticed(state, step, calibration, rules.limit, duration_s)
+            steps.append(step)
             alarms += [] if alarm is None else [alarm]
         if state.shift is not ship:
             return state, tuple(alarms), tuple(steps), index + 1
     return state, tuple(alarms), tuple(steps), len(grams)
 
 
-def _counted(state: State, one: Judged, surprised: float, duration_s: float, kind: int, terms: Array) -> State:
+def _counted(
+    state: State, one: Judged, weather: Array, calibration: Calibration, duration_s: float, kind: int, terms: Array
+) -> State:
     """The state with a stretch added to the sums over the whole watch.
 
-    It is not judged where the weather is beyond the reference, unless a change that was noticed explains it.
+    It is not judged where the weather is beyond the reference for all changes, unless one that was noticed explains it.
     """
-    weather = state.weather + (surprised - state.weather) / WEATHER_STRETCHES
-    beyond = weather > WEATHER_LIMIT and state.alarm is None
+    unlike = weather > WEATHER_LIMIT
+    beyond = bool(unlike[calibration.watched].all()) and state.alarm is None
     return replace(
         state,
         judged_s=state.judged_s + duration_s * (not beyond),
         left_out_s=state.left_out_s + duration_s * beyond,
         beyond_s=state.beyond_s + duration_s if beyond else 0.0,
+        beyond_of_s=state.beyond_of_s + duration_s * (unlike & (not beyond and state.alarm is None)),
         weather=weather,
         whole=state.whole.added(one)[0],
         load=replace(state.load, judged=state.load.judged + 1),
@@ -265,46 +277,62 @@ def _counted(state: State, one: Judged, surprised: float, duration_s: float, kin
 
 
 def _noticed(
-    state: State, step: Step, calibration: Calibration, limit: float, forces: int, duration_s: float
-) -> tuple[State, Alarm | None, bool]:
-    """Raise an alarm where a sum has passed the limit, unless weather explains it; all sums then begin anew.
+    state: State, step: Step, calibration: Calibration, limit: float, duration_s: float
+) -> tuple[State, Alarm | None, Step]:
+    """Raise an alarm where a sum has passed the limit, unless weather explains it.
 
-    Returns also whether the sum was compared with the limit.
+    The sums of changes that such weather looks like then begin anew, and the others go on: weather in yaw does not stop
+    surge. Returns also the step with the largest sum that was compared with the limit.
     """
-    if step.statistic <= limit:
+    m = len(state.shift)
+    passed = [int(place) for place in np.argsort(-state.ratios) if state.ratios[place] > limit]
+    if not passed:
         brief = state.brief + (state.undecided_s > 0)
-        return with_load(replace(state, brief=brief, undecided_s=0.0), calibration), None, True
-    if _doubtful(state):
-        return with_load(replace(state, undecided_s=state.undecided_s + duration_s), calibration), None, False
-    state = replace(state, undecided_s=0.0)
-    if not _by_weather(state, calibration, forces):
-        state, alarm = raised(state, step, calibration)
-        explained_s = min(state.beyond_s, state.until_s - float(state.largest.since_s[0]))
-        judged_s, left_out_s = state.judged_s + explained_s, state.left_out_s - explained_s
-        return replace(state, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, True
-    every = np.ones(len(state.ratios), dtype=bool)
-    sums = state.sums.again(every, state.until_s, state.weather)
-    return replace(state, ratios=np.zeros(len(every)), sums=sums, by_weather=state.by_weather + 1), None, False
+        return with_load(replace(state, brief=brief, undecided_s=0.0), calibration), None, step
+    explained, doubtful = np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
+    for place in passed:
+        one = place % m
+        if explained[one] or doubtful[one]:
+            continue
+        alike = calibration.weights @ calibration.weights[one] > ALIKE * (calibration.weights[one] ** 2).sum()
+        if _doubtful(state, place):
+            doubtful |= alike
+        elif _by_weather(state, place, calibration):
+            explained |= alike
+        else:
+            step = replace(step, statistic=float(state.ratios[place]), change=one)
+            state, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration)
+            explained_s = min(state.beyond_s, state.until_s - alarm.since_s)
+            judged_s, left_out_s = state.judged_s + explained_s, state.left_out_s - explained_s
+            return replace(state, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, step
+    undecided_s = state.undecided_s + duration_s if doubtful.any() else 0.0
+    state = replace(state, undecided_s=undecided_s, by_weather=state.by_weather + bool(explained.any()))
+    if explained.any():
+        both = np.tile(explained, 2)
+        sums = state.sums.again(both, state.until_s, np.tile(state.weather, 2))
+        state = replace(state, ratios=np.where(both, 0.0, state.ratios), sums=sums)
+    else:
+        state = with_load(state, calibration)
+    return state, None, replace(step, compared=False)
 
 
-def _doubtful(state: State) -> bool:
-    """Whether the largest sum has too few stretches to tell a change of the ship from unusual weather."""
-    sums = state.largest
-    return sums.count < TOLD_APART[int(sums.weather[0] > WEATHER_LIMIT)]
+def _doubtful(state: State, place: int) -> bool:
+    """Whether a sum has too few stretches to tell a change of the ship from unusual weather."""
+    return bool(state.sums.stretches[place] < TOLD_APART[int(state.sums.weather[place] > WEATHER_LIMIT)])
 
 
-def _by_weather(state: State, calibration: Calibration, forces: int) -> bool:
-    """Whether no change that lasts explains how far the force has been from its prediction since the largest sum began.
+def _by_weather(state: State, place: int, calibration: Calibration) -> bool:
+    """Whether no change that lasts explains how far the force has been from its prediction since a sum began.
 
     Of large changes, whose effects are not linear, most of it is explained, and the rest may still be large.
     """
-    sums = state.largest
-    score, information = sums.score[0], sums.information[0]
-    inner = information + np.eye(len(score)) / LARGEST_SIZE**2
-    surprised = float(sums.surprise[0])
-    left = surprised - float(score @ np.linalg.solve(inner, score)) / calibration.surprise
-    freedom = sums.count - float(np.trace(np.linalg.solve(inner, information))) / forces
-    return freedom > 1.0 and left > max(WEATHER_LIMIT * freedom, UNEXPLAINED_SHARE * surprised)
+    sums, own = state.sums, calibration.surprise[place % len(state.shift)]
+    inner = sums.by_lasting[place] + np.eye(len(state.shift)) / LARGEST_SIZE**2
+    surprised = float(sums.surprise[place]) / own
+    left = surprised - float(sums.lasting[place] @ np.linalg.solve(inner, sums.lasting[place])) / own
+    freedom = float(sums.stretches[place] - np.trace(np.linalg.solve(inner, sums.by_lasting[place])))
+    chance = freedom + CHANCE * math.sqrt(2.0 * max(freedom, 0.0))
+    return freedom > 1.0 and left > max(WEATHER_LIMIT * freedom, chance, UNEXPLAINED_SHARE * surprised)
 
 
 def _less(products: Array, change: Array) -> Array:
@@ -329,13 +357,14 @@ def _waited(state: State, nuisance: Force, until_s: float) -> State:
 
 
 def _summed(
-    state: State, one: Judged, surprised: float, before: float, begin_s: float, calibration: Calibration
+    state: State, one: Judged, surprised: Surprise, before: Array, begin_s: float, calibration: Calibration
 ) -> tuple[State, Step]:
     """Add a stretch to all sums, or begin a sum with it where that is larger; sums below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
     """
-    sums, score, information = state.sums.added(one, surprised)
+    weights = np.tile(calibration.weights, (2, 1))
+    sums, score, information = state.sums.added(one, surprised, weights)
     m = score.shape[1]
     own, number = np.arange(2 * m), np.arange(2 * m) % m
     sign, inflation = np.repeat([1.0, -1.0], m), np.tile(calibration.inflation, 2)
@@ -348,6 +377,8 @@ def _summed(
     place = int(np.argmax(ratios))
     step = Step(time_s=state.until_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
-        sums = sums.first(late & ~ended, one, begin_s, surprised, before)
+        sums = sums.first(late & ~ended, one, begin_s, surprised, weights, np.tile(before, 2))
     known = after_stretch(state.known, one)
-    return replace(state, known=known, ratios=ratios, sums=sums.again(ended, state.until_s, state.weather)), step
+    return replace(
+        state, known=known, ratios=ratios, sums=sums.again(ended, state.until_s, np.tile(state.weather, 2))
+    ), step

@@ -8,7 +8,7 @@ current and steady accelerations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from expdesign.diagnosis.motion import (
     start_responses,
 )
 from expdesign.monitoring.changes import Change
+from expdesign.monitoring.noise import WHITE, Noise, learnt_noise, whitened
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 
@@ -61,9 +62,13 @@ class Grams:
     budget: Array
     kind: NDArray[np.int64]  # (w,) number in `KINDS`
     stretch_s: float  # length of a whole one [s]
+    # (w,) draught over depth, where it is measured and the model does not read it; else zero
+    shoal: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3")
+        if not len(self.shoal):
+            object.__setattr__(self, "shoal", np.zeros(len(self.time_s)))
+        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3", shoal="w")
 
     @property
     def changes(self) -> int:
@@ -83,6 +88,7 @@ class Grams:
             counts=self.counts[:, stretches],
             budget=self.budget[stretches],
             kind=self.kind[stretches],
+            shoal=self.shoal[stretches],
         )
 
     @property
@@ -92,7 +98,13 @@ class Grams:
 
 
 def grams_of(
-    ship: ExtendedModel, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+    ship: ExtendedModel,
+    record: Record,
+    changes: Sequence[Change],
+    *,
+    begins_s: Sequence[float],
+    stretch_s: float,
+    noise: Noise = WHITE,
 ) -> Grams:
     """Inner products of all stretches of a record.
 
@@ -104,18 +116,14 @@ def grams_of(
         changes: watched for.
         begins_s: time of the first sample of each batch [s].
         stretch_s: length of a stretch [s].
+        noise: within stretches.
 
     Raises:
         InputError: batches of different sample times.
     """
-    parts, begins = _whole_stretches(record, begins_s, stretch_s)
-    windows = cut_windows(ship.model, parts, longest_s=stretch_s)
-    linear = linearise(simulate_from_measured(ship, windows))
-    known = effect_disturbances(linear, [change.effect for change in changes])
-    columns = _columns(linear, known, changes)
-    error = _compared(linear)
-    seen = np.isfinite(error)
-    columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
+    linear, known, columns, seen, begins = _simulated(ship, record, changes, begins_s, stretch_s)
+    windows = linear.motion.windows
+    columns = whitened(columns, seen, linear.transition, noise, step_s=windows.step_s)
     table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
     budget = _budget(linear, known, changes)
     keep = _usable(linear, seen) & ~_still(linear, budget, changes)
@@ -128,7 +136,51 @@ def grams_of(
         budget=budget[keep],
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
+        shoal=_shoal(linear)[keep],
     )
+
+
+def _shoal(linear: LinearisedMotion) -> Array:
+    """(w,) of `Grams`."""
+    ship, windows = linear.motion.ship, linear.motion.windows
+    read = ship.model.reads_depth or any(key.startswith("shallow:") for key in ship.effects)
+    if read or not windows.has_depth:
+        return np.zeros(len(windows.depth_m))
+    return np.asarray((ship.draught_m / windows.depth_m).mean(axis=1))
+
+
+def noise_of(
+    ship: ExtendedModel,
+    record: Record,
+    changes: Sequence[Change],
+    *,
+    begins_s: Sequence[float],
+    stretch_s: float,
+    known: Noise | None = None,
+) -> Noise:
+    """The noise within the stretches of a record, the known one where it fits; arguments as of `grams_of`."""
+    linear, acting, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
+    keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
+    windows = linear.motion.windows
+    return learnt_noise(
+        columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
+        known=known,
+    )  # fmt: skip
+
+
+def _simulated(
+    ship: ExtendedModel, record: Record, changes: Sequence[Change], begins_s: Sequence[float], stretch_s: float
+) -> tuple[LinearisedMotion, Sequence[Disturbance], Array, NDArray[np.bool_], Array]:
+    """All stretches: motion, changes, columns X, S, F and e (c, w, s, 4), what is measured, and where batches begin."""
+    parts, begins = _whole_stretches(record, begins_s, stretch_s)
+    windows = cut_windows(ship.model, parts, longest_s=stretch_s)
+    linear = linearise(simulate_from_measured(ship, windows))
+    known = effect_disturbances(linear, [change.effect for change in changes])
+    columns = _columns(linear, known, changes)
+    error = _compared(linear)
+    seen = np.isfinite(error)
+    columns = np.where(seen, np.concatenate([columns, np.where(seen, error, 0.0)[None]]), 0.0)
+    return linear, known, columns, seen, begins
 
 
 def _whole_stretches(record: Record, begins_s: Sequence[float], stretch_s: float) -> tuple[Record, Array]:
@@ -204,6 +256,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         counts=np.concatenate([part.counts for part in parts], axis=1),
         budget=np.concatenate([part.budget for part in parts]),
         kind=np.concatenate([part.kind for part in parts]),
+        shoal=np.concatenate([part.shoal for part in parts]),
         stretch_s=parts[0].stretch_s,
     )
 

@@ -104,24 +104,31 @@ def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64]
     )
 
 
-def surprise(products: Array, changes: int, known: Known, one: Judged, loads: NDArray[np.int64] = NO_LOADS) -> float:
-    """Squared error of the force that was predicted for a stretch, in its standard deviations.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surprise:
+    """How far the force of a stretch is from its prediction, by component."""
 
-    Zero where force and load are as the filter expected, on average one per component. It is what the prediction of the
-    data misses beyond a free force in the stretch.
+    squared: Array  # (q,) squared error, in standard deviations: one on average
+    share: Array  # (q,) error over its variance
+    variance: Array  # (q,)
+    seen: tuple[Array, Array]  # (q, m) and (q, n), products of the components with the changes and the force
+
+
+def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Surprise:
+    """The surprise of a stretch.
 
     Args:
         products: (c, c) of the stretch.
         changes: m, as for `judged`; loads: too.
         known: before the stretch.
-        one: the stretch under that.
     """
     own = slice(changes, len(products) - 1)
     columns = np.concatenate([np.tile(np.arange(changes, len(products) - 1), 2), loads])
-    missed = products[columns, -1] - products[np.ix_(columns, columns)] @ known.mean
-    free = products[own, -1] - products[own, columns] @ known.mean
-    squared = free @ np.linalg.lstsq(products[own, own], free, rcond=1e-12)[0]
-    return float(squared - missed @ one.towards)
+    across = products[own, columns]
+    missed = products[own, -1] - across @ known.mean
+    variance = np.diag(products[own, own]) + np.einsum("qi,ij,qj->q", across, known.covariance, across)
+    share = missed / np.maximum(variance, 1e-300)
+    return Surprise(squared=missed * share, share=share, variance=variance, seen=(products[own, :changes], across))
 
 
 def after_gap(known: Known, force: Force, gap_s: float) -> Known:

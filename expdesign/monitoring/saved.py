@@ -10,9 +10,10 @@ import numpy as np
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.changes import Change
 from expdesign.monitoring.force import Force, Known
+from expdesign.monitoring.noise import Noise
 from expdesign.monitoring.state import Alarm, Budget, Call, Load, State, Sums
 
-COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "weather")
+COUNTED = ("judged_s", "left_out_s", "beyond_s", "undecided_s", "brief", "by_weather", "shoal_s", "shoalest")
 """Numbers of a state that are added up."""
 
 
@@ -30,7 +31,7 @@ def saved(value: Any) -> Any:
 def restored_calibration(table: dict[str, Any]) -> Calibration:
     """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
-    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "surprise")}
+    rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "shoal_limit")}
     return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
 
 
@@ -47,6 +48,8 @@ def restored_state(table: dict[str, Any]) -> State:
         whole=Sums(**_arrays(table["whole"])),
         load=Load(**{**table["load"], "taken": _array(table["load"]["taken"])}),
         budget=Budget(**_arrays(table["budget"])),
+        weather=_array(table["weather"]),
+        beyond_of_s=_array(table["beyond_of_s"]),
         calls=tuple(
             Call(**{**call, "value": _array(call["value"]), "std": _array(call["std"])}) for call in table["calls"]
         ),
@@ -59,6 +62,11 @@ def restored_state(table: dict[str, Any]) -> State:
 def restored_alarm(table: dict[str, Any]) -> Alarm:
     """An alarm, read from what `saved` made of it."""
     return Alarm(**{**table, "as_likely": tuple(table["as_likely"])})
+
+
+def restored_noise(table: dict[str, Any]) -> Noise:
+    """Noise, read from what `saved` made of it."""
+    return Noise(**{name: _array(value) if isinstance(value, list) else value for name, value in table.items()})
 
 
 def restored_changes(tables: list[dict[str, Any]]) -> tuple[Change, ...]:

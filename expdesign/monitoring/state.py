@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.evidence import KINDS
-from expdesign.monitoring.force import Judged, Known
+from expdesign.monitoring.force import Judged, Known, Surprise
 from expdesign.values import Array
 
 
@@ -41,8 +41,11 @@ class Sums:
     score: Array
     information: Array
     stretches: Array  # (n,) that were added
-    surprise: Array  # (n,) sums of `force.surprise`, in that of a stretch of the reference
-    weather: Array  # (n,) `State.weather` as they began
+    surprise: Array  # (n,) sums of `force.surprise`, weighted for the change, in that of a stretch of the reference
+    # lasting, by_lasting: (n, m) and (n, m, m), score and information of changes that last in these surprises
+    lasting: Array
+    by_lasting: Array
+    weather: Array  # (n,) `State.weather` of the change as they began
 
     @property
     def count(self) -> int:
@@ -50,7 +53,7 @@ class Sums:
         return int(self.stretches[0])
 
     @classmethod
-    def begun(cls, count: int, changes: int, forces: int, time_s: float, weather: float = 1.0) -> Sums:
+    def begun(cls, count: int, changes: int, forces: int, time_s: float, weather: Array | float = 1.0) -> Sums:
         """Nothing yet."""
         return cls(
             since_s=np.full(count, time_s),
@@ -59,27 +62,35 @@ class Sums:
             information=np.zeros((count, changes, changes)),
             stretches=np.zeros(count),
             surprise=np.zeros(count),
-            weather=np.full(count, weather),
+            lasting=np.zeros((count, changes)),
+            by_lasting=np.zeros((count, changes, changes)),
+            weather=np.broadcast_to(weather, count).astype(float),
         )
 
     def one(self, place: int) -> Sums:
         """Those of one beginning."""
         return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
 
-    def again(self, places: np.ndarray, time_s: float, weather: float = 1.0) -> Sums:
-        """The sums with some (n,) begun anew."""
-        return self._where(places, Sums.begun(1, self.score.shape[1], self.taken.shape[1], time_s, weather))
+    def again(self, places: np.ndarray, time_s: float, weather: Array | float = 1.0) -> Sums:
+        """The sums with some (n,) begun anew, in a weather (n,)."""
+        count, changes = self.score.shape
+        return self._where(places, Sums.begun(count, changes, self.taken.shape[1], time_s, weather))
 
-    def first(self, places: np.ndarray, one: Judged, time_s: float, surprise: float, weather: float) -> Sums:
+    def first(
+        self, places: np.ndarray, one: Judged, time_s: float, surprise: Surprise, weights: Array, weather: Array
+    ) -> Sums:
         """The sums with some (n,) begun with a stretch."""
+        squared, lasting, by_lasting = _lasting(surprise, weights, np.zeros_like(self.taken))
         begun = Sums(
             since_s=np.array([time_s]),
             taken=(one.gain @ one.seen[0])[None],
             score=one.score[None],
             information=one.information[None],
             stretches=np.ones(1),
-            surprise=np.array([surprise]),
-            weather=np.array([weather]),
+            surprise=squared,
+            lasting=lasting,
+            by_lasting=by_lasting,
+            weather=weather,
         )
         return self._where(places, begun)
 
@@ -95,8 +106,16 @@ class Sums:
         """The sums after a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
-    def added(self, one: Judged, surprise: float = 0.0) -> tuple[Sums, Array, Array]:
-        """The sums with one more stretch; and its scores (n, m) and information (n, m, m)."""
+    def added(
+        self, one: Judged, surprise: Surprise | None = None, weights: Array | None = None
+    ) -> tuple[Sums, Array, Array]:
+        """The sums with one more stretch; and its scores (n, m) and information (n, m, m).
+
+        Surprises of components count by weights (n, q).
+        """
+        squared, lasting, by_lasting = np.zeros(1), np.zeros(1), np.zeros(1)
+        if surprise is not None and weights is not None:
+            squared, lasting, by_lasting = _lasting(surprise, weights, self.taken)
         score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
         cross = one.by_force @ self.taken
         information = (
@@ -109,10 +128,20 @@ class Sums:
             score=self.score + score,
             information=self.information + information,
             stretches=self.stretches + 1.0,
-            surprise=self.surprise + surprise,
+            surprise=self.surprise + squared,
+            lasting=self.lasting + lasting,
+            by_lasting=self.by_lasting + by_lasting,
             weather=self.weather,
         )
         return after, score, information
+
+
+def _lasting(surprise: Surprise, weights: Array, taken: Array) -> tuple[Array, Array, Array]:
+    """(n,) surprises, and (n, m) and (n, m, m) what changes of which the filter has `taken` explain of them."""
+    acting = surprise.seen[0] - surprise.seen[1] @ taken  # (n, q, m)
+    scaled = weights[:, :, None] * acting
+    lasting = np.einsum("nqm,q->nm", scaled, surprise.share)
+    return weights @ surprise.squared, lasting, np.swapaxes(scaled / surprise.variance[:, None], 1, 2) @ acting
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -179,25 +208,24 @@ class State:
     whole: Sums  # sums since the watch began, or since the last change was settled
     load: Load  # since the last port call; calls: those before, the latest of them
     budget: Budget  # of the stretches judged
+    weather: Array  # (m,) of late, the `surprise` of stretches for every change, in that of the reference
+    beyond_of_s: Array
     calls: tuple[Call, ...] = ()
     alarm: Alarm | None = None  # the alarm that is not yet settled, or None; pending: sums since its change
     pending: Sums | None = None
     # judged_s, left_out_s: measured time of the stretches that were judged, and of those whose error or weather was
-    # beyond the reference [s]
+    # beyond the reference for every change [s]; beyond_of_s: (m,) the first, where it was so for one change [s]
     judged_s: float = 0.0
     left_out_s: float = 0.0
     # the latest of that left out for its weather; a change that is noticed may explain it yet [s]
     beyond_s: float = 0.0
+    # shoal_s, shoalest: that left out for water shallower than in the reference [s], and draught over depth there
+    shoal_s: float = 0.0
+    shoalest: float = 0.0
     undecided_s: float = 0.0  # how long the largest sum has been above the threshold and too short to be judged [s]
     # brief, by_weather: how often such a sum fell again, and how often weather explained one that was judged
     brief: int = 0
     by_weather: int = 0
-    weather: float = 1.0  # of late, the `surprise` of stretches in that of the reference
-
-    @property
-    def largest(self) -> Sums:
-        """The largest sum."""
-        return self.sums.one(int(np.argmax(self.ratios)))
 
     @classmethod
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
@@ -213,6 +241,8 @@ class State:
             whole=Sums.begun(1, m, len(known.mean), time_s),
             load=Load(since_s=time_s, stay_s=0.0, judged=0, rounds=0, taken=np.zeros(m)),
             budget=Budget.begun(m),
+            weather=np.ones(m),
+            beyond_of_s=np.zeros(m),
         )
 
 

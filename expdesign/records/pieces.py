@@ -22,6 +22,7 @@ import numpy as np
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
 from expdesign.records.file import FIRST_ROW, MISSING, Inputs, Sources, choose_columns
+from expdesign.records.file.clock import JITTER_SHARE
 from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
@@ -34,6 +35,10 @@ CLOCKED_ROWS = 50
 LINES = 4096
 """Looked at together."""
 OPTIONAL = ("wind_u_mps", "wind_v_mps", "wind_speed_mps", "wind_angle_rad", "depth_m", "steered", "batch", *AUXILIARY)
+
+
+CORRECTED_SHARE = 0.005
+"""Share of the steps, at most, that corrections of a clock are."""
 
 
 @dataclass(frozen=True)
@@ -179,10 +184,12 @@ class _Cut:
     begins: str
     skipped: int
 
-    def piece(self, lines: list[str], left_out: int, *, rows: int, again: int, last: bool) -> Piece:
-        """A piece of the lines up to a row of the source, as many as make whole stretches."""
+    def piece(
+        self, lines: list[str], left_out: int, *, rows: int, again: int, last: bool, all_of: bool = False
+    ) -> Piece:
+        """A piece of the lines up to a row of the source, as many as make whole stretches, or all of them."""
         times = self.columns.times(lines)
-        whole = self._whole(times) if self.more_follow or not last else len(lines)
+        whole = self._whole(times) if not all_of and (self.more_follow or not last) else len(lines)
         kept = lines[:whole]
         written = self.columns.without_optional(kept) if self.columns.gaps else kept
         self.columns.gaps = False
@@ -193,6 +200,16 @@ class _Cut:
             pending=tuple(lines[whole:]), again=again, skipped=self.skipped,
             taken=Taken(self.source.name, self.begins, rows, float(times[-1]) if len(times) else math.nan),
         )  # fmt: skip
+
+    def correction(self, lines: list[str]) -> int:
+        """The first line after the clock was put right, back or by a part of a sample; zero where it was not.
+
+        Steps that are uneven again and again are no corrections, and for the reader to refuse.
+        """
+        steps = np.diff(self.columns.times(lines))
+        step_s = self.gap_s / TUNING.gap_sample_times
+        uneven = (steps <= 0) | ((np.abs(steps - step_s) > JITTER_SHARE * step_s) & (steps <= self.gap_s))
+        return int(np.argmax(uneven)) + 1 if 0 < uneven.sum() <= CORRECTED_SHARE * len(steps) else 0
 
     def _whole(self, times: Array) -> int:
         """Lines up to the end of the last whole stretch, counted from the last gap."""
@@ -215,6 +232,10 @@ def _cut(source: Iterator[str], how: _Cut, rows: int, again: int) -> Iterator[Pi
         rows, again = rows + len(block), max(0, again - len(block))
         kept, missing = how.columns.kept(block)
         lines, left_out = lines + kept, left_out + missing
+        while cut := how.correction(lines):
+            before, lines = lines[:cut], lines[cut:]
+            yield how.piece(before, left_out, rows=rows - len(lines), again=len(lines), last=False, all_of=True)
+            left_out = 0
         if last or len(lines) == how.rows:
             piece = how.piece(lines, left_out, rows=rows, again=again, last=last)
             yield piece

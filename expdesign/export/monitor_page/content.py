@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from expdesign.export.files import finite, strict_json
 from expdesign.export.roll_words import change_words, stability_words
@@ -88,6 +89,8 @@ SHOWN_CALLS = 5
 CLEAR_LOAD = 2.0
 """Standard errors from which a change of the load is reported."""
 MUCH_LEFT_OUT, HALF = 0.05, 0.5
+MOST_NAMES = 3
+"""Largest number of changes that a sentence names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,7 +154,9 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
     rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
     left_out = state.left_out_s / max(state.judged_s + state.left_out_s, 1e-300)
-    if left_out > HALF:
+    if left_out > HALF and state.shoal_s > HALF * state.left_out_s:
+        yield _shoal(content)
+    elif left_out > HALF:
         unlike = f"Most of the data, {percent(left_out)}, differ from the reference in a way that no change explains"
         unknown = "" if found else " Whether it is the same ship is not known: try expdesign diagnose."
         yield f"{unlike} that is watched for.{unknown}"
@@ -162,6 +167,10 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
     if found:
         yield f"Alarms are raised {rate}. For the cause, give the rows since the change to expdesign diagnose."
     yield from _passed(content)
+    yield from _beyond(content)
+    if state.shoal_s and not (left_out > HALF and state.shoal_s > HALF * state.left_out_s):
+        yield _shoal(content)
+    left_out -= state.shoal_s / max(state.judged_s + state.left_out_s, 1e-300)
     if MUCH_LEFT_OUT < left_out <= HALF:
         yield (
             f"{percent(left_out)} of the data were not judged: their error is beyond what the reference shows and "
@@ -207,17 +216,48 @@ def _passed(content: MonitorContent) -> Iterator[str]:
         yield f"The threshold was passed without an alarm: {', '.join(told)}."
 
 
+def _shoal(content: MonitorContent) -> str:
+    """Water shallower than in the reference, where another drag and inertia are no change of the ship."""
+    state, limit = content.state, content.calibration.shoal_limit
+    return (
+        f"{hours(state.shoal_s)} were not judged: the measured depth_m is less than in the reference, draught over "
+        f"depth up to {state.shoalest:.2f} beyond {limit:.2f}. Drag and inertia grow in shallow water, which the model "
+        "does not know: give it terms that read the depth, or a reference in such water."
+    )
+
+
+def _beyond(content: MonitorContent) -> Iterator[str]:
+    """Changes that were not judged for a while, as the weather that looks like them was beyond the reference."""
+    state, watched = content.state, content.calibration.watched
+    share = state.beyond_of_s / max(state.judged_s, 1e-300)
+    out = np.flatnonzero(watched & (share > MUCH_LEFT_OUT)).tolist()
+    if out and not content.found:
+        names = few([content.changes[number].words for number in out])
+        yield (
+            f"In up to {percent(float(share[out].max()))} of the judged time the weather was beyond the reference for "
+            f"{names}: there only the others were judged fully."
+        )
+
+
+def few(names: Sequence[str]) -> str:
+    """Names in words, of many the first and how many more there are."""
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
+
+
 def _call(content: MonitorContent, call: Call) -> str:
     clear = np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE)
     text = f"A port call until {when(call.time_s)} took {hours(call.stay_s)}. "
     if not clear.any():
         return text + "The ship carries the same load afterwards, as far as the data show."
+    clearest = np.argsort(-np.abs(call.value) / np.maximum(call.std, 1e-300))
     parts = [
-        f"{change.words} {change.in_words(value * change.size, std * change.size)}"
-        for change, value, std, known in zip(content.changes, call.value, call.std, clear, strict=True)
-        if known
+        f"{change.words} {change.in_words(call.value[i] * change.size, call.std[i] * change.size)}"
+        for i, change in ((i, content.changes[i]) for i in clearest.tolist())
+        if clear[i]
     ]
-    return text + f"The ship carries another load afterwards, which raises no alarm: {', '.join(parts)}."
+    return text + f"The ship carries another load afterwards, which raises no alarm: {few(parts)}."
 
 
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
@@ -228,23 +268,50 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
         f"The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
     )
     if alarm.as_likely:
-        others = ", ".join(content.changes[number].words for number in alarm.as_likely)
+        others = few([content.changes[number].words for number in alarm.as_likely])
         text += f" The data are explained as well by: {others}."
     if alarm.unexplained > content.limit:
-        text += " More than this one change is needed to explain them."
+        text += (
+            " More than this one change is needed to explain them: one cause may change several parameters at once, as "
+            "another load, shallow water and weather beyond the reference do."
+        )
     if not alarm.settled:
         text += " The size is not yet settled."
     return text
 
 
+def known_std(calibration: Calibration) -> Array:
+    """(m,) standard errors of the baseline, with the correlation of neighbouring stretches."""
+    return np.asarray(calibration.baseline_std * np.sqrt(calibration.inflation))
+
+
+def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
+    """(m,) differences of the ship from its file in the reference that are clear enough to be said."""
+    size = np.abs(calibration.baseline)
+    return np.asarray((size > CLEAR * known_std(calibration)) & (size > LARGE))
+
+
 def _baseline(content: MonitorContent) -> Iterator[str]:
     c = content.calibration
-    clear = (np.abs(c.baseline) > CLEAR * c.baseline_std) & (np.abs(c.baseline) > LARGE)
-    off = [(i, content.changes[i]) for i in np.flatnonzero(clear).tolist()]
+    off = [(i, content.changes[i]) for i in np.flatnonzero(said_of_reference(c)).tolist()]
     if off:
-        sizes = [(change, c.baseline[i] * change.size, c.baseline_std[i] * change.size) for i, change in off]
-        parts = ", ".join(f"{change.words} {change.in_words(value, std)}" for change, value, std in sizes)
-        yield f"Already in the reference the ship differs from its file: {parts}. Changes are counted from there."
+        std = known_std(c)
+        off.sort(key=lambda one: -abs(c.baseline[one[0]]) / std[one[0]])
+        parts = [
+            f"{change.words} {change.in_words(c.baseline[i] * change.size, std[i] * change.size)}" for i, change in off
+        ]
+        at_once = (
+            ""
+            if len(off) <= MOST_NAMES
+            else (
+                " So many at once have one cause rather than many: another load than the file's, shallow water, or an "
+                "input that is measured wrongly; expdesign diagnose tells them apart."
+            )
+        )
+        yield (
+            f"Already in the reference the ship differs from its file: {few(parts)}. Changes are counted from "
+            f"there.{at_once}"
+        )
 
 
 def alike(content: MonitorContent, number: int) -> list[str]:

@@ -32,6 +32,7 @@ from expdesign.monitoring import (
     restored_alarm,
     restored_calibration,
     restored_changes,
+    restored_noise,
     restored_roll,
     restored_state,
     saved,
@@ -50,8 +51,8 @@ from expdesign.workflows.data.watching import (
     Watching,
     after_reading,
     calibrated,
+    known_of,
     rules_of,
-    shift_of,
     with_piece,
     with_reference,
 )
@@ -67,6 +68,7 @@ def restored_watch(table: Mapping[str, Any]) -> Watch:
     """
     return Watch(
         changes=restored_changes(table["changes"]),
+        noise=restored_noise(table["noise"]),
         reading=_reading(table["reading"]),
         phase=_phase(table["phase"]),
         roll=restored_roll(table["roll"]),
@@ -114,7 +116,7 @@ WRITTEN_EVERY_S = 20.0
 """Time between writing files, from which a watch that is ended by force goes on [s]."""
 USUAL = {
     "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
-    "--port-h": 6.0, "--velocity": "auto", "--model": VESSEL,
+    "--port-h": 1.0, "--velocity": "auto", "--model": VESSEL,
 }  # fmt: skip
 
 
@@ -128,7 +130,7 @@ def monitor(
     false_alarm_days: float = 30.0,
     size: float = TUNING.relative_size,
     every_s: float = 3600.0,
-    port_h: float = 6.0,
+    port_h: float = 1.0,
     velocity: str = "auto",
     model: str = VESSEL,
     resume: bool = False,
@@ -206,7 +208,7 @@ def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: b
         source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows, unread=asked.unread,
         before=now.reading.pending, more_follow=more_follow, taken=now.reading.taken,
     )  # fmt: skip
-    tasks = ((piece, (piece.text, piece.time_s, now.changes, shift_of(now))) for piece in cut)
+    tasks = ((piece, (piece.text, piece.time_s, known_of(now))) for piece in cut)
     for piece, read in ahead(prepared, (asked,), tasks):
         now = with_piece(now, piece, read, asked)
         done += len(piece.text)
@@ -255,7 +257,7 @@ def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progres
             unread=asked.unread,
         ):
             progress(f"reading the reference, {source.name}", 0.0)
-            read = prepared(asked, piece.text, piece.time_s, now.changes, shift_of(now))
+            read = prepared(asked, piece.text, piece.time_s, known_of(now))
             now = after_reading(now, piece, read)
             now = with_reference(now, piece, read, asked) if isinstance(read, Read) else now
     if not reference:

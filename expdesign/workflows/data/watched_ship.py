@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import FileError, InputError
 from expdesign.kinematics import in_stated_time
-from expdesign.monitoring import Change, Grams, grams_of, stretch_length, watched_changes
+from expdesign.monitoring import WHITE, Change, Grams, Noise, grams_of, noise_of, stretch_length, watched_changes
 from expdesign.monitoring.yaw import (
     KEY,
     YAW_MODELS,
@@ -80,12 +80,12 @@ def ship_and_changes(
 
 
 def ship_grams(
-    ship: Ship, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float
+    ship: Ship, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float, noise: Noise
 ) -> Grams:
     """Inner products of all stretches of a record."""
     if isinstance(ship, YawShip):
         return yaw_grams(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s)
-    return grams_of(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s)
+    return grams_of(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, noise=noise)
 
 
 # Pieces of operational data as records with their inner products, which processes may prepare ahead of the watch.
@@ -120,20 +120,33 @@ class Asked:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Known:
+    """What inner products are for."""
+
+    changes: tuple[Change, ...] = ()  # watched for; none where they follow from the piece
+    shift: Array = field(default_factory=lambda: np.zeros(0))  # (m,) by which the ship has changed, in their sizes
+    noise: Noise = WHITE  # within stretches
+
+    def same(self, other: Known) -> bool:
+        """Whether the inner products are the same."""
+        return (
+            self.changes == other.changes and np.array_equal(self.shift, other.shift) and self.noise.same(other.noise)
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Read:
     """A piece of the data as a record."""
 
     record: Record  # of the piece
     begins_s: tuple[float, ...]  # time at which each batch begins, in the clock of the file [s]
     grams: Grams  # inner products, linearised at the ship with some changes; times in the clock of the file
-    changes: tuple[Change, ...]  # watched for; shift: (m,) by which the ship was changed, in their sizes
-    shift: Array
+    known: Known  # what they are for
     notes: tuple[str, ...]  # on the ship
 
-    def at(self, changes: tuple[Change, ...], shift: Array, asked: Asked, *, offset_s: float) -> Grams:
-        """Inner products, linearised at the ship with changes (m,), with times that are later."""
-        same = changes == self.changes and np.array_equal(shift, self.shift)
-        grams = self.grams if same else _linearised(self.record, self.begins_s, changes, shift, asked)[0]
+    def at(self, known: Known, asked: Asked, *, offset_s: float) -> Grams:
+        """Inner products for what is known, with times that are later."""
+        grams = self.grams if known.same(self.known) else _linearised(self.record, self.begins_s, known, asked)[0]
         return replace(grams, time_s=grams.time_s + offset_s)
 
 
@@ -145,15 +158,14 @@ class Unread:
     problem: str
 
 
-def prepared(asked: Asked, text: str, time_s: Array, changes: tuple[Change, ...], shift: Array) -> Read | Unread | None:
+def prepared(asked: Asked, text: str, time_s: Array, known: Known) -> Read | Unread | None:
     """A piece of the data, ready to be judged; None where it has no rows.
 
     Args:
         asked: of the command.
         text: header and rows.
         time_s: (k,) of the rows [s].
-        changes: watched for; none where they follow from this piece.
-        shift: (m,) by which the ship is known to have changed.
+        known: of the ship.
     """
     if len(time_s) < FEWEST_LINES:
         return None
@@ -164,25 +176,33 @@ def prepared(asked: Asked, text: str, time_s: Array, changes: tuple[Change, ...]
     except FileError as error:
         return Unread(error.key, error.problem)
     begins = tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
-    grams, changes, shift, notes = _linearised(record, begins, changes, shift, asked)
-    return Read(record=record, begins_s=begins, grams=grams, changes=changes, shift=shift, notes=notes)
+    grams, known, notes = _linearised(record, begins, known, asked)
+    return Read(record=record, begins_s=begins, grams=grams, known=known, notes=notes)
 
 
 def _linearised(
-    record: Record, begins_s: Sequence[float], known: tuple[Change, ...], shift: Array, asked: Asked
-) -> tuple[Grams, tuple[Change, ...], Array, tuple[str, ...]]:
-    """Inner products with the changes and the shift (m,) they are for, and notes on the ship.
+    record: Record, begins_s: Sequence[float], known: Known, asked: Asked
+) -> tuple[Grams, Known, tuple[str, ...]]:
+    """Inner products with what they are for, and notes on the ship.
 
-    Where no changes are known, those of the ship of this record.
+    Where no changes are known, those of the ship of this record, and its noise. Where another noise is clear in the
+    record, as in another sea, that is the one of the inner products.
     """
     ship, changes, notes = ship_and_changes(
-        asked.model, asked.vessel, record, known, size=asked.size, stretch_s=asked.stretch_s
+        asked.model, asked.vessel, record, known.changes, size=asked.size, stretch_s=asked.stretch_s
     )
-    shift = shift if known else np.zeros(len(changes))
+    first, noise = not known.changes, known.noise
+    if not isinstance(ship, YawShip):
+        before = None if first else known.noise
+        noise = noise_of(ship, record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, known=before)
+    if first:
+        known = Known(changes=changes, shift=np.zeros(len(changes)), noise=noise)
     effects = {
         change.effect: ship.get(change.effect) + change.size * value
-        for change, value in zip(changes, shift.tolist(), strict=True)
+        for change, value in zip(changes, known.shift.tolist(), strict=True)
         if value
     }
-    found = ship_grams(ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s)
-    return found, changes, shift, notes
+    found = ship_grams(
+        ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, noise=noise
+    )
+    return found, known, notes

@@ -12,10 +12,12 @@ from expdesign.errors import FileError, NotInformative
 from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
     TUNING,
+    WHITE,
     Alarm,
     Calibration,
     Change,
     Grams,
+    Noise,
     RollWatch,
     Rules,
     State,
@@ -31,12 +33,13 @@ from expdesign.records import STREAM, Piece, Taken
 from expdesign.roll import Run
 from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
 from expdesign.signals import Record
-from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.watched_ship import PIECE, Asked, Read, Unread
+from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
 """Time from the end of a file to the beginning of the next, where its times begin again [s]."""
+CORRECTION_S = 120.0
+"""Time by which a clock that is put back is taken to have been corrected [s]."""
 MOST_SAVED_ROWS = 7200
 """Largest number of rows saved since a change, for a diagnosis."""
 MOST_MOMENTS = 1000
@@ -108,6 +111,7 @@ class Watch:
     """Everything that goes on from piece to piece."""
 
     changes: tuple[Change, ...] = ()  # watched for; none before the first piece
+    noise: Noise = WHITE  # within stretches, as the first piece shows
     reading: Reading = Reading()  # how far the data have been read
     phase: Learning | Ready | Watching = Learning()  # what is known of the ship
     roll: RollWatch = field(default_factory=RollWatch)  # what is known of its roll
@@ -132,13 +136,18 @@ def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch
         return replace(now, reading=reading)
     remarks = [text.replace(PIECE, piece.source.name) for text in read.record.notes]
     reading = replace(reading.noted(*remarks, *read.notes), now_s=float(piece.time_s[-1]) + reading.offset_s)
-    return replace(now, changes=now.changes or read.changes, reading=reading)
+    known = known_of(now) if now.changes else read.known
+    return replace(now, changes=known.changes, noise=known.noise, reading=reading)
 
 
 def _continued(reading: Reading, piece: Piece) -> Reading:
     """The reading with times that go on where those of the piece begin again."""
-    if not piece.time_s[0] + reading.offset_s <= reading.now_s:
+    back_s = reading.now_s - float(piece.time_s[0]) - reading.offset_s
+    if not back_s >= 0.0:
         return reading
+    if back_s < CORRECTION_S and any(taken.continues(piece.taken) for taken in reading.taken):
+        note = f"{piece.source.name}: its clock was put back by {back_s:.0f} s or so; it is taken to go on"
+        return replace(reading.noted(note), offset_s=reading.offset_s + back_s + float(np.diff(piece.time_s[:2]).sum()))
     note = f"{piece.source.name}: its times begin again; it is taken as an hour after the data before"
     offset_s = reading.now_s + BETWEEN_FILES_S - float(piece.time_s[0])
     return replace(reading.noted(note), offset_s=offset_s)
@@ -202,7 +211,7 @@ def with_reference(now: Watch, piece: Piece, read: Read, asked: Asked) -> Watch:
     learning = now.phase
     if (runs := roll_runs(read.record, asked.vessel)) is not None:
         now = replace(now, roll=roll_learnt(now.roll, asked.vessel, runs))
-    grams = read.at(now.changes, np.zeros(len(now.changes)), asked, offset_s=now.reading.offset_s)
+    grams = read.at(known_of(now), asked, offset_s=now.reading.offset_s)
     lines = (*(learning.lines or (piece.header,)), *piece.lines) if piece.source == STREAM else ()
     return replace(now, phase=Learning(learnt=(*learning.learnt, grams), lines=lines))
 
@@ -241,7 +250,7 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     """Watch the stretches of a piece that begin at a time or later."""
     assert not isinstance(now.phase, Learning)
     calibration, offset_s = now.phase.calibration, now.reading.offset_s
-    grams = read.at(now.changes, shift_of(now), asked, offset_s=offset_s)
+    grams = read.at(known_of(now), asked, offset_s=offset_s)
     first, hour = int(np.searchsorted(grams.time_s, first_s)), round(HOUR / calibration.stretch_s)
     if first == len(grams):
         return now
@@ -253,14 +262,15 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
         raised += more
         first += used
         if on.state.shift is not before.shift and first < len(grams):
-            grams = read.at(now.changes, on.state.shift, asked, offset_s=offset_s)
+            grams = read.at(replace(known_of(now), shift=on.state.shift), asked, offset_s=offset_s)
     changed = _changed(on, piece, raised, offset_s)[: MOST_SAVED_ROWS + 1]
     return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed))
 
 
-def shift_of(now: Watch) -> Array:
-    """(m,) known changes of the ship, in sizes."""
-    return now.phase.state.shift if isinstance(now.phase, Watching) else np.zeros(len(now.changes))
+def known_of(now: Watch) -> Known:
+    """What inner products of the next piece are for."""
+    shift = now.phase.state.shift if isinstance(now.phase, Watching) else np.zeros(len(now.changes))
+    return Known(changes=now.changes, shift=shift, noise=now.noise)
 
 
 def _begun(ready: Ready, time_s: float) -> Watching:

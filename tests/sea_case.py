@@ -1,0 +1,215 @@
+"""Voyages of a ship under a heading autopilot in a slight sea, for the tests of monitoring.
+
+The motion is integrated here, by no code of the project, for many voyages at once. Waves move the ship about her slow
+motion (T. I. Fossen, Handbook of Marine Craft Hydrodynamics (2021), chapter 10), sensors feel both, and the autopilot
+answers what the sensors feel, so that the rudder is correlated with waves and noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+HOUR = 3600
+INSIDE = 2  # steps of the integration in a second
+VALUES = {
+    "X_uu": -0.004, "X_nn": 0.008, "X_vr": 1.2, "Y_uv": -0.02, "Y_ur": -0.3, "N_ur": -0.02, "N_ud": 0.0005,
+}  # fmt: skip
+EXPRESSIONS = {
+    "X_uu": "abs(u)*u", "X_nn": "abs(n1)*n1", "X_vr": "v*r", "Y_uv": "abs(u)*v", "Y_ur": "u*r", "N_ur": "abs(u)*r",
+    "N_ud": "abs(u)*u*sin(rudder1)",
+}  # fmt: skip
+NAMES = ("time_s", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps", "n1_rps", "rudder1_rad")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ship:
+    """In what a ship and her sensors differ from the file of `vessel_file`."""
+
+    thrust: float = 1.0
+    drag: float = 1.0
+    mass: float = 1.0  # and inertia in yaw
+    rudder_rad: float = 0.0  # by which the rudder stands beside what is measured
+    gyro: float = 1.0  # scale of the yaw rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sea:
+    """Waves, slow forces and noise, as standard deviations."""
+
+    wave_radps: float = np.deg2rad(0.1)  # yaw rate by waves; those of sway and surge go with it
+    wave_mps: float = 0.08
+    period_s: float = 7.0
+    gyro_radps: float = np.deg2rad(0.046)
+    surge_mps2: float = 2e-3  # slow forces, with a correlation time of ten minutes
+    yaw_radps2: float = 2e-5
+    pushed_s: float = 0.0  # correlation time of a force in yaw that moves her by `wave_radps`; zero for waves as above
+
+
+CALM = Sea(wave_radps=0.0, wave_mps=0.0)
+CASES = {
+    "unchanged": Ship(),
+    "thrust - 8 %": Ship(thrust=0.92),
+    "drag + 15 %": Ship(drag=1.15),
+    "rudder + 2 degrees": Ship(rudder_rad=np.deg2rad(2.0)),
+    "yaw rate times 0.97": Ship(gyro=0.97),
+    "mass + 12 %": Ship(mass=1.12),
+}
+
+
+def sailed(
+    ships: Sequence[Ship], seconds: int, *, seeds: Sequence[int], sea: Sea = Sea(), since_s: int = 0
+) -> np.ndarray:
+    """(voyages, seconds, 9) measured columns `NAMES` of voyages at 1 Hz.
+
+    Args:
+        ships: of each voyage, as they are from `since_s` on.
+        seconds: of a voyage.
+        seeds: of each voyage.
+        sea: of all.
+        since_s: until then each is as in the file [s].
+    """
+    drawn = [_drawn(seconds, np.random.default_rng(seed), sea) for seed in seeds]
+    wanted, speed, waves, slow, noise = (np.stack(part, axis=-1) for part in zip(*drawn, strict=True))
+    later = {name: np.array([getattr(ship, name) for ship in ships]) for name in vars(ships[0])}
+    before = {name: np.full(len(ships), value) for name, value in vars(Ship()).items()}
+    v, table = len(ships), np.empty((seconds, len(NAMES), len(ships)))
+    state = np.zeros((6, v))  # u, v, r, north, east, heading
+    state[0] = 4.0
+    rudder, felt, n = np.zeros(v), np.zeros((2, v)), speed[0]
+    for second in range(seconds):
+        ship = later if second >= since_s else before
+        moved = waves[second]  # of surge, sway, yaw rate and heading
+        told = state[[3, 4, 5, 0, 1, 2]].copy()
+        told[2:] += moved[[3, 0, 1, 2]]
+        told[5] *= ship["gyro"]
+        told += noise[second]
+        felt = told[[2, 5]]
+        turn = np.clip(wanted[second] - felt[0], -0.5, 0.5)
+        order = np.clip(0.8 * turn - 5.0 * felt[1], -0.5, 0.5)
+        begun = rudder
+        rudder = rudder + np.clip(order - rudder, -0.05, 0.05)
+        n = n + np.clip(speed[second] - n, -0.05, 0.05)
+        table[second] = np.stack([np.full(v, float(second)), *told, n, (begun + rudder) / 2])
+        for part in range(INSIDE):
+            angle = begun + (rudder - begun) * (part + 0.5) / INSIDE + ship["rudder_rad"]
+            state = _stepped(state, angle, n, slow[second], ship, 1.0 / INSIDE)
+    return np.moveaxis(table, 2, 0)
+
+
+def _drawn(seconds: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray, ...]:
+    """Set points of heading (s,) and speed of the propeller (s,), waves (s, 4), slow forces (s, 3), noise (s, 6)."""
+    wanted, speed = np.zeros(seconds), np.zeros(seconds)
+    heading = rng.uniform(-np.pi, np.pi)
+    for points in (wanted, speed):
+        second = 0
+        while second < seconds:
+            held = int(rng.uniform(300, 1200))
+            if points is wanted:
+                heading = heading + rng.choice([-1, 1]) * rng.uniform(0.2, 1.0)
+            points[second : second + held] = heading if points is wanted else rng.choice([2.4, 2.7, 3.0, 3.2])
+            second += held
+    wanted -= wanted[0]
+    waves = np.stack([_wave(seconds, rng, sea.period_s) for _ in range(3)], axis=-1)
+    waves *= np.array([0.5 * sea.wave_mps, sea.wave_mps, sea.wave_radps * (not sea.pushed_s)])
+    waves = np.concatenate([waves, np.cumsum(waves[:, 2:], axis=0)], axis=1)
+    waves[:, 3] -= np.convolve(waves[:, 3], np.full(61, 1 / 61), mode="same")
+    slow = np.stack([_slow(seconds, rng) for _ in range(3)], axis=-1)
+    slow *= np.array([sea.surge_mps2, 0.5 * sea.surge_mps2, sea.yaw_radps2])
+    if sea.pushed_s:
+        # acceleration for which a ship with damping N_ur u has this yaw rate, were there no autopilot
+        damping = -VALUES["N_ur"] * 4.0
+        slow[:, 2] += (
+            _slow(seconds, rng, sea.pushed_s) * sea.wave_radps * np.sqrt(damping * (damping + 1.0 / sea.pushed_s))
+        )
+    noise = rng.standard_normal((seconds, 6)) * np.array([0.3, 0.3, 0.003, 0.02, 0.02, sea.gyro_radps])
+    return wanted, speed, waves, slow, noise
+
+
+def _wave(seconds: int, rng: np.random.Generator, period_s: float) -> np.ndarray:
+    """(s,) a narrow-banded motion of standard deviation one: many waves of periods about one."""
+    rates = 2 * np.pi / period_s * rng.normal(1.0, 0.12, 60)
+    phases, time = rng.uniform(0, 2 * np.pi, 60), np.arange(seconds)
+    sizes = rng.rayleigh(1.0, 60)
+    motion = sum(a * np.cos(w * time + p) for a, w, p in zip(sizes, rates, phases, strict=True))
+    return np.asarray(motion / np.sqrt((sizes**2).sum() / 2))
+
+
+def _slow(seconds: int, rng: np.random.Generator, time_s: float = 600.0) -> np.ndarray:
+    """(s,) a first-order process of standard deviation one."""
+    keep, value, values = np.exp(-1.0 / time_s), rng.standard_normal(), np.empty(seconds)
+    for second, fresh in enumerate(np.sqrt(1 - keep**2) * rng.standard_normal(seconds)):
+        values[second] = value = keep * value + fresh
+    return values
+
+
+def _stepped(
+    state: np.ndarray, angle: np.ndarray, n: np.ndarray, slow: np.ndarray, ship: dict[str, np.ndarray], h: float
+) -> np.ndarray:
+    """The state after a step, by Heun's method."""
+    first = _rates(state, angle, n, slow, ship)
+    return np.asarray(state + h / 2 * (first + _rates(state + h * first, angle, n, slow, ship)))
+
+
+def _rates(
+    state: np.ndarray, angle: np.ndarray, n: np.ndarray, slow: np.ndarray, ship: dict[str, np.ndarray]
+) -> np.ndarray:
+    u, v, r, _, _, heading = state
+    k = VALUES
+    push = k["X_nn"] * ship["thrust"] * np.abs(n) * n
+    return np.stack(
+        [
+            (k["X_uu"] * ship["drag"] * np.abs(u) * u + push) / ship["mass"] + k["X_vr"] * v * r + slow[0],
+            k["Y_uv"] * np.abs(u) * v / ship["mass"] + k["Y_ur"] * u * r + slow[1],
+            (k["N_ur"] * np.abs(u) * r + k["N_ud"] * np.abs(u) * u * np.sin(angle)) / ship["mass"] + slow[2],
+            u * np.cos(heading) - v * np.sin(heading),
+            u * np.sin(heading) + v * np.cos(heading),
+            r,
+        ]
+    )
+
+
+def written(path: Path, table: np.ndarray, *, begin_s: float = 0.0) -> Path:
+    """A voyage (s, 9) as a file."""
+    told = table.copy()
+    told[:, 0] += begin_s
+    told[:, 3] = np.mod(told[:, 3] + np.pi, 2 * np.pi) - np.pi
+    np.savetxt(path, told, delimiter=",", header=",".join(NAMES), comments="", fmt="%.6g")
+    return path
+
+
+def vessel_file(path: Path) -> Path:
+    """The ship as known, 50 m long."""
+    text = """[vessel]
+name = "patrol-50m"
+length_m = 50.0
+beam_m = 9.0
+draught_m = 3.0
+sample_time_s = 1.0
+[[actuators]]
+kind = "propeller"
+forward_m = -23.0
+speed_min_rps = -3.0
+speed_max_rps = 4.0
+speed_rate_rps2 = 0.5
+[[actuators]]
+kind = "rudder"
+forward_m = -24.0
+angle_min_rad = -0.6109
+angle_max_rad = 0.6109
+angle_rate_radps = 0.05
+[model]
+structure = "custom"
+form = "continuous"
+"""
+    for name, expression in EXPRESSIONS.items():
+        equation = {"X": "u", "Y": "v", "N": "r"}[name[0]]
+        text += f'[[model.terms]]\nequation = "{equation}"\nname = "{name}"\nexpression = "{expression}"\n'
+    text += "[model.parameters]\n" + "".join(f"{name} = {value}\n" for name, value in VALUES.items())
+    text += "[model.parameter_std]\n" + "".join(f"{name} = {0.1 * abs(value)}\n" for name, value in VALUES.items())
+    text += "[sensors]\nposition_m = 0.3\nheading_rad = 0.003\nvelocity_mps = 0.02\nyaw_rate_radps = 0.0008\n"
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,178 @@
+"""Monitoring on autopilot in a slight sea: nothing false of an unchanged ship, and surge is watched whatever yaw does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign.cli import main
+from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.monitoring import (
+    WHITE,
+    Alarm,
+    Calibration,
+    Noise,
+    Rules,
+    State,
+    calibrate,
+    grams_of,
+    noise_of,
+    stretch_length,
+    threshold,
+    watch,
+    watched_changes,
+)
+from expdesign.monitoring.noise import whitened
+from expdesign.scenario import load_vessel
+from expdesign.signals import Batch, Record
+from expdesign.vessel import Vessel
+from sea_case import CALM, CASES, HOUR, Sea, Ship, sailed, vessel_file, written
+
+PUSHED = Sea(pushed_s=5.0)
+STEPS = 14
+
+
+@pytest.fixture(scope="module")
+def vessel(tmp_path_factory: pytest.TempPathFactory) -> Vessel:
+    return load_vessel(vessel_file(tmp_path_factory.mktemp("ship") / "vessel.toml"))
+
+
+def as_record(vessel: Vessel, table: np.ndarray) -> Record:
+    batch = Batch(
+        name="voyage", sample_time_s=1.0, input_names=vessel.model.inputs, inputs=table[:, 7:9],
+        velocity=table[:, 4:7], pose=table[:, 1:4],
+    )  # fmt: skip
+    return Record(batches=(batch,), notes=())
+
+
+def stretches(vessel: Vessel, table: np.ndarray, *, known: Noise | None = None, noise: Noise | None = None):
+    """Changes that are watched for, the noise and the inner products of a voyage."""
+    record = as_record(vessel, table)
+    ship = extended_model(vessel, record)
+    changes, words = watched_changes(ship), {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)}
+    noise = noise_of(ship, record, changes, known=known, **words) if noise is None else noise
+    return changes, noise, grams_of(ship, record, changes, noise=noise, **words)
+
+
+@pytest.fixture(scope="module")
+def known(vessel: Vessel) -> tuple[Noise, Calibration]:
+    """Of four hours in which waves push the ship in yaw."""
+    _, noise, grams = stretches(vessel, sailed([Ship()], 4 * HOUR, seeds=[5000], sea=PUSHED)[0])
+    return noise, calibrate(grams)
+
+
+def alarms_of(vessel: Vessel, known: tuple[Noise, Calibration], table: np.ndarray) -> tuple[State, list[str]]:
+    """The state up to the first change that is settled, and the effects that were named."""
+    changes, _, grams = stretches(vessel, table, known=known[0])
+    rules = Rules(limit=threshold(int(known[1].watched.sum()), 30 * 24 * HOUR / grams.stretch_s))
+    state, alarms, _, _ = watch(known[1], State.begun(known[1], time_s=0.0), grams, rules=rules)
+    found: list[Alarm] = [*alarms, *([] if state.alarm is None else [state.alarm])]
+    return state, [changes[found[-1].change].effect] if found else []
+
+
+def test_the_filtered_columns_have_the_inner_products_of_generalised_least_squares() -> None:
+    rng = np.random.default_rng(0)
+    noise = Noise(
+        std=np.array([0.3, 0.4, 0.5, 0.7]), pushes=np.array([0.2, 0.1, 0.3]), waves=np.array([0.5, 0.0, 0.4]),
+        period_s=6.0, kept=0.8,
+    )  # fmt: skip
+    transition = np.eye(3) * 0.8 + 0.1 * rng.standard_normal((1, STEPS - 1, 3, 3))
+    columns = rng.standard_normal((2, 1, STEPS, 4))
+    seen = rng.random((1, STEPS, 4)) < 0.8
+    columns = np.where(seen, columns, 0.0)
+    shown = np.zeros((4, 7))
+    shown[[0, 1, 2, 3], [0, 1, 2, 2]] = 1.0
+    shown[[0, 2, 3], [3, 5, 5]] = 1.0
+    fresh = np.diag([0.2, 0.1, 0.3, *[0.5 * (1 - 0.8**2)] * 2, *[0.4 * (1 - 0.8**2)] * 2])
+    before = np.diag([0.0, 0.0, 0.0, 0.5, 0.5, 0.4, 0.4])
+    over = np.zeros((STEPS * 7, STEPS * 7))  # covariance of the states at all steps
+    over[:7, :7] = before
+    for step in range(1, STEPS):
+        moving = np.zeros((7, 7))
+        moving[:3, :3] = transition[0, step - 1]
+        for own in (slice(3, 5), slice(5, 7)):
+            moving[own, own] = noise.wave_transition(1.0)
+        last, now = slice(7 * step - 7, 7 * step), slice(7 * step, 7 * step + 7)
+        over[now, : 7 * step] = moving @ over[last, : 7 * step]
+        over[: 7 * step, now] = over[now, : 7 * step].T
+        over[now, now] = moving @ over[last, last] @ moving.T + fresh
+    C = np.kron(np.eye(STEPS), shown)
+    R = (C @ over @ C.T + np.kron(np.eye(STEPS), np.diag(noise.std**2)))[np.ix_(seen.ravel(), seen.ravel())]
+    flat = columns.reshape(2, -1)[:, seen.ravel()]
+    told = (whitened(columns, seen, transition, noise, step_s=1.0) / noise.std).reshape(2, -1)
+    assert told @ told.T == pytest.approx(flat @ np.linalg.solve(R, flat.T))
+    assert whitened(columns, seen, transition, WHITE, step_s=1.0) is columns
+
+
+def test_the_noise_is_that_of_the_sea(vessel: Vessel) -> None:
+    voyages = [sailed([Ship()], 2 * HOUR, seeds=[3], sea=sea)[0] for sea in (CALM, Sea(), PUSHED)]
+    calm, waves, pushed = (stretches(vessel, table)[1] for table in voyages)
+    assert calm.white
+    assert calm.std[:3] == pytest.approx([0.02, 0.02, Sea().gyro_radps], rel=0.1)
+    assert not waves.pushes.any()
+    assert waves.period_s == pytest.approx(Sea().period_s, rel=0.1)
+    assert np.sqrt(waves.waves) == pytest.approx([0.04, 0.08, Sea().wave_radps], rel=0.25)
+    assert pushed.pushes[2] > 100 * pushed.pushes[:2].max() * 1e-6
+    assert np.sqrt(pushed.waves[2]) < 0.1 * Sea().wave_radps
+    again = stretches(vessel, voyages[1], known=waves)[1]
+    assert again is waves
+    assert stretches(vessel, voyages[2], known=waves)[1].pushes[2] > 0.0  # another sea is learnt anew
+
+
+def test_scores_of_an_unchanged_ship_are_unbiased_where_the_rudder_answers_the_sea(vessel: Vessel) -> None:
+    seeds, far = range(3), {True: [], False: []}
+    for table in sailed([Ship()] * len(seeds), 2 * HOUR, seeds=seeds, sea=PUSHED):
+        for modelled, values in far.items():
+            changes, _, grams = stretches(vessel, table, noise=None if modelled else WHITE)
+            told = calibrate(grams)
+            places = [k for k, change in enumerate(changes) if change.effect in ("theta:Y_ur", "inertia:r")]
+            values.append((told.baseline / told.baseline_std)[places])
+    bias = {modelled: np.abs(np.mean(values, axis=0)).max() for modelled, values in far.items()}
+    assert bias[True] < 3.0 / np.sqrt(len(seeds))
+    assert bias[False] > 3.0 / np.sqrt(len(seeds))
+
+
+def test_drag_is_found_within_an_hour_and_nothing_in_an_unchanged_ship(
+    vessel: Vessel, known: tuple[Noise, Calibration]
+) -> None:
+    ships = [Ship(), CASES["drag + 15 %"]]
+    same, changed = sailed(ships, 2 * HOUR, seeds=[6, 7], sea=PUSHED, since_s=HOUR)
+    assert alarms_of(vessel, known, same)[1] == []
+    assert alarms_of(vessel, known, changed)[1][0] in ("theta:X_uu", "theta:X_nn", "gain")
+
+
+def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
+    vessel: Vessel, known: tuple[Noise, Calibration]
+) -> None:
+    quick = Sea(pushed_s=5.0, wave_radps=np.deg2rad(0.25))
+    slow = Sea(pushed_s=5.0, yaw_radps2=3.0 * PUSHED.yaw_radps2)
+    found = 0
+    for sea, seed in ((quick, 8), (slow, 9), (slow, 10)):
+        (table,) = sailed([CASES["drag + 15 %"]], 2 * HOUR, seeds=[seed], sea=sea, since_s=HOUR)
+        state, names = alarms_of(vessel, known, table)
+        found += names[:1] in (["theta:X_uu"], ["theta:X_nn"], ["gain"])
+        assert state.left_out_s < 0.2 * state.judged_s
+    assert found == 3
+
+
+def test_shallower_water_than_the_references_is_told_and_not_judged(tmp_path: Path) -> None:
+    path = vessel_file(tmp_path / "vessel.toml")
+    deep, shoal = (
+        written(tmp_path / name, table)
+        for name, table in zip(
+            ("deep.csv", "shoal.csv"), sailed([Ship(), Ship(drag=1.4, mass=1.2)], 2 * HOUR, seeds=[1, 2]), strict=True
+        )
+    )
+    for file, depth in ((deep, 60.0), (shoal, 6.0)):
+        header, *rows = file.read_text().splitlines()
+        file.write_text("\n".join([f"{header},depth_m", *(f"{row},{depth}" for row in rows)]) + "\n")
+    words = ["monitor", str(shoal), "--reference", str(deep), "--vessel", str(path), "--out", str(tmp_path), "--quiet"]
+    assert main(words) == 0
+    told = json.loads((tmp_path / "monitor.json").read_text())
+    assert told["alarms"] == []
+    assert told["judged_h"] == 0.0
+    assert "the measured depth_m is less than in the reference, draught over depth up to 0.50" in told["verdict"][0]
+    assert not any("the ship is the one of the reference" in sentence for sentence in told["verdict"])
