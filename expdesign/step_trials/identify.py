@@ -11,7 +11,7 @@ from expdesign.errors import NotInformative
 from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
 from expdesign.step_trials.dead_times import samples_and_delays
-from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed
+from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed, throttle_sign
 from expdesign.step_trials.model import TwoDofModel
 from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, steady_from
@@ -46,6 +46,11 @@ class StepTrial:
     found: tuple[Comparison, ...]  # asymmetry and hysteresis
 
     @property
+    def ahead(self) -> float:
+        """+1, or -1 where a negative throttle drives ahead."""
+        return throttle_sign(self.batches)
+
+    @property
     def counted(self) -> tuple[StepSample, ...]:
         """Samples that give an inertia."""
         return tuple(one for one in self.samples if one.counts)
@@ -63,7 +68,9 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
         NotInformative: the record is no step trial, or has too few steps that count.
     """
     batches = tuple(sailed(batch, controls) for batch in record.batches)
-    sign = -1 if sum(float(batch.commands[:, 1] @ batch.state[:, 1]) for batch in batches) < 0 else 1
+    # sternway turns the rudder's effect round
+    turns = sum(float(batch.commands[:, 1] @ (batch.state[:, 1] * np.sign(batch.surge))) for batch in batches)
+    sign = -1 if turns < 0 else 1
     batches = tuple(replace(batch, commands=batch.commands * [1.0, sign]) for batch in batches)
     holds = holds_of(batches)
     tests = calibrated_tests(batches, holds, np.random.default_rng(seed))

@@ -34,6 +34,9 @@ LEAST_GROUP = 5  # samples of one command level among which outliers are sought
 PREFERRED = 10.0  # decrease of Akaike's criterion from which a second order response is preferred
 
 
+ASTERN = "astern, or begun from astern: left out, as the model is of a vessel that goes ahead"
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plateau:
     """Steady state of a hold."""
@@ -94,10 +97,9 @@ class StepSample:
 
     @property
     def upward(self) -> bool:
-        """Whether the command that changed became larger in size."""
+        """Whether the command that changed moved away from zero, on the side where it ends."""
         channel = self.hold.channel or 0
-        after = self.hold.commands[channel]
-        return abs(after) > abs(after - self.hold.change[channel])
+        return self.hold.commands[channel] * self.hold.change[channel] > 0
 
 
 Delays = tuple[tuple[float, float], tuple[float, float]]
@@ -114,7 +116,7 @@ def step_samples(
 ) -> tuple[StepSample, ...]:
     """A sample of every hold, with dead times between bounds."""
     plateaus = [
-        None if begin is None else plateau(batches[hold.batch], begin, hold.end)
+        None if begin is None or hold.astern else plateau(batches[hold.batch], begin, hold.end)
         for hold, begin in zip(holds, steady, strict=True)
     ]
     samples = []
@@ -173,6 +175,8 @@ def step_sample(
         plateau=after,
         before=None if hold.first else before,
     )
+    if hold.astern:
+        return replace(own, remarks=(ASTERN,))
     if after is None:
         return replace(own, problems=(f"not steady within {(hold.end - hold.begin) * batch.sample_time_s:.0f} s",))
     if hold.first or not hold.changed:

@@ -232,7 +232,9 @@ def calibrated_tests(
 
 def _calibrated(batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, rng: np.random.Generator) -> RatioTest:
     constants = [
-        rough for hold in holds if hold.channel == channel and (rough := _rough(batches[hold.batch], hold, holds))
+        rough
+        for hold in holds
+        if hold.channel == channel and not hold.astern and (rough := _rough(batches[hold.batch], hold, holds))
     ]
     if not constants:
         name, state = (("throttle", "speed"), ("rudder", "yaw rate"))[channel]
@@ -242,7 +244,7 @@ def _calibrated(batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, 
         )
     step_s = batches[0].sample_time_s
     memory_s = max(TUNING.memory_share * float(np.quantile(constants, 0.75)), LEAST_MEMORY_SAMPLES * step_s)
-    ends = [_end(batches[hold.batch], hold, channel) for hold in holds]
+    ends = [_end(batches[hold.batch], hold, channel) for hold in holds if not hold.astern]
     return calibrated(_steadiest(ends), sample_time_s=step_s, memory_s=memory_s, rng=rng)
 
 

@@ -20,6 +20,7 @@ SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported 
 
 REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
 STATES = ("speed", "yaw rate")
+STATE_UNITS = ("m/s", "rad/s")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,14 +90,18 @@ def unit_of(signal: str) -> str:
 
 def _sentences(content: StepTrialContent) -> Iterator[str]:
     trial = content.trial
-    asked = sum(one.hold.channel is not None for one in trial.samples)
-    steady = sum(one.plateau is not None for one in trial.samples)
+    ahead = [one for one in trial.samples if not one.hold.astern]
+    asked = sum(one.hold.channel is not None for one in ahead)
+    steady = sum(one.plateau is not None for one in ahead)
     turned = ", negative for turns to starboard; the model counts it the other way" * (trial.rudder_sign < 0)
     yield (
         f"{len(trial.counted)} of {counted(asked, 'step')} give an inertia; {steady} of "
-        f"{counted(len(trial.holds), 'hold')} were steady and give a damping. Throttle is {trial.controls.words[0]}, "
+        f"{counted(len(ahead), 'hold')} were steady and give a damping. Throttle is {trial.controls.words[0]}, "
         f"rudder {trial.controls.words[1]}{turned}."
     )
+    if len(ahead) < len(trial.samples):
+        numbers = ", ".join(str(one.hold.number) for one in trial.samples if one.hold.astern)
+        yield f"Left out: {numbers}, which go astern or begin from astern. The model is of a vessel that goes ahead."
     delays = [
         f"{name} {value:.2f} \N{PLUS-MINUS SIGN} {std:.2f} s"
         for name, (value, std) in zip(CHANNELS, trial.delays, strict=True)
@@ -128,6 +133,10 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
     for one in significant:
         size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
+        if one.kind == "hysteresis":
+            unit = STATE_UNITS[CHANNELS.index(one.command)]
+            what += f": {abs(one.state_difference):.3g} {unit} {'more' if one.state_difference > 0 else 'less'} after steps"
+            what += f" down, in {one.samples // 2} pairs, as if the {one.command} differed"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})

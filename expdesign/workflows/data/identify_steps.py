@@ -29,6 +29,7 @@ from expdesign.step_trials import (
     Controls,
     Sailed,
     StepTrial,
+    ahead_only,
     controls_of,
     fit_percent,
     nominal_vessel,
@@ -132,6 +133,7 @@ def _turned(batch: Sailed, trial: StepTrial) -> Sailed:
 
 
 def _validated(trial: StepTrial, batch: Sailed) -> Validated:
+    batch = ahead_only(batch, trial.ahead)
     every = max(1, round(SIMULATED_STEP_S / batch.sample_time_s))
     states, step_s = batch.state[::every], every * batch.sample_time_s
     simulated = trial.model.simulated(states[0], batch.commands[::every], sample_time_s=step_s)
