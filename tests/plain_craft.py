@@ -40,6 +40,8 @@ class Craft:
     play_rps: float = 0.0  # half the width
     # the speed rises by 2 m/s more about 10 rps, where the hull begins to plane, and turns take some of it
     hump: bool = False
+    # the hull begins to plane at so much more throttle, and goes on planing down to so much less
+    planing_play_rps: float = 0.0
     current_mps: float = 0.0  # to the north
     waves_mps: float = 0.06  # of the speed, with a correlation time of 1.5 s
     gusts_mps: float = 0.0  # that the hull follows with its own time constant
@@ -71,11 +73,11 @@ def _followed(target: np.ndarray, share: float) -> np.ndarray:
     return np.asarray(moved)
 
 
-def steady_speed(throttle: np.ndarray, rudder: np.ndarray, craft: Craft) -> np.ndarray:
+def steady_speed(throttle: np.ndarray, rudder: np.ndarray, craft: Craft, shift: np.ndarray | float = 0.0) -> np.ndarray:
     """Speed through the water [m/s] of a throttle [rps] and a rudder [rad]."""
     if not craft.hump:
         return SPEED_PER_RPS * throttle
-    rises = 2.0 / (1.0 + np.exp(-(np.abs(throttle) - 10.0) / 0.8)) * np.sign(throttle)
+    rises = 2.0 / (1.0 + np.exp(-(np.abs(throttle) - 10.0 - shift) / 0.8)) * np.sign(throttle)
     return (SPEED_PER_RPS * throttle + rises) * (1.0 - 0.8 * np.abs(rudder))
 
 
@@ -87,7 +89,8 @@ def sailed(seed: int, craft: Craft) -> dict[str, np.ndarray]:
     count, late = len(n), round(craft.delay_s / h)
     acting = [np.concatenate([np.repeat(column[:1], late), column])[:count] for column in (n, rudder)]
     gusts = _reddened(rng, count, craft.gusts_mps, CONSTANTS_S[0] / h) if craft.gusts_mps else np.zeros(count)
-    speed = _followed(steady_speed(_played(acting[0], craft.play_rps), acting[1], craft), h / CONSTANTS_S[0]) + gusts
+    shift = acting[0] - _played(acting[0], craft.planing_play_rps)
+    speed = _followed(steady_speed(_played(acting[0], craft.play_rps), acting[1], craft, shift), h / CONSTANTS_S[0]) + gusts
     speed += _reddened(rng, count, craft.waves_mps, 1.5 / h)
     rate = _followed(RATE_PER_RAD * acting[1] * np.sign(acting[0]), h / CONSTANTS_S[1])
     rate += _reddened(rng, count, 0.1 * craft.waves_mps, 1.5 / h)

@@ -79,13 +79,15 @@ class Sailed:
     # (k,) [rad]; when left out, the yaw rate summed up from an unknown heading
     heading: Array = field(default_factory=lambda: np.zeros(0))
     surge: Array = field(default_factory=lambda: np.zeros(0))  # (k,) u [m/s], negative astern; U when left out
+    compass: bool = False  # whether the heading was measured
+    current_covariance: Array = field(default_factory=lambda: np.zeros((2, 2)))  # of a steady current N, E [m2/s2]
 
     def __post_init__(self) -> None:
         if not len(self.heading):
             frozen_set(self, "heading", np.cumsum(self.state[:, 1]) * self.sample_time_s)
         if not len(self.surge):
             frozen_set(self, "surge", self.state[:, 0])
-        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k", surge="k")
+        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k", surge="k", current_covariance="2 2")
 
     @property
     def time_s(self) -> Array:
@@ -118,6 +120,7 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
         inputs=batch.inputs,
         heading=batch.pose[:, 2] if batch.pose is not None and known else np.zeros(0),
         surge=u,
+        compass=known,
     )
 
 

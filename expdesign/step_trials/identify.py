@@ -12,6 +12,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
 from expdesign.step_trials.dead_times import samples_and_delays
 from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed, throttle_sign
+from expdesign.step_trials.noise import Current, current_of, through_water
 from expdesign.step_trials.model import TwoDofModel
 from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, steady_from
@@ -44,6 +45,7 @@ class StepTrial:
     delays: Delays  # dead time of throttle and rudder with standard error [s]
     model: TwoDofModel  # with two degrees of freedom
     found: tuple[Comparison, ...]  # asymmetry and hysteresis
+    currents: tuple[Current | None, ...] = ()  # of each batch, that was taken off; None where none was clear
 
     @property
     def ahead(self) -> float:
@@ -73,6 +75,11 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
     sign = -1 if turns < 0 else 1
     batches = tuple(replace(batch, commands=batch.commands * [1.0, sign]) for batch in batches)
     holds = holds_of(batches)
+    currents = tuple(
+        current_of(batch, [one for one in holds if one.batch == place and not one.astern])
+        for place, batch in enumerate(batches)
+    )
+    batches = tuple(through_water(*pair) for pair in zip(batches, currents, strict=True))
     tests = calibrated_tests(batches, holds, np.random.default_rng(seed))
     steady = steady_from(batches, holds, tests)
     samples, delays = samples_and_delays(batches, holds, steady, progress=within(progress, 0.3, 1.0))
@@ -80,6 +87,7 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
     return StepTrial(
         batches=batches, holds=holds, controls=controls, rudder_sign=sign, tests=tests, samples=samples, delays=delays,
         model=_model(samples, delays), found=comparisons(samples),
+        currents=tuple(one if one is not None and one.clear else None for one in currents),
     )  # fmt: skip
 
 

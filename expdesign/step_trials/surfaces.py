@@ -168,7 +168,7 @@ LOW_ORDER = 3
 """Highest degree of the surface that is compared with."""
 LEAST_PAIRS = 2
 """Levels reached from both sides, from which hysteresis is judged."""
-REPEATED_SHARE = 0.01
+REPEATED_SHARE = 0.003
 """Of a steady state, within which it repeats itself from hour to hour whatever its standard error says."""
 
 
@@ -183,6 +183,7 @@ class Comparison:
     p_value: float  # of no difference
     samples: int  # plateaus compared
     state_difference: float = math.nan  # of hysteresis: down less up, in the state that the command drives; m/s, rad/s
+    at: tuple[float, float] | None = None  # commands of the pair that shows it; None for the mean of all pairs
 
 
 def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
@@ -195,6 +196,9 @@ def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
 def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Comparison | None:
     """Hysteresis: plateaus at the same commands, after steps up and after steps down, whatever the surface is between.
 
+    Hysteresis may be that of an actuator, alike at all levels, or of the flow, at some of them: the mean difference and the
+    largest one are both judged, and the clearer of the two is told.
+
     Differences are weighed by their standard errors. Where they do not even agree in sign and spread more than these,
     their own spread counts, as in a random-effects meta-analysis; where they agree it is by what hysteresis differs
     from level to level.
@@ -202,7 +206,7 @@ def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Compa
     Source: G. Knapp and J. Hartung, Statistics in Medicine 22 (2003), 2693-2710.
     """
     own = [(one, part) for one, part in steady if one.hold.channel == channel and np.isfinite(part.std).all()]
-    pairs = _pairs(own)
+    at, pairs = _pairs(own)
     if len(pairs) < LEAST_PAIRS:
         return None
     commands = np.array([one.hold.commands[channel] for one, _ in own])
@@ -219,9 +223,15 @@ def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Compa
     if spread > own_variance and np.ptp(np.sign(apart)):
         own_variance, freedom = spread, len(pairs) - 1.0
     std = math.sqrt(own_variance)
+    p_value, one = 2 * float(scipy.stats.t.sf(abs(mean) / std, freedom)), int(np.argmax(apart**2 / variance))
+    alone = 2 * float(scipy.stats.t.sf(abs(apart[one]) / math.sqrt(variance[one]), 2 * (TUNING.steady_blocks - 1)))
+    place = None
+    if alone * len(pairs) < p_value:
+        p_value, mean, std = alone * len(pairs), float(apart[one]), math.sqrt(variance[one])
+        place = at[one]
     return Comparison(
         kind="hysteresis", command=CHANNELS[channel], difference=mean / 2 / slope, std=std / 2 / slope,
-        p_value=2 * float(scipy.stats.t.sf(abs(mean) / std, freedom)), samples=2 * len(pairs), state_difference=mean,
+        p_value=min(1.0, 2 * p_value), samples=2 * len(pairs), state_difference=mean, at=place,
     )  # fmt: skip
 
 
@@ -231,20 +241,23 @@ def _level(one: StepSample, channel: int, own: Sequence[tuple[StepSample, Platea
     return round(one.hold.commands[channel] / max(TUNING.constant_share * float(np.ptp(values)), 1e-6))
 
 
-def _pairs(own: Sequence[tuple[StepSample, Plateau]]) -> list[tuple[float, float]]:
-    """State after steps down less that after steps up, away from zero, and its variance, at each pair of levels."""
+def _pairs(own: Sequence[tuple[StepSample, Plateau]]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Commands, and state after steps down less that after steps up, away from zero, with its variance, of each pair."""
     groups: dict[tuple[int, int], dict[bool, list[Plateau]]] = {}
+    places: dict[tuple[int, int], tuple[float, float]] = {}
     channel = (own[0][0].hold.channel or 0) if own else 0
     for one, part in own:
         key = _level(one, 0, own), _level(one, 1, own)
         groups.setdefault(key, {True: [], False: []})[one.upward].append(part)
-    found = []
-    for by in groups.values():
+        places.setdefault(key, one.hold.commands)
+    at, found = [], []
+    for key, by in groups.items():
         if by[True] and by[False]:
             up, down = (_joined(by[way], channel) for way in (True, False))
             variance = up[1] + down[1] + 2.0 * (REPEATED_SHARE * up[0]) ** 2
             found.append((float(np.sign(up[0])) * (down[0] - up[0]), variance))
-    return found
+            at.append(places[key])
+    return at, found
 
 
 def _joined(parts: Sequence[Plateau], channel: int) -> tuple[float, float]:

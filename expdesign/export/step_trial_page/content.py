@@ -136,7 +136,8 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
         if one.kind == "hysteresis":
             unit = STATE_UNITS[CHANNELS.index(one.command)]
             what += f": {abs(one.state_difference):.3g} {unit} {'more' if one.state_difference > 0 else 'less'} after steps"
-            what += f" down, in {one.samples // 2} pairs, as if the {one.command} differed"
+            where = "on average" if one.at is None else f"at throttle {_order(one.at[0])}, rudder {_order(one.at[1])}, most"
+            what += f" down {where} of {counted(one.samples // 2, 'pair')} of holds, as if the {one.command} differed"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})
