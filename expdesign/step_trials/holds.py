@@ -158,7 +158,7 @@ def holds_of(batches: Sequence[Sailed]) -> tuple[Hold, ...]:
     for index, batch in enumerate(batches):
         own = list(_holds(batch, index, width, first=len(found) + 1))
         gone = [_astern(batch, one, ahead * one.commands[0] < -width[0]) for one in own]
-        from_ = [False, *gone[:-1]]
+        from_ = [False, *gone][: len(own)]
         found += [replace(one, astern=yes or was) for one, yes, was in zip(own, gone, from_, strict=True)]
     if len(found) < 3:
         raise NotInformative(
