@@ -13,6 +13,7 @@ Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -34,6 +35,8 @@ AT_BOUND = 1e-4  # share of the range of the search, within which of its end a p
 MOST_ROUNDS = 12  # of instruments and noise models
 SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
 LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
+SEEN = 3.5  # standard deviations of quadratic damping, from which it is estimated
+CHI2_95 = 3.841  # of one degree of freedom
 UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
 
 
@@ -65,6 +68,7 @@ class RollProblem:
         low, high = -FARTHEST * self.scale, FARTHEST * self.scale
         place = PARAMETERS.index("A_x")
         low[place] = self.scale[place] / FARTHEST**2
+        low[PARAMETERS.index("m")] = 0.0
         return np.minimum(low, self.start), np.maximum(high, self.start)
 
     @property
@@ -140,6 +144,10 @@ class RollEstimate:
     unanswered: float
     freedom: float  # degrees of freedom of the noise's power, of the case with the fewest, at each frequency
 
+    # d2 / d of quadratic damping with its standard deviation [s/rad]; None where the data do not show it
+    quadratic: tuple[float, float] | None = None
+    load_interval: tuple[float, float] | None = None  # of m, 95 % by its profile [kg]; None where it is not sought
+
     def __post_init__(self) -> None:
         seal(self, theta="9", covariance="p p", sensed="q p", rounds="r 9")
 
@@ -193,15 +201,28 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
     if method == "iv" and any(run.planned is not None for case in problem.cases for run in case.runs):
         theta = estimate_roll(_by_rudder(problem)).theta
         values = [*_sampled(problem, theta)]
+    bends, quadratic, quadratic_std, more = False, 0.0, float("nan"), 0.0
     while True:
         parts = zip(problem.cases, instruments, values, strict=True)
         weighted = [weighted_equations(case, own, one) for case, own, one in parts]
         before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
         history.append(theta)
+        more, quadratic_std = _quadratic(problem, weighted, theta, sensed, left)
         settled = len(history) > 1 and _little(problem, theta - before, sensed)
+        settled = settled and not (bends and abs(more) > SETTLED * quadratic_std)
+        if settled and not bends and method == "iv" and abs(more) > SEEN * quadratic_std:
+            bends, settled = True, False
         if settled or len(history) == MOST_ROUNDS:
             break
+        if bends:
+            quadratic += more
+            problem = _with_quadratic(problem, quadratic)
         values = [*_sampled(problem, theta)]
+    if bends:
+        gone = _bends(problem, weighted, theta)
+        gone = gone / np.linalg.norm(gone)
+        sensed, left = sensed - np.outer(gone, gone @ sensed), left - gone * (gone @ left)
+    surprise = _surprise(left, len(problem.free) - len(held) + bends)
     covariance = _covariance(problem, weighted, theta, sensed, held, method)
     return RollEstimate(
         problem=problem,
@@ -213,10 +234,111 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         rounds=np.array(history),
         settled=settled,
         strength=_strength(problem, weighted, theta, sensed, covariance) if method == "iv" else float("nan"),
-        surprise=_surprise(left, len(problem.free) - len(held)),
-        unanswered=_unanswered(problem, weighted, theta, sensed) if method == "iv" else float("nan"),
+        surprise=surprise,
+        unanswered=_unanswered(problem, weighted, theta, sensed, surprise) if method == "iv" else float("nan"),
         freedom=min(spectrum(residuals).freedom for residuals in _noise(problem, weighted, theta)),
+        quadratic=(quadratic, quadratic_std) if bends else None,
+        load_interval=_profile(problem, weighted, theta, sensed, covariance, held, bends=bends),
     )
+
+
+def _with_quadratic(problem: RollProblem, quadratic: float) -> RollProblem:
+    cases = [
+        replace(case, runs=tuple(replace(run, quadratic=quadratic) for run in case.runs)) for case in problem.cases
+    ]
+    return replace(problem, cases=tuple(cases))
+
+
+def _bends(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
+    """(q,) derivatives of the weighted residuals, which are top - slope c, by the ratio of quadratic damping."""
+    by = zip(weighted, _sampled(problem, theta), strict=True)
+    return np.concatenate([(1.0 - values[1]) * part.bend for part, values in by])
+
+
+def _quadratic(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, left: Array
+) -> tuple[float, float]:
+    """By how much the ratio of quadratic damping is too small, and its standard deviation, beside all parameters."""
+    by = _bends(problem, weighted, theta)
+    across = by - _onto(sensed * problem.scale[problem.places], by)
+    size = float(across @ across)
+    return (-float(across @ left) / size, size**-0.5) if size > 0 else (0.0, float("inf"))
+
+
+def _onto(columns: Array, vector: Array) -> Array:
+    """The part of a vector (q,) in the span of columns (q, p)."""
+    return np.asarray(columns @ (np.linalg.pinv(columns, rcond=1e-10) @ vector))
+
+
+def _profile(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, covariance: Array,
+    held: Sequence[str], *, bends: bool,
+) -> tuple[float, float] | None:
+    """95 % interval of the unknown load's mass by the profile of the sum of squares; None where it is not sought.
+
+    A mass is positive, and what tells it, moments over the product of mass and height, is not linear in it. Far from
+    the estimate the sum of squares grows slower than its curvature there says, on one side more than on the other.
+
+    Source: D. M. Bates and D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), 6.1.
+    """
+    if "m" not in problem.free or "m" in held:
+        return None
+    place, own = PARAMETERS.index("m"), problem.free.index("m")
+    std = math.sqrt(float(covariance[own, own]))
+    plain = sensed * problem.scale[problem.places]
+    least = math.sqrt(max(float(np.linalg.pinv(plain.T @ plain, rcond=1e-12)[own, own]), 0.0)) * problem.scale[place]
+    if not (0 < std < math.inf and least > 0):
+        return None
+    gone = _bends(problem, weighted, theta) if bends else np.zeros(len(sensed))
+    gone = gone / max(float(np.linalg.norm(gone)), 1e-300)
+    others = [PARAMETERS.index(name) for name in problem.free if name not in (*held, "m")]
+    low, high = problem.bounds
+    enough = CHI2_95 * (std / least) ** 2
+    best, found = _cost(problem, weighted, theta, gone), np.array(theta)
+
+    def excess(mass: float) -> float:
+        nonlocal found
+
+        def full(values: Array) -> Array:
+            result = np.array(found)
+            result[others], result[place] = values, mass
+            return result
+
+        def apart(values: Array) -> Array:
+            left = _residuals(problem, weighted, full(values))
+            return np.asarray(left - gone * (gone @ left))
+
+        def slopes(values: Array) -> Array:
+            rows = _slopes(problem, weighted, full(values))[:, others]
+            return np.asarray(rows - np.outer(gone, gone @ rows))
+
+        begin = np.clip(found[others], low[others], high[others])
+        one = scipy.optimize.least_squares(
+            apart, begin, slopes, bounds=(low[others], high[others]), x_scale=problem.scale[others]
+        )
+        found = full(one.x)
+        return float(2.0 * one.cost) - best - enough
+
+    ends = []
+    for side, bound in ((-1.0, float(low[place])), (1.0, float(high[place]))):
+        found, near, far = np.array(theta), float(theta[place]), float(theta[place])
+        for factor in (1.0, 2.0, 4.0, 8.0, 16.0):
+            far = float(np.clip(theta[place] + side * factor * std, low[place], high[place]))
+            if far == bound or excess(far) > 0:
+                break
+            near = far
+        if far == bound and excess(far) <= 0:
+            ends.append(0.0 if side < 0 else math.inf)
+        elif excess(far) <= 0:
+            ends.append(0.0 if side < 0 else math.inf)
+        else:
+            ends.append(float(scipy.optimize.brentq(excess, near, far, rtol=1e-3)))
+    return ends[0], ends[1]
+
+
+def _cost(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, gone: Array) -> float:
+    left = _residuals(problem, weighted, theta)
+    return float(left @ left - (gone @ left) ** 2)
 
 
 def _by_rudder(problem: RollProblem) -> RollProblem:
@@ -225,14 +347,17 @@ def _by_rudder(problem: RollProblem) -> RollProblem:
     return replace(problem, cases=tuple(cases))
 
 
-def _unanswered(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array) -> float:
+def _unanswered(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, surprise: float
+) -> float:
     hertz = np.array([roll_frequency(theta, problem.body, case.load) for case in problem.cases])
     if not (hertz > 0).all():
         return float("nan")
     jacobians = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
     slopes = [rows[:, problem.places] for rows in jacobians]
     periods = (1.0 / (hertz * problem.step_s)).tolist()
-    return chance_of_answers(problem.cases, weighted, _noise(problem, weighted, theta), slopes, sensed, periods)
+    noise = _noise(problem, weighted, theta)
+    return chance_of_answers(problem.cases, weighted, noise, slopes, sensed, periods, surprise)
 
 
 def _surprise(left: Array, fitted: int) -> float:

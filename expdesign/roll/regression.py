@@ -42,9 +42,10 @@ class Rows:
 
     y: Array  # (n,) roll rate
     X: Array  # (n, 5) regressors
+    bend: Array  # (n,) that quadratic damping adds: residuals change by (1 - a2) of it with `Run.quadratic`
 
     def __post_init__(self) -> None:
-        seal(self, y="n", X="n 5")
+        seal(self, y="n", X="n 5", bend="n")
 
     def residuals(self, values: Array) -> Array:
         """(n,) residuals at coefficients (5,)."""
@@ -53,11 +54,19 @@ class Rows:
 
 def build_rows(run: Run, noise: NoiseModel) -> Rows:
     """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
-    table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
+    rate = run.signals[:, 0]
+    table = np.column_stack([rate, regressors(run.signals), bent(rate)])
     table[:2] = 0.0
     table[:, :3] = unwarped(table[:, :3], run.unwarped)
+    # d (phi' + q abs(phi') phi') in place of d phi': the bilinear map makes (1 - a2) / 2 of d
+    table[:, [0, 2]] += run.quadratic * table[:, [6]]
     table = without_start(noise.whitened(table)[LEFT_OUT_SAMPLES:], noise)
-    return Rows(y=table[:, 0], X=table[:, 1:])
+    return Rows(y=table[:, 0], X=table[:, 1:6], bend=table[:, 6])
+
+
+def bent(rate: Array) -> Array:
+    """(k,) half the difference of abs(phi') phi' over two samples."""
+    return difference(np.abs(rate) * rate) / 2.0
 
 
 def unwarped(columns: Array, share: float) -> Array:

@@ -40,6 +40,8 @@ class Run:
     signals: Array
     # (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself
     planned: Array | None = None
+    # quadratic damping, d2 / d of the moment d phi' + d2 abs(phi') phi' [s/rad]
+    quadratic: float = 0.0
     unwarped: float = 0.0  # share of half the sample rate, below which the bilinear map of the equation is made exact
 
     def __post_init__(self) -> None:
