@@ -163,7 +163,7 @@ class Weighted:
     # top, slope: sums of its products with y and X, (q,) and (q, 5)
     top: Array
     slope: Array
-    bend: Array  # (q,) the same with what quadratic damping adds
+    effects: Array  # (q, 3, 6) the same with what effects change of y and X
     noise: NoiseModel  # that whitened the rows
     # (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares
     hidden: tuple[Array, ...]
@@ -188,7 +188,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
         basis,
         np.sum([B.T @ one.y for B, one in parts], axis=0),
         np.sum([B.T @ one.X for B, one in parts], axis=0),
-        np.sum([B.T @ one.bend for B, one in parts], axis=0),
+        np.sum([np.einsum("nq,nij->qij", B, one.effects) for B, one in parts], axis=0),
         model,
         () if instruments is None else _hidden(rows, instruments, model),
     )
