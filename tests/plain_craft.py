@@ -90,7 +90,9 @@ def sailed(seed: int, craft: Craft) -> dict[str, np.ndarray]:
     acting = [np.concatenate([np.repeat(column[:1], late), column])[:count] for column in (n, rudder)]
     gusts = _reddened(rng, count, craft.gusts_mps, CONSTANTS_S[0] / h) if craft.gusts_mps else np.zeros(count)
     shift = acting[0] - _played(acting[0], craft.planing_play_rps)
-    speed = _followed(steady_speed(_played(acting[0], craft.play_rps), acting[1], craft, shift), h / CONSTANTS_S[0]) + gusts
+    speed = (
+        _followed(steady_speed(_played(acting[0], craft.play_rps), acting[1], craft, shift), h / CONSTANTS_S[0]) + gusts
+    )
     speed += _reddened(rng, count, craft.waves_mps, 1.5 / h)
     rate = _followed(RATE_PER_RAD * acting[1] * np.sign(acting[0]), h / CONSTANTS_S[1])
     rate += _reddened(rng, count, 0.1 * craft.waves_mps, 1.5 / h)

@@ -10,8 +10,7 @@ beforehand: random steps. Heights are above the rotation axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import scipy

@@ -230,6 +230,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
             more, _ = _more(problem, weighted, theta, sensed, left, added)
             problem = _with_effects(problem, added, more)
         values = [*_sampled(problem, theta)]
+    _, std = _more(problem, weighted, theta, sensed, left, added)
     effects = dict(zip([EFFECT_NAMES[place] for place in added], zip(
         [problem.cases[0].runs[0].effects[place] for place in added], std.tolist(), strict=True
     ), strict=True))  # fmt: skip
@@ -303,7 +304,12 @@ def _more(
 
 
 def _missed(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, left: Array, added: Sequence[int],
+    problem: RollProblem,
+    weighted: Sequence[Weighted],
+    theta: Array,
+    sensed: Array,
+    left: Array,
+    added: Sequence[int],
     banned: Sequence[int],
 ) -> list[int]:
     """The effect, if any, that data show most clearly of those not among the parameters yet; all where much is missed."""
@@ -324,8 +330,13 @@ def _onto(columns: Array, vector: Array) -> Array:
 
 
 def _profile(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, covariance: Array,
-    held: Sequence[str], gone: Array,
+    problem: RollProblem,
+    weighted: Sequence[Weighted],
+    theta: Array,
+    sensed: Array,
+    covariance: Array,
+    held: Sequence[str],
+    gone: Array,
 ) -> tuple[float, float] | None:
     """95 % interval of the unknown load's mass by the profile of the sum of squares; None where it is not sought.
 
@@ -378,9 +389,7 @@ def _profile(
             if far == bound or excess(far) > 0:
                 break
             near = far
-        if far == bound and excess(far) <= 0:
-            ends.append(0.0 if side < 0 else math.inf)
-        elif excess(far) <= 0:
+        if (far == bound and excess(far) <= 0) or excess(far) <= 0:
             ends.append(0.0 if side < 0 else math.inf)
         else:
             ends.append(float(scipy.optimize.brentq(excess, near, far, rtol=1e-3)))

@@ -55,9 +55,7 @@ def levelled(signals: Array, body: Body, step_s: float) -> Array:
     return np.column_stack([rolls, sensed + body.forward_m * np.gradient(turns, step_s), turns, rudder])
 
 
-def roll_run(
-    batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = None, body: Body | None = None
-) -> Run:
+def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = None, body: Body | None = None) -> Run:
     """Signals of a batch; the accelerometer counts to port in the room of roll.
 
     Args:

@@ -87,7 +87,9 @@ class Sailed:
             frozen_set(self, "heading", np.cumsum(self.state[:, 1]) * self.sample_time_s)
         if not len(self.surge):
             frozen_set(self, "surge", self.state[:, 0])
-        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k", surge="k", current_covariance="2 2")
+        seal(
+            self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k", surge="k", current_covariance="2 2"
+        )
 
     @property
     def time_s(self) -> Array:

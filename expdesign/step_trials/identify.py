@@ -12,8 +12,8 @@ from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
 from expdesign.step_trials.dead_times import samples_and_delays
 from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed, throttle_sign
-from expdesign.step_trials.noise import Current, current_of, through_water
 from expdesign.step_trials.model import TwoDofModel
+from expdesign.step_trials.noise import Current, current_of, through_water
 from expdesign.step_trials.samples import Delays, StepSample
 from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, hold_advice, steady_from
 from expdesign.step_trials.surfaces import (

@@ -49,7 +49,9 @@ class TwoDofModel:
     def halves(self) -> list[tuple[int, Surface, Surface]]:
         """Place, damping and inertia of each state that the trial gives."""
         pairs = zip(self.damping, self.inertia, strict=True)
-        return [(place, one, other) for place, (one, other) in enumerate(pairs) if one is not None and other is not None]
+        return [
+            (place, one, other) for place, (one, other) in enumerate(pairs) if one is not None and other is not None
+        ]
 
     @property
     def quickest_s(self) -> float:

@@ -189,7 +189,9 @@ class Comparison:
 def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
     """Asymmetry where both sides were sailed, hysteresis where levels were reached from both directions."""
     steady = [(one, one.plateau) for one in samples if one.plateau is not None]
-    found = [part for channel in range(len(CHANNELS)) for part in (_asymmetry(channel, steady), _paired(channel, steady))]
+    found = [
+        part for channel in range(len(CHANNELS)) for part in (_asymmetry(channel, steady), _paired(channel, steady))
+    ]
     return tuple(one for one in found if one is not None)
 
 

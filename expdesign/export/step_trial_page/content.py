@@ -165,8 +165,12 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
         if one.kind == "hysteresis":
             unit = STATE_UNITS[CHANNELS.index(one.command)]
-            what += f": {abs(one.state_difference):.3g} {unit} {'more' if one.state_difference > 0 else 'less'} after steps"
-            where = "on average" if one.at is None else f"at throttle {_order(one.at[0])}, rudder {_order(one.at[1])}, most"
+            what += (
+                f": {abs(one.state_difference):.3g} {unit} {'more' if one.state_difference > 0 else 'less'} after steps"
+            )
+            where = (
+                "on average" if one.at is None else f"at throttle {_order(one.at[0])}, rudder {_order(one.at[1])}, most"
+            )
             what += f" down {where} of {counted(one.samples // 2, 'pair')} of holds, as if the {one.command} differed"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
@@ -287,9 +291,7 @@ def step_model_json(content: StepTrialContent) -> str:
                 None if one is None else {"to_north_mps": one.to_mps[0], "to_east_mps": one.to_mps[1]}
                 for one in trial.currents
             ],
-            "comparisons": [
-                {**vars(one), "state_difference": finite(one.state_difference)} for one in trial.found
-            ],
+            "comparisons": [{**vars(one), "state_difference": finite(one.state_difference)} for one in trial.found],
             "fit_percent": {
                 part.name: dict(zip("Ur", part.fit_percent.tolist(), strict=True))
                 for part in (*content.own, *content.tests)

@@ -177,7 +177,8 @@ def _summary(content: StepTrialContent) -> dict[str, object]:
         "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
         **{f"delay_{CHANNELS[place]}_s": trial.delays[place][0] for place, *_ in trial.model.halves},
         "fit": {
-            part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves} for part in (*content.own, *content.tests)
+            part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves}
+            for part in (*content.own, *content.tests)
         },
         "remarks": [*sentences(content), *content.notes],
     }
