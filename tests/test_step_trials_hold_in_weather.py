@@ -1,4 +1,4 @@
-"""Step trials of a craft that the project does not simulate: intervals, hysteresis, sternway, halves and short holds."""
+"""Step trials of a craft that the project does not simulate: intervals, hysteresis, sternway, short holds."""
 
 from __future__ import annotations
 

@@ -116,7 +116,8 @@ def _sentences(content: RollContent) -> Iterator[str]:
         if_so = f", for {' and '.join(estimate.held)} as held" if estimate.held else ""
         mass = body.mass_kg + (estimate.values["m"] if case.load is None else case.load.mass_kg)
         height = f"a metacentric height of {right / (G_MPS2 * mass):.3g} m"
-        yield f"{'' if estimate.trusted else 'Not to be trusted: '}{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
+        warned = "" if estimate.trusted else "Not to be trusted: "
+        yield f"{warned}{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
     if estimate.trusted:
         yield from _effects(content)
     yield from _open(content)
@@ -187,22 +188,23 @@ def headline(content: RollContent) -> str:
 def _effects(content: RollContent) -> Iterator[str]:
     """What the equation needed besides its parameters."""
     estimate, body = content.estimate, content.estimate.problem.body
+    apart = "\N{PLUS-MINUS SIGN}"
     for name, (value, std) in estimate.effects.items():
         if name == "quadratic":
             yield (
                 "Roll is damped by the square of its rate, too, which is estimated beside d: the moment is "
-                f"d (phi' + q abs(phi') phi') with q = {value:.3g} \N{PLUS-MINUS SIGN} {std:.2g} s/rad. A vessel file has the "
+                f"d (phi' + q abs(phi') phi') with q = {value:.3g} {apart} {std:.2g} s/rad. A vessel file has the "
                 "linear part alone."
             )
         elif name == "forward":
             yield (
-                f"The accelerometer reads as if it stood {body.forward_m + value:.3g} \N{PLUS-MINUS SIGN} {std:.2g} m before "
+                f"The accelerometer reads as if it stood {body.forward_m + value:.3g} {apart} {std:.2g} m before "
                 f"the axis of yaw, not {body.forward_m:g} m as stated; this is estimated, too. State sensor_forward_m."
             )
         else:
             tilt, error = np.degrees(body.tilt_rad + value), np.degrees(std)
             yield (
-                f"The gyros read as if the sensor were tilted by {tilt:.3g} \N{PLUS-MINUS SIGN} {error:.2g} degrees, bow end up, "
+                f"The gyros read as if the sensor were tilted by {tilt:.3g} {apart} {error:.2g} degrees, bow end up, "
                 f"not {np.degrees(body.tilt_rad):g} as stated; this is estimated, too. State sensor_tilt_deg."
             )
 

@@ -38,7 +38,8 @@ LEAST_UNANSWERED = 0.02  # chance without feedback, below which the rudder is sa
 SEEN = 3.0  # standard deviations of an effect, from which it is estimated
 EXPLAINED = 0.1  # of the sum of squares that is left without it, that it takes away at least
 STAYS, MOST_TRIES = 2.5, 2  # standard deviations, below which it is left out again, and times after which for good
-# most of them: damping by the square over the linear one at the rms rate, lengths of 0.3 beams or the load's height, angle
+# most of them: damping by the square over the linear one at the rms rate, lengths of 0.3 beams or heights of the load,
+# an angle
 MOST_BENT, MOST_LENGTHS, MOST_TILT_RAD = 5.0, 8.0, 0.5
 LEAST_ROUNDS = 3  # before effects are looked for
 EFFECT_NAMES = tuple(EFFECTS)
@@ -312,7 +313,7 @@ def _missed(
     added: Sequence[int],
     banned: Sequence[int],
 ) -> list[int]:
-    """The effect, if any, that data show most clearly of those not among the parameters yet; all where much is missed."""
+    """The effect that data show most clearly of those not among the parameters yet; all where much is missed."""
     rest = [place for place in range(len(EFFECT_NAMES)) if place not in (*added, *banned)]
     if not added and not banned and _surprise(left, len(problem.free)) > TUNING.most_surprise:
         return rest  # which of them it is shows when none is missing
@@ -379,7 +380,7 @@ def _profile(
             apart, begin, slopes, bounds=(low[others], high[others]), x_scale=problem.scale[others]
         )
         found = full(one.x)
-        return float(2.0 * one.cost) - best - enough
+        return float(2.0 * one.cost - best - enough)
 
     ends = []
     for side, bound in ((-1.0, float(low[place])), (1.0, float(high[place]))):

@@ -251,7 +251,9 @@ def chance_of_answers(
     powers, axes = np.linalg.eigh(power / np.outer(size, size))
     kept = powers > REPEATED * powers[-1]
     seen = axes[:, kept].T @ (moments / size) / np.sqrt(powers[kept])
-    return float(scipy.stats.chi2.sf(seen @ seen / max(1.0, surprise), np.count_nonzero(kept)))
+    # spectra of the residuals that are weighed by them come out too small, as in the covariance of the estimate
+    short = (1.0 - 2.0 / min(one.freedom for one in spectra)) ** 2
+    return float(scipy.stats.chi2.sf(short * seen @ seen / max(1.0, surprise), np.count_nonzero(kept)))
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:

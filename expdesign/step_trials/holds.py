@@ -122,7 +122,7 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
         inputs=batch.inputs,
         heading=batch.pose[:, 2] if batch.pose is not None and known else np.zeros(0),
         surge=u,
-        compass=known,
+        compass=bool(known),
     )
 
 
@@ -196,10 +196,10 @@ def signed_speed(u: Array, v: Array) -> Array:
     return np.asarray(np.where(u < -ASTERN_SHARE * speed, -speed, speed))
 
 
-def ahead_only(batch: Sailed, controls_ahead: float) -> Sailed:
-    """The longest stretch of a batch that is sailed ahead and ordered ahead, throttle times `controls_ahead` not < 0."""
+def ahead_only(batch: Sailed, sign: float) -> Sailed:
+    """The longest stretch of a batch that is sailed ahead and ordered ahead: throttle times a sign, not below 0."""
     least = -TUNING.constant_share * float(np.ptp(batch.commands[:, 0]))
-    gone = (controls_ahead * batch.commands[:, 0] < least) | (batch.surge < -ASTERN_SHARE * batch.state[:, 0])
+    gone = (sign * batch.commands[:, 0] < least) | (batch.surge < -ASTERN_SHARE * batch.state[:, 0])
     if not gone.any():
         return batch
     edges = np.flatnonzero(np.concatenate([[True], gone, [True]]))

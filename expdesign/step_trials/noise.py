@@ -81,8 +81,8 @@ def _autocorrelation(parts: Sequence[Array]) -> Array:
         ]
     )
     if not power[0] > 0:
-        return np.r_[1.0, np.zeros(longest - 1)]
-    share, shape = 0.0, np.r_[1.0, np.zeros(longest - 1)]
+        return np.concatenate([[1.0], np.zeros(longest - 1)])
+    share, shape = 0.0, np.concatenate([[1.0], np.zeros(longest - 1)])
     for _ in range(ROUNDS):
         now = power + share * power[0] / (1.0 - share)
         shape = _continued(now / now[0], longest)
@@ -121,7 +121,7 @@ def current_of(batch: Sailed, holds: Sequence[Hold]) -> Current | None:
     """From the turns of a batch; None where its heading or its sway is not known, or it does not turn."""
     if not batch.compass or not np.isfinite(batch.sway).all():
         return None
-    scores, information, moment, parts = [], np.zeros((2, 2)), np.zeros(2), []
+    information, moment, parts = np.zeros((2, 2)), np.zeros(2), []
     for hold in holds:
         end = slice(hold.end - max(4, int(STEADY_SHARE * (hold.end - hold.settled))), hold.end)
         cos, sin = np.cos(batch.heading[end]), np.sin(batch.heading[end])

@@ -238,8 +238,8 @@ def calibrated_tests(
     found = [_constants(batches, holds, channel) for channel in (0, 1)]
     if not any(found):
         raise NotInformative(
-            "no step of the throttle alone is followed by a change of speed, and none of the rudder alone by one of yaw "
-            "rate: expected steps, one by one, each held until the vessel is steady"
+            "no step of the throttle alone is followed by a change of speed, and none of the rudder alone by one of "
+            "yaw rate: expected steps, one by one, each held until the vessel is steady"
         )
     both = [one or next(filter(None, found)) for one in found]
     return _calibrated(batches, holds, 0, both[0], rng), _calibrated(batches, holds, 1, both[1], rng)
@@ -274,8 +274,8 @@ def hold_advice(holds: Sequence[Hold], batches: Sequence[Sailed], *tests: RatioT
     enough_s = max(test.enough_s for test in tests)
     constant_s, step_s = max(test.constant_s for test in tests), batches[0].sample_time_s
     return (
-        f"they were held for {usual_s:.0f} s; {math.ceil(enough_s / 5) * 5} s or more would do, at {1.0 / step_s:.3g} Hz "
-        f"and for a time constant of about {constant_s:.2g} s"
+        f"they were held for {usual_s:.0f} s; {math.ceil(enough_s / 5) * 5} s or more would do, at "
+        f"{1.0 / step_s:.3g} Hz and for a time constant of about {constant_s:.2g} s"
     )
 
 

@@ -198,8 +198,8 @@ def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
 def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Comparison | None:
     """Hysteresis: plateaus at the same commands, after steps up and after steps down, whatever the surface is between.
 
-    Hysteresis may be that of an actuator, alike at all levels, or of the flow, at some of them: the mean difference and the
-    largest one are both judged, and the clearer of the two is told.
+    Hysteresis may be that of an actuator, alike at all levels, or of the flow, at some of them: the mean difference and
+    the largest one are both judged, and the clearer of the two is told.
 
     Differences are weighed by their standard errors. Where they do not even agree in sign and spread more than these,
     their own spread counts, as in a random-effects meta-analysis; where they agree it is by what hysteresis differs
@@ -244,7 +244,7 @@ def _level(one: StepSample, channel: int, own: Sequence[tuple[StepSample, Platea
 
 
 def _pairs(own: Sequence[tuple[StepSample, Plateau]]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Commands, and state after steps down less that after steps up, away from zero, with its variance, of each pair."""
+    """Commands of each pair, and state after steps down less that after steps up, away from zero, with its variance."""
     groups: dict[tuple[int, int], dict[bool, list[Plateau]]] = {}
     places: dict[tuple[int, int], tuple[float, float]] = {}
     channel = (own[0][0].hold.channel or 0) if own else 0

@@ -150,10 +150,14 @@ def _currents(content: StepTrialContent) -> Iterator[str]:
     trial = content.trial
     for batch, one in zip(trial.batches, trial.currents, strict=False):
         if one is not None:
-            size, std = float(np.hypot(*one.to_mps)), math.sqrt(float(np.trace(one.covariance)) / 2)
+            apart, size, std = (
+                "\N{PLUS-MINUS SIGN}",
+                float(np.hypot(*one.to_mps)),
+                math.sqrt(float(np.trace(one.covariance)) / 2),
+            )
             to = math.degrees(math.atan2(one.to_mps[1], one.to_mps[0])) % 360
             yield (
-                f"{batch.name}: turns show a current of {size:.2f} \N{PLUS-MINUS SIGN} {std:.2f} m/s to {to:.0f} degrees, "
+                f"{batch.name}: turns show a current of {size:.2f} {apart} {std:.2f} m/s to {to:.0f} degrees, "
                 "which is taken off: U is the speed through the water."
             )
 
