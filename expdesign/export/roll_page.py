@@ -11,6 +11,7 @@ from expdesign.export.files import finite, strict_json
 from expdesign.export.pages import page_template
 from expdesign.export.words import percent
 from expdesign.roll import (
+    EFFECTS,
     G_MPS2,
     MEANINGS,
     PARAMETERS,
@@ -66,11 +67,14 @@ def _interval(content: RollContent, name: str, factor: float = 1.0) -> str:
         return "held: not determined"
     low, high = (factor * end for end in interval(content, name))
     only = f" for {' and '.join(estimate.held)} as held" if name in content.report.undetermined else ""
-    return f"{low:.4g} to {high:.4g}{only}"
+    shown = f"{low:.4g} to {high:.4g}{only}" if high < float("inf") else f"{low:.4g} or more{only}"
+    return shown if estimate.trusted else f"none to be trusted ({shown})"
 
 
 def interval(content: RollContent, name: str) -> tuple[float, float]:
-    """95 % interval of a free parameter, for held parameters as they are."""
+    """95 % interval of a free parameter, for held parameters as they are; that of the unknown load by its profile."""
+    if name == "m" and content.estimate.load_interval is not None:
+        return content.estimate.load_interval
     value, std = content.estimate.values[name], content.estimate.std[name]
     return value - NORMAL * std, value + NORMAL * std
 
@@ -101,6 +105,8 @@ def roll_sentences(content: RollContent) -> tuple[str, ...]:
 
 def _sentences(content: RollContent) -> Iterator[str]:
     estimate, report, body = content.estimate, content.report, content.estimate.problem.body
+    if not estimate.trusted:
+        yield f"None of these estimates is to be trusted: {headline(content)}."
     if "m" in estimate.problem.free:
         yield _load(content)
     for case in estimate.problem.cases:
@@ -110,7 +116,10 @@ def _sentences(content: RollContent) -> Iterator[str]:
         if_so = f", for {' and '.join(estimate.held)} as held" if estimate.held else ""
         mass = body.mass_kg + (estimate.values["m"] if case.load is None else case.load.mass_kg)
         height = f"a metacentric height of {right / (G_MPS2 * mass):.3g} m"
-        yield f"{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
+        warned = "" if estimate.trusted else "Not to be trusted: "
+        yield f"{warned}{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
+    if estimate.trusted:
+        yield from _effects(content)
     yield from _open(content)
     for one in report.faint:
         yield f"The data hardly show the combination {one}: its relative standard deviation is {1.0 / one.size:.2g}."
@@ -153,11 +162,51 @@ def _load(content: RollContent) -> str:
         return f"The unknown load is not known: the load cases do not determine it, and {value} is its start value."
     if "m" in estimate.reached:
         return f"The unknown load is not known: its search ended at a bound, {value}."
-    known = f"95 % interval {low:.4g} to {high:.4g} kg"
+    above = high == float("inf")
+    known = f"{low:.4g} kg or more, to which the data set no limit" if above else f"{low:.4g} to {high:.4g} kg"
+    known = f"95 % interval {known}"
     only = f", for {' and '.join(estimate.held)} as held" if "m" in content.report.undetermined else ""
     if not estimate.trusted:
         return f"The unknown load is not known: the estimate of {value} with the {known}{only} is not to be trusted."
     return f"The unknown load is {value}, {known}{only}."
+
+
+def headline(content: RollContent) -> str:
+    """The first reason why nothing is to be trusted, in a few words; "" where all is."""
+    one = content.estimate
+    reasons = {
+        "least squares is biased by waves and sensors": one.method == "ls",
+        f"the search for {' and '.join(one.reached)} ended at a bound": bool(one.reached),
+        "the model misses something of what the rudder does": one.surprise > TUNING.most_surprise,
+        "waves and sensors hide what the rudder does": one.weak,
+        "the rudder seems to answer roll": one.answering,
+        "the estimate did not settle": not one.settled,
+    }
+    return next((reason for reason, true in reasons.items() if true), "")
+
+
+def _effects(content: RollContent) -> Iterator[str]:
+    """What the equation needed besides its parameters."""
+    estimate, body = content.estimate, content.estimate.problem.body
+    apart = "\N{PLUS-MINUS SIGN}"
+    for name, (value, std) in estimate.effects.items():
+        if name == "quadratic":
+            yield (
+                "Roll is damped by the square of its rate, too, which is estimated beside d: the moment is "
+                f"d (phi' + q abs(phi') phi') with q = {value:.3g} {apart} {std:.2g} s/rad. A vessel file has the "
+                "linear part alone."
+            )
+        elif name == "forward":
+            yield (
+                f"The accelerometer reads as if it stood {body.forward_m + value:.3g} {apart} {std:.2g} m before "
+                f"the axis of yaw, not {body.forward_m:g} m as stated; this is estimated, too. State sensor_forward_m."
+            )
+        else:
+            tilt, error = np.degrees(body.tilt_rad + value), np.degrees(std)
+            yield (
+                f"The gyros read as if the sensor were tilted by {tilt:.3g} {apart} {error:.2g} degrees, bow end up, "
+                f"not {np.degrees(body.tilt_rad):g} as stated; this is estimated, too. State sensor_tilt_deg."
+            )
 
 
 def _open(content: RollContent) -> Iterator[str]:
@@ -211,6 +260,13 @@ def roll_json(content: RollContent) -> str:
                 "sample_time_s": content.filter.step_s,
             },
             **({} if content.scale is None else {"at_full_scale": _scaled(content)}),
+            "effects": {
+                name: {"value": value, "std": std, "meaning": EFFECTS[name][0], "unit": EFFECTS[name][1]}
+                for name, (value, std) in estimate.effects.items()
+            },
+            "load_interval_kg": None
+            if estimate.load_interval is None
+            else [finite(end) for end in estimate.load_interval],
             "settled": estimate.settled,
             "surprise": finite(estimate.surprise),
             "instrument_strength": finite(estimate.strength),

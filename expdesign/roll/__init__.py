@@ -27,7 +27,7 @@ from expdesign.roll.model import (
     stiffness,
 )
 from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, direction, null_space, open_directions
-from expdesign.roll.runs import Case, LowPass, Run, low_pass, prepared
+from expdesign.roll.runs import EFFECTS, Case, LowPass, Run, low_pass, prepared
 from expdesign.roll.tuning import TUNING
 from expdesign.vessel.masses import (
     G_MPS2,

@@ -18,7 +18,9 @@ answers roll correlates with the noise of somewhat earlier times:
 
 With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h is distributed as chi-square if nothing
 answers. Changes of the rudder are used, as in the equation: the rudder itself would weigh frequency zero most, where
-the noise is zero and its spectrum cannot be estimated.
+the noise is zero and its spectrum cannot be estimated. What the model misses of the ship follows the rudder of earlier
+times, with which later rudders correlate too: only that part of them is used that earlier rudders and the instruments
+do not predict, and moments count in the size that those of the instruments are left with.
 
 Source: L. Ljung, System Identification (1999), 16.6, for residuals that go with later inputs; L. P. Hansen,
 Econometrica 50 (1982), 1029-1054, for the covariance of moments at an estimate.
@@ -37,6 +39,7 @@ from expdesign.roll.regression import (
     NoiseModel,
     Rows,
     Spectrum,
+    bent,
     build_rows,
     delayed,
     difference,
@@ -55,6 +58,7 @@ LAGS = 4  # of each simulated signal among the instruments
 RUDDER_LAGS = 2  # of the rudder's difference
 NOISE_ORDER = 12  # of the autoregression in the noise model of a case
 REPEATED = 1e-10  # share of variance below which a combination of instruments repeats others
+BACK = 2  # periods of roll, over which earlier rudders foresee later ones
 LEADS = 8  # to which the rudder is looked at, up to a period of roll later, to see whether it answers
 
 
@@ -129,7 +133,7 @@ def instrument_columns(simulated: Array) -> Array:
     roll_rate, *others = np.column_stack([simulated[:, :1], difference(simulated[:, 1:])]).T
     lags = [LAGS, LAGS, RUDDER_LAGS]
     parts = [delayed(signal, range(count)) for signal, count in zip(others, lags, strict=True)]
-    return np.column_stack([delayed(roll_rate, range(1, 1 + LAGS)), *parts])
+    return np.column_stack([delayed(roll_rate, range(1, 1 + LAGS)), *parts, bent(roll_rate)])
 
 
 def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> Array:
@@ -159,6 +163,7 @@ class Weighted:
     # top, slope: sums of its products with y and X, (q,) and (q, 5)
     top: Array
     slope: Array
+    effects: Array  # (q, 3, 6) the same with what effects change of y and X
     noise: NoiseModel  # that whitened the rows
     # (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares
     hidden: tuple[Array, ...]
@@ -183,6 +188,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
         basis,
         np.sum([B.T @ one.y for B, one in parts], axis=0),
         np.sum([B.T @ one.X for B, one in parts], axis=0),
+        np.sum([np.einsum("nq,nij->qij", B, one.effects) for B, one in parts], axis=0),
         model,
         () if instruments is None else _hidden(rows, instruments, model),
     )
@@ -219,6 +225,7 @@ def chance_of_answers(
     jacobians: Sequence[Array],
     sensed: Array,
     periods: Sequence[float],
+    surprise: float,
 ) -> float:
     """Chance that a rudder without feedback correlates with the noise as much as this one, 0 to 1.
 
@@ -228,6 +235,7 @@ def chance_of_answers(
         jacobians: (5, p) of the sampled coefficients of each case.
         sensed: (q, p) derivatives of the weighted residuals.
         periods: of roll in each case [samples].
+        surprise: least sum of squares of the instruments' moments over its expected value.
     """
     spectra = [spectrum(own) for own in residuals]
     columns = [_later(*one) for one in zip(cases, weighted, spectra, periods, strict=True)]
@@ -243,20 +251,30 @@ def chance_of_answers(
     powers, axes = np.linalg.eigh(power / np.outer(size, size))
     kept = powers > REPEATED * powers[-1]
     seen = axes[:, kept].T @ (moments / size) / np.sqrt(powers[kept])
-    return float(scipy.stats.chi2.sf(seen @ seen, np.count_nonzero(kept)))
+    # spectra of the residuals that are weighed by them come out too small, as in the covariance of the estimate
+    short = (1.0 - 2.0 / min(one.freedom for one in spectra)) ** 2
+    return float(scipy.stats.chi2.sf(short * seen @ seen / max(1.0, surprise), np.count_nonzero(kept)))
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:
-    """(n, l) rudder changes of each run up to a period of roll later; the last one repeats past its end."""
+    """(n, l) rudder changes of each run up to a period of roll later, without what is foreseen of them.
+
+    The last one repeats past a run's end.
+    """
     first = LEFT_OUT_SAMPLES
-    result = []
-    for run in case.runs:
+    ahead = np.rint(period / LEADS * np.arange(1, LEADS + 1)).astype(int)
+    back = np.unique(np.rint(period / LEADS * np.arange(BACK * LEADS + 1)).astype(int))
+    later, before = [], []
+    for run, basis in zip(case.runs, part.basis, strict=True):
         rudder = difference(run.source)
-        ahead = np.rint(period / LEADS * np.arange(1, LEADS + 1)).astype(int)
         places = np.minimum(np.arange(len(rudder))[:, None] + ahead, len(rudder) - 1)
-        weighed = left.divided(part.noise.whitened(rudder[places])[first:])
-        result.append(without_start(weighed, part.noise))
-    return result
+        both = np.column_stack([rudder[places], delayed(rudder, back.tolist())])
+        weighed = without_start(left.divided(part.noise.whitened(both)[first:]), part.noise)
+        later.append(weighed[:, :LEADS])
+        before.append(np.column_stack([basis, weighed[:, LEADS:]]))
+    size = np.maximum(np.linalg.norm(np.concatenate(before), axis=0), 1e-300)
+    gains = np.linalg.lstsq(np.concatenate(before) / size, np.concatenate(later), rcond=1e-10)[0]
+    return [W - known / size @ gains for W, known in zip(later, before, strict=True)]
 
 
 def _covariance(

@@ -34,7 +34,7 @@ from expdesign.signals import AUXILIARY, Batch
 from expdesign.simulation import acting_response, delivered_at_samples, steering_signals
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, ROLL_PARAMETERS, RollPendulum, Vessel
-from expdesign.vessel.masses import G_MPS2, Load
+from expdesign.vessel.masses import G_MPS2, Body, Load
 
 # Runs of roll from batches of measured data.
 
@@ -47,13 +47,22 @@ def missing_columns(batch: Batch) -> tuple[str, ...]:
     return tuple(name for name in NEEDED if not batch.measures(name))
 
 
-def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = None) -> Run:
+def levelled(signals: Array, body: Body, step_s: float) -> Array:
+    """(k, 4) signals of a run as a sensor above the axis of yaw would read them, that stands level."""
+    cos, sin = np.cos(body.tilt_rad), np.sin(body.tilt_rad)
+    rate, sensed, turn, rudder = signals.T
+    rolls, turns = cos * rate + sin * turn, cos * turn - sin * rate
+    return np.column_stack([rolls, sensed + body.forward_m * np.gradient(turns, step_s), turns, rudder])
+
+
+def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = None, body: Body | None = None) -> Run:
     """Signals of a batch; the accelerometer counts to port in the room of roll.
 
     Args:
         batch: measured.
         rudder: signals whose mean steers; found by their kinds when empty.
         ship: whose file states how late actuators are; None for none.
+        body: that says where the sensor is along the ship, and its tilt; that of the ship's [roll] when left out.
 
     Raises:
         InputError: a column is missing, or nothing steers.
@@ -65,6 +74,10 @@ def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = 
     chosen = [batch.input_names.index(name) for name in _rudders(batch.input_names, rudder)]
     steering = _delivered(batch, batch.inputs, ship)[:, chosen].mean(axis=1)
     signals = np.column_stack([roll_rate, -sensed, batch.velocity[:, 2], steering])
+    if body is None and ship is not None and ship.pendulum is not None:
+        body = ship.pendulum.body
+    if body is not None:
+        signals = levelled(signals, body, batch.sample_time_s)
     planned = None
     if batch.planned is not None and batch.planned.shape[1] == len(batch.input_names):
         planned = _delivered(batch, batch.planned, ship)[:, chosen].mean(axis=1)

@@ -42,9 +42,10 @@ class Rows:
 
     y: Array  # (n,) roll rate
     X: Array  # (n, 5) regressors
+    effects: Array  # (n, 3, 6) of y and X, by `Run.effects`
 
     def __post_init__(self) -> None:
-        seal(self, y="n", X="n 5")
+        seal(self, y="n", X="n 5", effects="n 3 6")
 
     def residuals(self, values: Array) -> Array:
         """(n,) residuals at coefficients (5,)."""
@@ -54,10 +55,30 @@ class Rows:
 def build_rows(run: Run, noise: NoiseModel) -> Rows:
     """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
     table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
-    table[:2] = 0.0
+    effects = _effects(run.signals, run.step_s)
+    table[:2], effects[:2] = 0.0, 0.0
     table[:, :3] = unwarped(table[:, :3], run.unwarped)
-    table = without_start(noise.whitened(table)[LEFT_OUT_SAMPLES:], noise)
-    return Rows(y=table[:, 0], X=table[:, 1:])
+    table += np.einsum("kij,i->kj", effects, run.effects)
+    both = np.column_stack([table, effects.reshape(len(table), -1)])
+    both = without_start(noise.whitened(both)[LEFT_OUT_SAMPLES:], noise)
+    return Rows(y=both[:, 0], X=both[:, 1:6], effects=both[:, 6:].reshape(-1, 3, 6))
+
+
+def _effects(signals: Array, step_s: float) -> Array:
+    """(k, 3, 6) change of y and X by each effect, to first order."""
+    rate, turn = signals[:, 0], signals[:, 2]
+    found = np.zeros((len(rate), 3, 6))
+    # d (phi' + q abs(phi') phi') in place of d phi': the bilinear map makes (1 - a2) / 2 of d
+    found[:, 0, 0] = found[:, 0, 2] = bent(rate)
+    found[:, 1, 3] = difference(np.gradient(turn, step_s))
+    # the ship's own roll rate is p + tilt r, her yaw rate r - tilt p
+    found[:, 2, 0], found[:, 2, 1:3], found[:, 2, 4] = turn, -delayed(turn, (1, 2)), -difference(rate)
+    return found
+
+
+def bent(rate: Array) -> Array:
+    """(k,) half the difference of abs(phi') phi' over two samples."""
+    return difference(np.abs(rate) * rate) / 2.0
 
 
 def unwarped(columns: Array, share: float) -> Array:

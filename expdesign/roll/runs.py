@@ -30,6 +30,15 @@ LEAST_SAMPLES = 100  # in a run, beside those that are left out
 LEFT_OUT_SAMPLES = 50  # at the beginning of a run, where lags reach before it
 
 
+EFFECTS = {
+    "quadratic": ("quadratic damping, d2 / d of the moment d phi' + d2 abs(phi') phi'", "s/rad"),
+    "forward": ("place of the sensor before the axis of yaw", "m"),
+    "tilt": ("tilt of the sensor, its bow end up", "rad"),
+}
+"""What the equation may need besides its parameters: words and unit. The accelerometer reads -x_s r' of its place x_s,
+and a tilted gyro reads p cos(tilt) - r sin(tilt) for the roll rate p."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
     """One uninterrupted record."""
@@ -40,6 +49,7 @@ class Run:
     signals: Array
     # (k,) what the rudder was planned to be, whatever the ship did; None where it was set beforehand itself
     planned: Array | None = None
+    effects: tuple[float, ...] = (0.0, 0.0, 0.0)  # of `EFFECTS`
     unwarped: float = 0.0  # share of half the sample rate, below which the bilinear map of the equation is made exact
 
     def __post_init__(self) -> None:

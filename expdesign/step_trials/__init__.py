@@ -8,7 +8,7 @@ experiments, in Sensing and Control for Autonomous Vehicles (2017); S. Cao and R
 (1995).
 """
 
-from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, controls_of, levels_of, sailed
+from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, ahead_only, controls_of, levels_of, sailed
 from expdesign.step_trials.identify import StepTrial, identify_steps
 from expdesign.step_trials.model import TwoDofModel, fit_percent
 from expdesign.step_trials.nominal import nominal_vessel, with_delays

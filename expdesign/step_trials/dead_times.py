@@ -42,7 +42,7 @@ def samples_and_delays(
 def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
     """Median of the dead times of first order responses, weighted by their information, and its standard error."""
     own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
-    found = np.array([part.delay_s for part in own if part is not None])
+    found = np.array([max(0.0, part.delay_s) for part in own if part is not None])
     if not len(found):
         return 0.0, math.inf
     weights = np.array([max(part.delay_std_s, 1e-3) ** -2.0 for part in own if part is not None])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from expdesign.values import Array, frozen_set, seal
 
 CHANNELS = ("throttle", "rudder")
 """Commands; the first drives the speed U, the second the yaw rate r."""
+COLUMNS = ("state", "sway", "commands", "inputs", "heading", "surge")
+"""Of a record, one row for each sample."""
+ASTERN_SHARE = 0.5  # of the speed, that is astern where a vessel goes astern
 THROTTLES, RUDDERS = ("n", "tau_x"), ("rudder", "a", "tau_psi")
 
 
@@ -75,11 +78,18 @@ class Sailed:
     inputs: Array  # (k, m) all inputs of the record
     # (k,) [rad]; when left out, the yaw rate summed up from an unknown heading
     heading: Array = field(default_factory=lambda: np.zeros(0))
+    surge: Array = field(default_factory=lambda: np.zeros(0))  # (k,) u [m/s], negative astern; U when left out
+    compass: bool = False  # whether the heading was measured
+    current_covariance: Array = field(default_factory=lambda: np.zeros((2, 2)))  # of a steady current N, E [m2/s2]
 
     def __post_init__(self) -> None:
         if not len(self.heading):
             frozen_set(self, "heading", np.cumsum(self.state[:, 1]) * self.sample_time_s)
-        seal(self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k")
+        if not len(self.surge):
+            frozen_set(self, "surge", self.state[:, 0])
+        seal(
+            self, state="k 2", sway="k", commands="k 2", inputs="k m", heading="k", surge="k", current_covariance="2 2"
+        )
 
     @property
     def time_s(self) -> Array:
@@ -111,6 +121,8 @@ def sailed(batch: Batch, controls: Controls) -> Sailed:
         commands=commands_of(controls, batch.input_names, batch.inputs),
         inputs=batch.inputs,
         heading=batch.pose[:, 2] if batch.pose is not None and known else np.zeros(0),
+        surge=u,
+        compass=bool(known),
     )
 
 
@@ -127,6 +139,7 @@ class Hold:
     changed: str  # what changed before it: "throttle", "rudder", "both", or "" for nothing
     change: tuple[float, float]  # signed change of throttle and rudder
     first: bool  # of its batch
+    astern: bool = False  # the vessel goes astern, or is ordered to, in it or in the hold that it begins from
 
     @property
     def channel(self) -> int | None:
@@ -142,15 +155,24 @@ def holds_of(batches: Sequence[Sailed]) -> tuple[Hold, ...]:
     """
     values = np.concatenate([batch.commands for batch in batches])
     width = np.maximum(TUNING.constant_share * np.ptp(values, axis=0), 1e-9)
+    ahead = throttle_sign(batches)
     found: list[Hold] = []
     for index, batch in enumerate(batches):
-        found += _holds(batch, index, width, first=len(found) + 1)
+        own = list(_holds(batch, index, width, first=len(found) + 1))
+        gone = [_astern(batch, one, ahead * one.commands[0] < -width[0]) for one in own]
+        from_ = [False, *gone][: len(own)]
+        found += [replace(one, astern=yes or was) for one, yes, was in zip(own, gone, from_, strict=True)]
     if len(found) < 3:
         raise NotInformative(
             f"the commands stand still in {len(found)} stretches of at least {TUNING.least_hold_s:g} s, expected three "
             "or more: this is no step trial"
         )
     return tuple(found)
+
+
+def throttle_sign(batches: Sequence[Sailed]) -> float:
+    """+1, or -1 where a negative throttle drives ahead."""
+    return 1.0 if sum(float(batch.commands[:, 0] @ batch.surge) for batch in batches) >= 0 else -1.0
 
 
 def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[Hold]:
@@ -166,6 +188,30 @@ def _holds(batch: Sailed, index: int, width: Array, *, first: int) -> Iterator[H
             first=before is None,
         )  # fmt: skip
         before = (end, (throttle, rudder))
+
+
+def signed_speed(u: Array, v: Array) -> Array:
+    """(k,) speed [m/s], negative where a vessel goes astern; v is nan where it is not known."""
+    speed = np.hypot(u, np.nan_to_num(v))
+    return np.asarray(np.where(u < -ASTERN_SHARE * speed, -speed, speed))
+
+
+def ahead_only(batch: Sailed, sign: float) -> Sailed:
+    """The longest stretch of a batch that is sailed ahead and ordered ahead: throttle times a sign, not below 0."""
+    least = -TUNING.constant_share * float(np.ptp(batch.commands[:, 0]))
+    gone = (sign * batch.commands[:, 0] < least) | (batch.surge < -ASTERN_SHARE * batch.state[:, 0])
+    if not gone.any():
+        return batch
+    edges = np.flatnonzero(np.concatenate([[True], gone, [True]]))
+    longest = int(np.argmax(np.diff(edges)))
+    kept = slice(int(edges[longest]), int(edges[longest + 1]) - 1)
+    return replace(batch, **{name: getattr(batch, name)[kept] for name in COLUMNS})
+
+
+def _astern(batch: Sailed, hold: Hold, ordered: bool) -> bool:
+    """Whether a hold's throttle is astern, or the vessel goes astern at its end, more so than sideways or by noise."""
+    end = slice(hold.end - max(1, (hold.end - hold.settled) // 3), hold.end)
+    return ordered or float(batch.surge[end].mean()) < -ASTERN_SHARE * float(batch.state[end, 0].mean())
 
 
 def levels_of(values: Array, sample_time_s: float) -> tuple[Array, Array]:

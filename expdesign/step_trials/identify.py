@@ -11,10 +11,11 @@ from expdesign.errors import NotInformative
 from expdesign.progress import Progress, silent, within
 from expdesign.signals import Record
 from expdesign.step_trials.dead_times import samples_and_delays
-from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed
+from expdesign.step_trials.holds import CHANNELS, Controls, Hold, Sailed, holds_of, sailed, throttle_sign
 from expdesign.step_trials.model import TwoDofModel
+from expdesign.step_trials.noise import Current, current_of, through_water
 from expdesign.step_trials.samples import Delays, StepSample
-from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, steady_from
+from expdesign.step_trials.steady_state import RatioTest, calibrated_tests, hold_advice, steady_from
 from expdesign.step_trials.surfaces import (
     EVEN,
     ODD,
@@ -44,6 +45,12 @@ class StepTrial:
     delays: Delays  # dead time of throttle and rudder with standard error [s]
     model: TwoDofModel  # with two degrees of freedom
     found: tuple[Comparison, ...]  # asymmetry and hysteresis
+    currents: tuple[Current | None, ...] = ()  # of each batch, that was taken off; None where none was clear
+
+    @property
+    def ahead(self) -> float:
+        """+1, or -1 where a negative throttle drives ahead."""
+        return throttle_sign(self.batches)
 
     @property
     def counted(self) -> tuple[StepSample, ...]:
@@ -63,47 +70,65 @@ def identify_steps(record: Record, controls: Controls, *, seed: int = 0, progres
         NotInformative: the record is no step trial, or has too few steps that count.
     """
     batches = tuple(sailed(batch, controls) for batch in record.batches)
-    sign = -1 if sum(float(batch.commands[:, 1] @ batch.state[:, 1]) for batch in batches) < 0 else 1
+    # sternway turns the rudder's effect round
+    turns = sum(float(batch.commands[:, 1] @ (batch.state[:, 1] * np.sign(batch.surge))) for batch in batches)
+    sign = -1 if turns < 0 else 1
     batches = tuple(replace(batch, commands=batch.commands * [1.0, sign]) for batch in batches)
     holds = holds_of(batches)
+    currents = tuple(
+        current_of(batch, [one for one in holds if one.batch == place and not one.astern])
+        for place, batch in enumerate(batches)
+    )
+    batches = tuple(through_water(*pair) for pair in zip(batches, currents, strict=True))
     tests = calibrated_tests(batches, holds, np.random.default_rng(seed))
     steady = steady_from(batches, holds, tests)
     samples, delays = samples_and_delays(batches, holds, steady, progress=within(progress, 0.3, 1.0))
-    _check(samples)
+    halves = _halves(samples, hold_advice(holds, batches, *tests))
     return StepTrial(
         batches=batches, holds=holds, controls=controls, rudder_sign=sign, tests=tests, samples=samples, delays=delays,
-        model=_model(samples, delays), found=comparisons(samples),
+        model=_model(samples, delays, halves), found=comparisons(samples),
+        currents=tuple(one if one is not None and one.clear else None for one in currents),
     )  # fmt: skip
 
 
-def _check(samples: Sequence[StepSample]) -> None:
+def _halves(samples: Sequence[StepSample], advice: str) -> tuple[bool, bool]:
+    """Whether the steps give the speed's and the yaw rate's half of the model.
+
+    Raises:
+        NotInformative: they give neither, and why; `advice` where holds are too short.
+    """
+    whys, there = [], []
     for channel, name in enumerate(CHANNELS):
-        own = [one for one in samples if one.hold.channel == channel]
+        own = [one for one in samples if one.hold.channel == channel and not one.hold.astern]
         count = sum(one.counts for one in own)
-        if count < LEAST_SAMPLES:
-            bad = next((one for one in own if one.problems), None)
-            why = f"; step {bad.hold.number}: {bad.problems[0]}" if bad else ""
-            raise NotInformative(
-                f"{count} of {len(own)} steps of the {name} alone give an inertia, expected {LEAST_SAMPLES} or "
-                f"more{why}"
-            )
+        there.append(count >= LEAST_SAMPLES)
+        bad = next((one for one in own if one.problems), None)
+        why = f"; step {bad.hold.number}: {bad.problems[0]}" if bad else ""
+        whys.append(
+            f"{count} of {len(own)} steps of the {name} alone give an inertia, expected {LEAST_SAMPLES} or more{why}"
+        )
+    if not any(there):
+        short = any(one.plateau is None and not one.hold.astern for one in samples)
+        raise NotInformative("; ".join([*whys, *[advice] * short]))
+    return there[0], there[1]
 
 
-def _model(samples: Sequence[StepSample], delays: Delays) -> TwoDofModel:
+def _model(samples: Sequence[StepSample], delays: Delays, halves: tuple[bool, bool]) -> TwoDofModel:
     steady = [(one, one.plateau) for one in samples if one.plateau is not None]
     states = np.array([part.state for _, part in steady])
     commands = np.array([one.hold.commands for one, _ in steady])
     both = np.ptp(np.sign(np.round(commands[:, 1], 6))) > 1
     visited = np.concatenate([states, *(one.location[None] for one in samples if one.counts)])
+    bases = (EVEN, WITH_BIAS if both else ODD)
+    damping = [
+        fitted_surface(states, commands[:, place], bases[place]) if there else None
+        for place, there in enumerate(halves)
+    ]
+    inertia = [_inertia(samples, place) if there else None for place, there in enumerate(halves)]
     return TwoDofModel(
-        damping=(
-            fitted_surface(states, commands[:, 0], EVEN),
-            fitted_surface(states, commands[:, 1], WITH_BIAS if both else ODD),
-        ),
-        inertia=(_inertia(samples, 0), _inertia(samples, 1)),
-        delay_s=(delays[0][0], delays[1][0]),
+        damping=(damping[0], damping[1]), inertia=(inertia[0], inertia[1]), delay_s=(delays[0][0], delays[1][0]),
         region=validity_region(visited),
-    )
+    )  # fmt: skip
 
 
 def _inertia(samples: Sequence[StepSample], channel: int) -> Surface:

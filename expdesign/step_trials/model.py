@@ -23,8 +23,10 @@ SUBSTEP_SHARE = 0.2  # of the shortest time constant, one step of the simulated 
 class TwoDofModel:
     """Damping and inertia of speed and yaw rate."""
 
-    damping: tuple[Surface, Surface]  # sigma_U and sigma_r [unit of throttle, unit of rudder]
-    inertia: tuple[Surface, Surface]  # m_U and m_r [unit of throttle per m/s2, unit of rudder per rad/s2]
+    # sigma_U and sigma_r [unit of throttle, unit of rudder], m_U and m_r [unit of throttle per m/s2, unit of rudder per
+    # rad/s2]; None, both of a state, where too few steps of its command count
+    damping: tuple[Surface | None, Surface | None]
+    inertia: tuple[Surface | None, Surface | None]
     delay_s: tuple[float, float]  # dead times of throttle and rudder [s]
     region: ValidityRegion  # where the model holds; outside, surfaces keep their value at its edge and damping grows
 
@@ -35,27 +37,37 @@ class TwoDofModel:
         """
         inside = self.region.nearest(state)
         u, r = inside.tolist()
-        mass = np.array([self._mass(channel, u, r) for channel in range(2)])
-        sigma = np.array([surface.at(u, r) for surface in self.damping])
         beyond = state - inside
-        slope = np.array([surface.most - surface.least for surface in self.damping]) / self.region.scale
-        return np.asarray((commands - sigma - slope * beyond) / mass)
+        found = np.zeros(2)
+        for channel, damping, inertia in self.halves:
+            slope = (damping.most - damping.least) / self.region.scale[channel]
+            mass = min(max(inertia.at(u, r), LEAST_INERTIA_SHARE * inertia.least), inertia.most)
+            found[channel] = (commands[channel] - damping.at(u, r) - slope * beyond[channel]) / mass
+        return found
 
-    def _mass(self, channel: int, u: float, r: float) -> float:
-        surface = self.inertia[channel]
-        return min(max(surface.at(u, r), LEAST_INERTIA_SHARE * surface.least), surface.most)
+    @property
+    def halves(self) -> list[tuple[int, Surface, Surface]]:
+        """Place, damping and inertia of each state that the trial gives."""
+        pairs = zip(self.damping, self.inertia, strict=True)
+        return [
+            (place, one, other) for place, (one, other) in enumerate(pairs) if one is not None and other is not None
+        ]
 
     @property
     def quickest_s(self) -> float:
         """A short time constant of the model [s]."""
-        ranges = [surface.most - surface.least for surface in self.damping]
         return min(
-            float(surface.least * scale / max(width, 1e-12))
-            for surface, scale, width in zip(self.inertia, self.region.scale.tolist(), ranges, strict=True)
+            float(inertia.least * self.region.scale[place] / max(damping.most - damping.least, 1e-12))
+            for place, damping, inertia in self.halves
         )
 
-    def simulated(self, start: Array, commands: Array, *, sample_time_s: float) -> Array:
-        """(k, 2) U and r at every sample, from `start` (2,), under commands (k, 2) as given, held between samples."""
+    def simulated(self, measured: Array, commands: Array, *, sample_time_s: float) -> Array:
+        """(k, 2) U and r at every sample, under commands (k, 2) as given, held between samples.
+
+        They begin as measured, (k, 2) or the first (2,); a state that is no half of the model stays as measured.
+        """
+        measured = np.broadcast_to(measured, (len(commands), 2))
+        outside = [place for place in range(2) if place not in {one for one, *_ in self.halves}]
         delays = [round(delay / sample_time_s) for delay in self.delay_s]
         acting = np.stack(
             [
@@ -66,10 +78,12 @@ class TwoDofModel:
         )
         parts = max(1, int(np.ceil(sample_time_s / max(SUBSTEP_SHARE * self.quickest_s, 1e-3))))
         states = np.empty((len(commands), 2))
-        states[0] = state = np.asarray(start, float)
+        states[0] = state = np.asarray(measured[0], float)
         for k, given in enumerate(acting[:-1]):
             for _ in range(parts):
                 state = self._step(state, given, sample_time_s / parts)
+            if outside:
+                state[outside] = measured[k + 1, outside]
             states[k + 1] = state
         return states
 

@@ -65,6 +65,7 @@ class Transient:
     # before_std, after_std: their standard errors
     before_std: float = 0.0
     after_std: float = 0.0
+    density: float = 0.0  # of the noise at low frequencies, where it is known: variance of a mean times samples
 
     @property
     def size(self) -> float:
@@ -168,8 +169,9 @@ def _errors(
         slopes[:, place] = data.size * (curve(ahead, data.time_s) - curve(back, data.time_s)) / (2 * step)
     slopes[:, -1] *= not fixed
     inverse = np.linalg.pinv(slopes.T @ slopes, rcond=1e-10)
-    noise = (
-        scale * float(np.sum(_residuals_transients(data, curve, found) ** 2)) / max(len(data.time_s) - len(found), 1)
+    noise = max(
+        scale * float(np.sum(_residuals_transients(data, curve, found) ** 2)) / max(len(data.time_s) - len(found), 1),
+        data.density,
     )
     done = curve(found, data.time_s)
     plateaus = inverse @ slopes.T @ np.stack([(1 - done) * data.before_std, done * data.after_std], axis=1)

@@ -17,6 +17,7 @@ import numpy as np
 
 from expdesign.progress import Progress, silent
 from expdesign.step_trials.holds import CHANNELS, Hold, Sailed
+from expdesign.step_trials.noise import mean_errors
 from expdesign.step_trials.responses import (
     Response,
     Transient,
@@ -34,6 +35,9 @@ LEAST_GROUP = 5  # samples of one command level among which outliers are sought
 PREFERRED = 10.0  # decrease of Akaike's criterion from which a second order response is preferred
 
 
+ASTERN = "astern, or begun from astern: left out, as the model is of a vessel that goes ahead"
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plateau:
     """Steady state of a hold."""
@@ -49,9 +53,11 @@ class Plateau:
     duration_s: float  # time of the mean [s]
     # (2,) mean cosine and sine of the heading, near zero over whole turns
     course: Array = field(default_factory=lambda: np.zeros(2))
+    samples: int = 0  # of the mean
+    density: Array = field(default_factory=lambda: np.zeros(2))  # of the noise: see `MeanError`
 
     def __post_init__(self) -> None:
-        seal(self, state="2", std="2", inputs="m", course="2")
+        seal(self, state="2", std="2", inputs="m", course="2", density="2")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,10 +100,9 @@ class StepSample:
 
     @property
     def upward(self) -> bool:
-        """Whether the command that changed became larger in size."""
+        """Whether the command that changed moved away from zero, on the side where it ends."""
         channel = self.hold.channel or 0
-        after = self.hold.commands[channel]
-        return abs(after) > abs(after - self.hold.change[channel])
+        return self.hold.commands[channel] * self.hold.change[channel] > 0
 
 
 Delays = tuple[tuple[float, float], tuple[float, float]]
@@ -113,15 +118,43 @@ def step_samples(
     progress: Progress = silent,
 ) -> tuple[StepSample, ...]:
     """A sample of every hold, with dead times between bounds."""
-    plateaus = [
-        None if begin is None else plateau(batches[hold.batch], begin, hold.end)
+    plateaus = _with_common_noise(batches, holds, [
+        None if begin is None or hold.astern else plateau(batches[hold.batch], begin, hold.end)
         for hold, begin in zip(holds, steady, strict=True)
-    ]
+    ])  # fmt: skip
     samples = []
     for place, (hold, begin) in enumerate(zip(holds, steady, strict=True)):
         progress(f"fitting the response to step {hold.number} of {len(holds)}", place / len(holds))
         samples.append(step_sample(batches[hold.batch], hold, begin, plateaus[place], plateaus[place - 1], delay_s))
     return tuple(samples)
+
+
+def _with_common_noise(
+    batches: Sequence[Sailed], holds: Sequence[Hold], plateaus: Sequence[Plateau | None]
+) -> list[Plateau | None]:
+    """Plateaus with standard errors by the noise of all of them, and by what is not known of a current."""
+    there = [(place, part) for place, part in enumerate(plateaus) if part is not None]
+    found = list(plateaus)
+    if not there:
+        return found
+    ends = [slice(holds[place].end - part.samples, holds[place].end) for place, part in there]
+    own = [batches[holds[place].batch] for place, _ in there]
+    columns = [[batch.state[end, state] for batch, end in zip(own, ends, strict=True)] for state in (0, 1)]
+    speed, rate = (mean_errors(parts) for parts in columns)
+    sways = [batch.sway[end] for batch, end in zip(own, ends, strict=True)]
+    known = all(bool(np.isfinite(part).all()) for part in sways)
+    sway = mean_errors(sways) if known else [None] * len(there)
+    for (place, part), batch, u, r, v in zip(there, own, speed, rate, sway, strict=True):
+        drift = float(part.course @ batch.current_covariance @ part.course)
+        across = np.array([-part.course[1], part.course[0]])
+        aside = float(across @ batch.current_covariance @ across)
+        found[place] = replace(
+            part,
+            std=np.array([math.hypot(u.std, math.sqrt(drift)), r.std]),
+            sway_std=part.sway_std if v is None else math.hypot(v.std, math.sqrt(aside)),
+            density=np.array([u.density, r.density]),
+        )
+    return found
 
 
 def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
@@ -142,6 +175,7 @@ def plateau(batch: Sailed, begin: int, end: int) -> Plateau:
         turns=turns,
         duration_s=(end - begin) * batch.sample_time_s,
         course=np.array([np.cos(batch.heading[part]).mean(), np.sin(batch.heading[part]).mean()]),
+        samples=end - begin,
     )
 
 
@@ -173,6 +207,8 @@ def step_sample(
         plateau=after,
         before=None if hold.first else before,
     )
+    if hold.astern:
+        return replace(own, remarks=(ASTERN,))
     if after is None:
         return replace(own, problems=(f"not steady within {(hold.end - hold.begin) * batch.sample_time_s:.0f} s",))
     if hold.first or not hold.changed:
@@ -202,6 +238,7 @@ def _with_response(own: StepSample, batch: Sailed, hold: Hold, steady: int, dela
         after=float(own.plateau.state[channel]),
         before_std=float(own.before.std[channel]),
         after_std=float(own.plateau.std[channel]),
+        density=float(own.plateau.density[channel]),
     )
     return _fitted(own, batch, hold, data, delay_s[channel])
 

@@ -35,6 +35,8 @@ UPPER_FACTOR = 2.0  # least ratio of the thresholds
 QUICKER = 3.0  # filters of both variances forget so many times as fast
 DWELL_MEMORIES = 1.0  # time below the lower threshold after which the vessel is steady, in filter memories
 SURROGATES = 40  # of the steady data, to find these quantiles
+# a hold that would do: time constants until a response is over, memories until the filters forget it, and a mean [s]
+SETTLED_CONSTANTS, FORGOTTEN_MEMORIES, MEAN_S = 5.0, 5.0, 10.0
 LONGEST_INTERVAL_SHARE = 0.2  # of the filter's memory, between samples of the ratio test
 
 
@@ -53,6 +55,12 @@ class RatioTest:
     lower: float
     upper: float
     noise: float  # variance of the averaged signal in steady state
+    constant_s: float = 0.0  # rough time constant of the slower responses [s]; 0 where it is not known
+
+    @property
+    def enough_s(self) -> float:
+        """A hold long enough for the response, for the filters to forget it, and for a mean [s]."""
+        return SETTLED_CONSTANTS * self.constant_s + FORGOTTEN_MEMORIES * self.memory_s + MEAN_S
 
     @property
     def interval_s(self) -> float:
@@ -225,25 +233,50 @@ def calibrated_tests(
     """The tests for U and r: memory from the slower responses, thresholds from the ends of the holds.
 
     Raises:
-        NotInformative: no throttle step or no rudder step shows a response, or holds are too short.
+        NotInformative: neither throttle steps nor rudder steps show a response, or holds are too short.
     """
-    return _calibrated(batches, holds, 0, rng), _calibrated(batches, holds, 1, rng)
-
-
-def _calibrated(batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, rng: np.random.Generator) -> RatioTest:
-    constants = [
-        rough for hold in holds if hold.channel == channel and (rough := _rough(batches[hold.batch], hold, holds))
-    ]
-    if not constants:
-        name, state = (("throttle", "speed"), ("rudder", "yaw rate"))[channel]
+    found = [_constants(batches, holds, channel) for channel in (0, 1)]
+    if not any(found):
         raise NotInformative(
-            f"no step of the {name} alone is followed by a change of {state}: expected steps of {name}, one by one, "
-            "each held until the vessel is steady"
+            "no step of the throttle alone is followed by a change of speed, and none of the rudder alone by one of "
+            "yaw rate: expected steps, one by one, each held until the vessel is steady"
         )
-    step_s = batches[0].sample_time_s
-    memory_s = max(TUNING.memory_share * float(np.quantile(constants, 0.75)), LEAST_MEMORY_SAMPLES * step_s)
-    ends = [_end(batches[hold.batch], hold, channel) for hold in holds]
-    return calibrated(_steadiest(ends), sample_time_s=step_s, memory_s=memory_s, rng=rng)
+    both = [one or next(filter(None, found)) for one in found]
+    return _calibrated(batches, holds, 0, both[0], rng), _calibrated(batches, holds, 1, both[1], rng)
+
+
+def _constants(batches: Sequence[Sailed], holds: Sequence[Hold], channel: int) -> list[float]:
+    """Rough time constants [s] of the steps of a command."""
+    own = [hold for hold in holds if hold.channel == channel and not hold.astern]
+    return [rough for hold in own if (rough := _rough(batches[hold.batch], hold, holds))]
+
+
+def _calibrated(
+    batches: Sequence[Sailed], holds: Sequence[Hold], channel: int, constants: Sequence[float], rng: np.random.Generator
+) -> RatioTest:
+    step_s, constant_s = batches[0].sample_time_s, float(np.quantile(constants, 0.75))
+    memory_s = max(TUNING.memory_share * constant_s, LEAST_MEMORY_SAMPLES * step_s)
+    ends = [_end(batches[hold.batch], hold, channel) for hold in holds if not hold.astern]
+    try:
+        test = calibrated(_steadiest(ends), sample_time_s=step_s, memory_s=memory_s, rng=rng)
+    except NotInformative as error:
+        blank = RatioTest(
+            sample_time_s=step_s, averaged=1, rate=step_s / memory_s, lower=0.0, upper=0.0, noise=0.0,
+            constant_s=constant_s,
+        )  # fmt: skip
+        raise NotInformative(f"{error}; {hold_advice(holds, batches, blank)}") from None
+    return replace(test, constant_s=constant_s)
+
+
+def hold_advice(holds: Sequence[Hold], batches: Sequence[Sailed], *tests: RatioTest) -> str:
+    """Which hold would do, beside those that there are."""
+    usual_s = float(np.median([(one.end - one.begin) * batches[one.batch].sample_time_s for one in holds]))
+    enough_s = max(test.enough_s for test in tests)
+    constant_s, step_s = max(test.constant_s for test in tests), batches[0].sample_time_s
+    return (
+        f"they were held for {usual_s:.0f} s; {math.ceil(enough_s / 5) * 5} s or more would do, at "
+        f"{1.0 / step_s:.3g} Hz and for a time constant of about {constant_s:.2g} s"
+    )
 
 
 def _end(batch: Sailed, hold: Hold, channel: int) -> Array:

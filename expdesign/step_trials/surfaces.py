@@ -18,6 +18,7 @@ import shapely
 from expdesign.step_trials.holds import CHANNELS
 from expdesign.step_trials.regression import Fit, Sampled, best_fit, ridge
 from expdesign.step_trials.samples import Plateau, StepSample
+from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array, seal
 
 EVEN = ((0, 0), (1, 0), (2, 0), (0, 2), (3, 0), (1, 2), (4, 0), (2, 2), (0, 4))
@@ -161,15 +162,19 @@ def validity_region(states: Array) -> ValidityRegion:
     return ValidityRegion(corners=shapely.get_coordinates(hull), scale=scale)
 
 
-# Whether port differs from starboard, and steps up from steps down: nested regressions and their F test.
+# Whether port differs from starboard, by nested regressions, and steps up from steps down, by pairs of plateaus.
 
 LOW_ORDER = 3
 """Highest degree of the surface that is compared with."""
+LEAST_PAIRS = 2
+"""Levels reached from both sides, from which hysteresis is judged."""
+REPEATED_SHARE = 0.003
+"""Of a steady state, within which it repeats itself from hour to hour whatever its standard error says."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A difference in damping that a symmetric surface without memory cannot have."""
+    """A difference that a symmetric surface without memory cannot have."""
 
     kind: str  # "asymmetry" or "hysteresis"
     command: str  # "throttle" or "rudder"
@@ -177,44 +182,104 @@ class Comparison:
     std: float  # its standard error
     p_value: float  # of no difference
     samples: int  # plateaus compared
+    state_difference: float = math.nan  # of hysteresis: down less up, in the state that the command drives; m/s, rad/s
+    at: tuple[float, float] | None = None  # commands of the pair that shows it; None for the mean of all pairs
 
 
 def comparisons(samples: Sequence[StepSample]) -> tuple[Comparison, ...]:
-    """Asymmetry where both sides were sailed, hysteresis where both directions were, for both commands."""
+    """Asymmetry where both sides were sailed, hysteresis where levels were reached from both directions."""
     steady = [(one, one.plateau) for one in samples if one.plateau is not None]
-    found = []
-    for channel, command in enumerate(CHANNELS):
-        sides = np.array([np.sign(part.state[1]) * (abs(one.hold.commands[1]) > 0) for one, part in steady])
-        directions = np.array([_direction(one, channel) for one, _ in steady])
-        for kind, signs in (("asymmetry", sides), ("hysteresis", directions)):
-            found += [_compared(kind, command, channel, steady, signs)]
+    found = [
+        part for channel in range(len(CHANNELS)) for part in (_asymmetry(channel, steady), _paired(channel, steady))
+    ]
     return tuple(one for one in found if one is not None)
 
 
-def _direction(one: StepSample, channel: int) -> float:
-    """+1 after a step up of this command, -1 after a step down, 0 after others."""
-    return 0.0 if one.hold.channel != channel else (1.0 if one.upward else -1.0)
+def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Comparison | None:
+    """Hysteresis: plateaus at the same commands, after steps up and after steps down, whatever the surface is between.
+
+    Hysteresis may be that of an actuator, alike at all levels, or of the flow, at some of them: the mean difference and
+    the largest one are both judged, and the clearer of the two is told.
+
+    Differences are weighed by their standard errors. Where they do not even agree in sign and spread more than these,
+    their own spread counts, as in a random-effects meta-analysis; where they agree it is by what hysteresis differs
+    from level to level.
+
+    Source: G. Knapp and J. Hartung, Statistics in Medicine 22 (2003), 2693-2710.
+    """
+    own = [(one, part) for one, part in steady if one.hold.channel == channel and np.isfinite(part.std).all()]
+    at, pairs = _pairs(own)
+    if len(pairs) < LEAST_PAIRS:
+        return None
+    commands = np.array([one.hold.commands[channel] for one, _ in own])
+    states = np.array([part.state[channel] for _, part in own])
+    levels = [[place for place, (one, _) in enumerate(own) if _level(one, 1 - channel, own) == key] for key in
+              dict.fromkeys(_level(one, 1 - channel, own) for one, _ in own)]  # fmt: skip
+    rows = [(np.ptp(commands[part]), np.ptp(states[part])) for part in levels if np.ptp(commands[part]) > 0]
+    slope = float(np.median([high / wide for wide, high in rows]))
+    apart, variance = np.array(pairs).T
+    weights = 1.0 / variance
+    mean = float(weights @ apart / weights.sum())
+    own_variance, freedom = 1.0 / float(weights.sum()), float(len(pairs) * 2 * (TUNING.steady_blocks - 1))
+    spread = float(weights @ (apart - mean) ** 2 / weights.sum()) / (len(pairs) - 1)
+    if spread > own_variance and np.ptp(np.sign(apart)):
+        own_variance, freedom = spread, len(pairs) - 1.0
+    std = math.sqrt(own_variance)
+    p_value, one = 2 * float(scipy.stats.t.sf(abs(mean) / std, freedom)), int(np.argmax(apart**2 / variance))
+    alone = 2 * float(scipy.stats.t.sf(abs(apart[one]) / math.sqrt(variance[one]), 2 * (TUNING.steady_blocks - 1)))
+    place = None
+    if alone * len(pairs) < p_value:
+        p_value, mean, std = alone * len(pairs), float(apart[one]), math.sqrt(variance[one])
+        place = at[one]
+    return Comparison(
+        kind="hysteresis", command=CHANNELS[channel], difference=mean / 2 / slope, std=std / 2 / slope,
+        p_value=min(1.0, 2 * p_value), samples=2 * len(pairs), state_difference=mean, at=place,
+    )  # fmt: skip
 
 
-def _compared(
-    kind: str, command: str, channel: int, steady: Sequence[tuple[StepSample, Plateau]], signs: Array
-) -> Comparison | None:
+def _level(one: StepSample, channel: int, own: Sequence[tuple[StepSample, Plateau]]) -> int:
+    """Number of the level of a command, within the width that holds have."""
+    values = [other.hold.commands[channel] for other, _ in own]
+    return round(one.hold.commands[channel] / max(TUNING.constant_share * float(np.ptp(values)), 1e-6))
+
+
+def _pairs(own: Sequence[tuple[StepSample, Plateau]]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Commands of each pair, and state after steps down less that after steps up, away from zero, with its variance."""
+    groups: dict[tuple[int, int], dict[bool, list[Plateau]]] = {}
+    places: dict[tuple[int, int], tuple[float, float]] = {}
+    channel = (own[0][0].hold.channel or 0) if own else 0
+    for one, part in own:
+        key = _level(one, 0, own), _level(one, 1, own)
+        groups.setdefault(key, {True: [], False: []})[one.upward].append(part)
+        places.setdefault(key, one.hold.commands)
+    at, found = [], []
+    for key, by in groups.items():
+        if by[True] and by[False]:
+            up, down = (_joined(by[way], channel) for way in (True, False))
+            variance = up[1] + down[1] + 2.0 * (REPEATED_SHARE * up[0]) ** 2
+            found.append((float(np.sign(up[0])) * (down[0] - up[0]), variance))
+            at.append(places[key])
+    return at, found
+
+
+def _joined(parts: Sequence[Plateau], channel: int) -> tuple[float, float]:
+    """Weighted mean of plateaus, and its variance."""
+    weights = np.array([part.std[channel] for part in parts]) ** -2.0
+    values = np.array([part.state[channel] for part in parts])
+    return float(weights @ values / weights.sum()), 1.0 / float(weights.sum())
+
+
+def _asymmetry(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Comparison | None:
+    signs = np.array([np.sign(part.state[1]) * (abs(one.hold.commands[1]) > 0) for one, part in steady])
     states = np.array([part.state for _, part in steady])
     values = np.array([one.hold.commands[channel] for one, _ in steady])
-    if kind == "hysteresis" and channel == 1:
-        signs = signs * np.sign(states[:, 1])
-    powers = [power for power in ((0, 0), *ODD) if channel and sum(power) <= LOW_ORDER] or [
-        power for power in EVEN if sum(power) <= LOW_ORDER
-    ]
-    if kind == "asymmetry" and channel:
-        powers = [power for power in powers if power != (0, 0)]
-        extra = np.ones(len(signs))
-    else:
-        extra = signs
+    # half the difference of the rudders of both sides is a constant, that of throttles changes sign with the side
+    powers = [power for power in (ODD if channel else EVEN) if sum(power) <= LOW_ORDER]
+    extra = np.ones(len(signs)) if channel else signs
     if min(np.sum(signs > 0), np.sum(signs < 0)) < 3 or len(values) < len(powers) + 4:
         return None
     columns = np.stack([states[:, 0] ** i * states[:, 1] ** j for i, j in powers], axis=1)
-    return _tested(kind, command, columns, extra, values)
+    return _tested("asymmetry", CHANNELS[channel], columns, extra, values)
 
 
 def _tested(kind: str, command: str, columns: Array, extra: Array, values: Array) -> Comparison:

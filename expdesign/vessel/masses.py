@@ -41,11 +41,13 @@ class Body:
     z_g: float  # of its centre of mass, down from the body origin [m]
     z_s: float  # of the accelerometer, down [m]: from the body origin, or from the rotation axis
     sensor_from_axis: bool = False  # z_s is counted from the rotation axis, which somebody has located
+    forward_m: float = 0.0  # the sensor before the axis of yaw, whose yaw acceleration it reads
+    tilt_rad: float = 0.0  # of the sensor, its bow end up: its gyros mix roll and yaw
 
     def __post_init__(self) -> None:
         if not 0 < self.mass_kg < math.inf:
             raise InputError(f"body.mass_kg is {self.mass_kg:g}, expected more than 0")
-        for name in ("z_g", "z_s"):
+        for name in ("z_g", "z_s", "forward_m", "tilt_rad"):
             if not math.isfinite(getattr(self, name)):
                 raise InputError(f"body.{name} is {getattr(self, name):g}, expected a finite place")
 

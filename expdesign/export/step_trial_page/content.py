@@ -20,6 +20,7 @@ SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported 
 
 REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
 STATES = ("speed", "yaw rate")
+STATE_UNITS = ("m/s", "rad/s")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,25 +90,30 @@ def unit_of(signal: str) -> str:
 
 def _sentences(content: StepTrialContent) -> Iterator[str]:
     trial = content.trial
-    asked = sum(one.hold.channel is not None for one in trial.samples)
-    steady = sum(one.plateau is not None for one in trial.samples)
+    ahead = [one for one in trial.samples if not one.hold.astern]
+    asked = sum(one.hold.channel is not None for one in ahead)
+    steady = sum(one.plateau is not None for one in ahead)
     turned = ", negative for turns to starboard; the model counts it the other way" * (trial.rudder_sign < 0)
     yield (
         f"{len(trial.counted)} of {counted(asked, 'step')} give an inertia; {steady} of "
-        f"{counted(len(trial.holds), 'hold')} were steady and give a damping. Throttle is {trial.controls.words[0]}, "
+        f"{counted(len(ahead), 'hold')} were steady and give a damping. Throttle is {trial.controls.words[0]}, "
         f"rudder {trial.controls.words[1]}{turned}."
     )
+    if len(ahead) < len(trial.samples):
+        numbers = ", ".join(str(one.hold.number) for one in trial.samples if one.hold.astern)
+        yield f"Left out: {numbers}, which go astern or begin from astern. The model is of a vessel that goes ahead."
     delays = [
         f"{name} {value:.2f} \N{PLUS-MINUS SIGN} {std:.2f} s"
         for name, (value, std) in zip(CHANNELS, trial.delays, strict=True)
+        if math.isfinite(std)
     ]
     yield f"Dead times: {', '.join(delays)}."
-    fits = [f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.own]
+    yield from _halves(content)
+    yield from _currents(content)
+    fits = [_fit(content, part) for part in content.own]
     yield f"Simulated from its commands alone, the model fits {'; '.join(fits)}, the data that it was made from."
     if content.tests:
-        fits = [
-            f"U {part.fit_percent[0]:.0f} %, r {part.fit_percent[1]:.0f} % of {part.name}" for part in content.tests
-        ]
+        fits = [_fit(content, part) for part in content.tests]
         yield f"It fits {'; '.join(fits)}, which {'was' if len(fits) == 1 else 'were'} held out."
     if again := to_repeat(content):
         numbers = ", ".join(str(one.hold.number) for one in again)
@@ -116,11 +122,44 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
             yield "With --steps PLAN.json, only steps of its runs are asked to be repeated, not changes between them."
     yield from _compared(content)
     outside = [one for one in trial.samples if one.plateau is not None and not one.plateau.turns]
-    if len(outside) > steady / 2:
+    if len(outside) > steady / 2 and not any(trial.currents):
         yield (
             f"{len(outside)} of {counted(steady, 'steady hold')} lasted less than a whole turn: a current would be in "
             "their speeds. In a current hold each step for a whole turn."
         )
+
+
+def _fit(content: StepTrialContent, part: Validated) -> str:
+    halves = content.trial.model.halves
+    return ", ".join(f"{'Ur'[place]} {part.fit_percent[place]:.0f} %" for place, *_ in halves) + f" of {part.name}"
+
+
+def _halves(content: StepTrialContent) -> Iterator[str]:
+    """What the model lacks where steps of one command are missing."""
+    there = {place for place, *_ in content.trial.model.halves}
+    for place in {0, 1} - there:
+        own = [one for one in content.trial.samples if one.hold.channel == place and not one.hold.astern]
+        count = sum(one.counts for one in own)
+        yield (
+            f"Only the half of the {STATES[1 - place]} is identified: {count} of {counted(len(own), 'step')} of the "
+            f"{CHANNELS[place]} alone give an inertia, expected 3 or more for the half of the {STATES[place]}."
+        )
+
+
+def _currents(content: StepTrialContent) -> Iterator[str]:
+    trial = content.trial
+    for batch, one in zip(trial.batches, trial.currents, strict=False):
+        if one is not None:
+            apart, size, std = (
+                "\N{PLUS-MINUS SIGN}",
+                float(np.hypot(*one.to_mps)),
+                math.sqrt(float(np.trace(one.covariance)) / 2),
+            )
+            to = math.degrees(math.atan2(one.to_mps[1], one.to_mps[0])) % 360
+            yield (
+                f"{batch.name}: turns show a current of {size:.2f} {apart} {std:.2f} m/s to {to:.0f} degrees, "
+                "which is taken off: U is the speed through the water."
+            )
 
 
 def _compared(content: StepTrialContent) -> Iterator[str]:
@@ -128,6 +167,15 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
     for one in significant:
         size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
+        if one.kind == "hysteresis":
+            unit = STATE_UNITS[CHANNELS.index(one.command)]
+            what += (
+                f": {abs(one.state_difference):.3g} {unit} {'more' if one.state_difference > 0 else 'less'} after steps"
+            )
+            where = (
+                "on average" if one.at is None else f"at throttle {_order(one.at[0])}, rudder {_order(one.at[1])}, most"
+            )
+            what += f" down {where} of {counted(one.samples // 2, 'pair')} of holds, as if the {one.command} differed"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})
@@ -175,16 +223,22 @@ STEP_HEADER = (
 
 def step_rows(content: StepTrialContent) -> list[tuple[str, ...]]:
     """Every hold, under `STEP_HEADER`."""
-    return [_step_row(one) for one in content.trial.samples]
+    return [_step_row(content, one) for one in content.trial.samples]
 
 
-def _step_row(one: StepSample) -> tuple[str, ...]:
+def constant_std_s(content: StepTrialContent, one: StepSample) -> float:
+    """Standard error of a step's time constant [s]: that of its response, and of the dead time before it."""
+    assert one.response is not None
+    return math.hypot(one.response.time_constant_std_s, content.trial.delays[one.hold.channel or 0][1])
+
+
+def _step_row(content: StepTrialContent, one: StepSample) -> tuple[str, ...]:
     part, response = one.plateau, one.response
     state = ("", "", "") if part is None else (f"{part.state[0]:.2f}", f"{part.state[1]:.3f}", str(part.turns))
     time = (
         ""
         if response is None
-        else f"{response.time_constant_s:.2f} \N{PLUS-MINUS SIGN} {response.time_constant_std_s:.2f} s"
+        else f"{response.time_constant_s:.2f} \N{PLUS-MINUS SIGN} {constant_std_s(content, one):.2f} s"
     )
     mass = f"{one.inertia:.3g} \N{PLUS-MINUS SIGN} {one.inertia_std:.1g}" if math.isfinite(one.inertia) else ""
     remarks = "; ".join((*one.problems, *one.remarks))
@@ -220,10 +274,10 @@ def step_model_json(content: StepTrialContent) -> str:
             "rudder_sign": trial.rudder_sign,
             "model": {
                 "equations": "m_U(U, r) dU/dt + sigma_U(U, r) = throttle(t - delay), the same in r with the rudder",
-                "delay_s": dict(zip(CHANNELS, model.delay_s, strict=True)),
+                "delay_s": {CHANNELS[place]: model.delay_s[place] for place, *_ in model.halves},
                 "delay_std_s": {name: finite(std) for name, (_, std) in zip(CHANNELS, trial.delays, strict=True)},
-                **{f"sigma_{state}": _surface(part) for state, part in zip("Ur", model.damping, strict=True)},
-                **{f"m_{state}": _surface(part) for state, part in zip("Ur", model.inertia, strict=True)},
+                **{f"sigma_{'Ur'[place]}": _surface(part) for place, part, _ in model.halves},
+                **{f"m_{'Ur'[place]}": _surface(part) for place, _, part in model.halves},
                 "validity_corners": [{"U_mps": u, "r_radps": r} for u, r in model.region.outline.tolist()],
             },
             "steady_state_test": {
@@ -237,7 +291,11 @@ def step_model_json(content: StepTrialContent) -> str:
                 for state, test in zip("Ur", trial.tests, strict=True)
             },
             "steps": [_step(content, one) for one in trial.samples],
-            "comparisons": [vars(one) for one in trial.found],
+            "currents": [
+                None if one is None else {"to_north_mps": one.to_mps[0], "to_east_mps": one.to_mps[1]}
+                for one in trial.currents
+            ],
+            "comparisons": [{**vars(one), "state_difference": finite(one.state_difference)} for one in trial.found],
             "fit_percent": {
                 part.name: dict(zip("Ur", part.fit_percent.tolist(), strict=True))
                 for part in (*content.own, *content.tests)
@@ -277,7 +335,7 @@ def _step(content: StepTrialContent, one: StepSample) -> dict[str, object]:
         "r_std_radps": None if part is None else finite(part.std[1]),
         "turns": None if part is None else part.turns,
         "time_constant_s": None if response is None else response.time_constant_s,
-        "time_constant_std_s": None if response is None else finite(response.time_constant_std_s),
+        "time_constant_std_s": None if response is None else finite(constant_std_s(content, one)),
         "damping_ratio": None if response is None else response.damping,
         "zero_s": None if response is None else response.zero_s,
         "inertia": finite(one.inertia),

@@ -19,7 +19,7 @@ from expdesign.export.step_trial_page.content import (
     sentences,
     step_rows,
 )
-from expdesign.step_trials import StepSample, Surface
+from expdesign.step_trials import CHANNELS, StepSample, Surface
 from expdesign.values import Array
 
 if TYPE_CHECKING:
@@ -52,19 +52,20 @@ def coverage_figure(content: StepTrialContent) -> str:
 @page_figure
 def surface_figure(content: StepTrialContent) -> str:
     """Both dampings and both inertias: measured, and by the model at the same places."""
-    figure = new_figure(6.8, 5.4)
-    axes = figure.subplots(2, 2)
-    trial, model = content.trial, content.trial.model
+    trial, halves = content.trial, content.trial.model.halves
+    figure = new_figure(3.4 * len(halves), 5.4)
+    axes = figure.subplots(2, len(halves), squeeze=False)
     steady = [(one, one.plateau) for one in trial.samples if one.plateau is not None]
     states = np.array([part.state for _, part in steady])
-    for channel, (name, unit) in enumerate(zip(("throttle", "rudder"), command_units(content), strict=True)):
+    for place, (channel, damping, inertia) in enumerate(halves):
+        name, unit = CHANNELS[channel], command_units(content)[channel]
         given = np.array([one.hold.commands[channel] for one, _ in steady])
-        _against(axes[0, channel], states, given, model.damping[channel], f"damping = steady {name}", channel)
+        _against(axes[0, place], states, given, damping, f"damping = steady {name}", channel)
         own = [one for one in trial.samples if one.hold.channel == channel]
-        _inertia(axes[1, channel], own, model.inertia[channel], f"inertia to {name}")
+        _inertia(axes[1, place], own, inertia, f"inertia to {name}")
         if unit:
-            axes[0, channel].set_ylabel(f"{name} [{unit}]")
-            axes[1, channel].set_ylabel(f"[{unit} per {('m/s²', 'rad/s²')[channel]}]")
+            axes[0, place].set_ylabel(f"{name} [{unit}]")
+            axes[1, place].set_ylabel(f"[{unit} per {('m/s²', 'rad/s²')[channel]}]")
     return svg(figure, key="surfaces", label="Damping and inertia, measured and by the model")
 
 

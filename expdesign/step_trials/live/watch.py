@@ -13,7 +13,7 @@ import numpy as np
 from expdesign.errors import NotInformative
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
-from expdesign.step_trials.holds import CHANNELS, Hold, Sailed, changed_words, commands_of
+from expdesign.step_trials.holds import CHANNELS, Hold, Sailed, changed_words, commands_of, signed_speed
 from expdesign.step_trials.live import values
 from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence
 from expdesign.step_trials.live.values import Event, Finished, Held, Row, State
@@ -74,7 +74,7 @@ def _sailed(held: Held, sample_time_s: float, steps: StepList) -> Sailed:
     u, v, r = np.array([row.motion for row in held.rows]).T
     inputs = np.array([row.inputs for row in held.rows])
     return Sailed(
-        name="live", sample_time_s=sample_time_s, state=np.stack([np.hypot(u, np.nan_to_num(v)), r], axis=1), sway=v,
+        name="live", sample_time_s=sample_time_s, state=np.stack([signed_speed(u, v), r], axis=1), sway=v,
         commands=commands_of(steps.controls, steps.names, inputs), inputs=inputs,
     )  # fmt: skip
 
@@ -169,7 +169,7 @@ def _calibrated(state: State, held: Held, setup: Setup) -> StateAndEvents:
 def _states(rows: tuple[Row, ...]) -> np.ndarray:
     """(k, 2) U and r."""
     u, v, r = np.array([row.motion for row in rows]).T
-    return np.stack([np.hypot(u, np.nan_to_num(v)), r], axis=1)
+    return np.stack([signed_speed(u, v), r], axis=1)
 
 
 def _watching(state: State, sample: np.ndarray) -> State:

@@ -98,7 +98,7 @@ def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
         change=np.array([_change(one) for one, *_ in steps]),
         time_constant_s=np.array([constant for _, constant, _ in steps]),
         log_std=np.array([max(error, LEAST_LOG_STD) for *_, error in steps]),
-        delay_std_s=np.array([std for _, std in delays]),
+        delay_std_s=np.array([std if math.isfinite(std) else 0.0 for _, std in delays]),
     )
 
 

@@ -180,7 +180,7 @@ def with_delays(vessel: Vessel, controls: Controls, delays: Sequence[tuple[float
     """The vessel with dead times of throttle and rudder (value and standard error) in its file."""
     found: dict[str, tuple[float, float]] = {}
     for names, delay in zip((controls.throttle, controls.rudder), delays, strict=True):
-        found |= {f"{name}_delay_s": delay for name in names if delay is not None}
+        found |= {f"{name}_delay_s": delay for name in names if delay is not None and math.isfinite(delay[1])}
     std = {**vessel.std, **{name: delay[1] for name, delay in found.items() if delay[0] > 0}}
     actuators = with_response_values(vessel.actuators, {name: delay[0] for name, delay in found.items()})
     return replace(vessel, model=replace(vessel.model, actuators=actuators), std=std)

@@ -26,9 +26,11 @@ from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.step_trials import (
+    CHANNELS,
     Controls,
     Sailed,
     StepTrial,
+    ahead_only,
     controls_of,
     fit_percent,
     nominal_vessel,
@@ -132,9 +134,10 @@ def _turned(batch: Sailed, trial: StepTrial) -> Sailed:
 
 
 def _validated(trial: StepTrial, batch: Sailed) -> Validated:
+    batch = ahead_only(batch, trial.ahead)
     every = max(1, round(SIMULATED_STEP_S / batch.sample_time_s))
     states, step_s = batch.state[::every], every * batch.sample_time_s
-    simulated = trial.model.simulated(states[0], batch.commands[::every], sample_time_s=step_s)
+    simulated = trial.model.simulated(states, batch.commands[::every], sample_time_s=step_s)
     return Validated(
         name=batch.name,
         time_s=batch.time_s[::every],
@@ -172,10 +175,10 @@ def _summary(content: StepTrialContent) -> dict[str, object]:
         "holds": len(trial.holds),
         "steps_that_count": len(trial.counted),
         "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
-        "delay_throttle_s": trial.delays[0][0],
-        "delay_rudder_s": trial.delays[1][0],
+        **{f"delay_{CHANNELS[place]}_s": trial.delays[place][0] for place, *_ in trial.model.halves},
         "fit": {
-            part.name: {"U": part.fit_percent[0], "r": part.fit_percent[1]} for part in (*content.own, *content.tests)
+            part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves}
+            for part in (*content.own, *content.tests)
         },
         "remarks": [*sentences(content), *content.notes],
     }

@@ -15,6 +15,7 @@ from expdesign.export.roll_page import (
     PARAMETER_HEADER,
     RollContent,
     cure_rows,
+    headline,
     parameter_rows,
     roll_html,
     roll_json,
@@ -24,6 +25,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import load_records
 from expdesign.roll import (
     TUNING,
+    Body,
     Case,
     LowPass,
     RollEstimate,
@@ -137,7 +139,7 @@ def _cases(
         actuators = () if ship is None else ship.model.actuators
         record = load_records([path], outputs=("r",), sample_time_s=step_s, actuators=actuators)
         step_s = record.batches[0].sample_time_s
-        runs = tuple(_run(path, batch, rudder, ship) for batch in record.batches)
+        runs = tuple(_run(path, batch, rudder, ship, known.body) for batch in record.batches)
         cases.append(Case(name=path.stem, load=load, runs=runs))
         notes += record.notes
         followed |= any(batch.steered is not None and batch.steered.any() for batch in record.batches)
@@ -154,9 +156,9 @@ FOLLOWED = (
 )
 
 
-def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None) -> Run:
+def _run(path: Path, batch: Batch, rudder: Sequence[str], ship: Vessel | None, body: Body) -> Run:
     try:
-        return roll_run(batch, rudder=rudder, ship=ship)
+        return roll_run(batch, rudder=rudder, ship=ship, body=body)
     except UnknownName:
         raise
     except InputError as error:
@@ -196,6 +198,7 @@ def _check_passed(estimate: RollEstimate, used: LowPass) -> None:
 def _summary(content: RollContent) -> dict[str, object]:
     estimate = content.estimate
     return {
+        "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
         "parameters": estimate.values,
         "std": {name: std for name, std in estimate.std.items() if name not in estimate.held},
         "held": list(estimate.held),

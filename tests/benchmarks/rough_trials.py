@@ -1,0 +1,169 @@
+"""Step and roll trials in weather, by simulations that are not the project's: how often it is right what is said.
+
+`python tests/benchmarks/rough_trials.py STUDY [--seeds N] [--only CASE]`, one row for each case of a study:
+
+steps: shares of 95 % intervals that hold, in gusts and in a current; hysteresis found; holds astern; halves.
+holds: at 1 Hz, shares of trials with a model when held for as long as there is, and as is said to do.
+roll: loads inside their intervals, and trusted, in calm water, waves, with other damping, and sensors out of place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from expdesign.errors import ExpdesignError
+from expdesign.step_trials import StepTrial, controls_of, identify_steps
+from plain_craft import CONSTANTS_S, RATE_PER_RAD, ROUND, Craft, record, steady_speed
+from plain_roller import Sea, estimated
+
+LEVELS = tuple((n, a) for a in (0.15, 0.3) for n in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0))
+ASTERN = ((4.0, 0.2), (-4.0, 0.2), (-7.0, 0.2), (-4.0, 0.2), (4.0, 0.2))
+COVERED = {"calm": Craft(), "gusts": Craft(gusts_mps=0.08), "current of 0.3 m/s": Craft(current_mps=0.3, hold_s=80.0)}
+SEAS = {
+    "calm": Sea(),
+    "calm, rudder by the clock, damping 8 % by the square": Sea(zigzag_s=12.0, quadratic=0.08),
+    "calm, damping by the square half of the linear one": Sea(quadratic=0.5),
+    "waves, roll of 1 degree": Sea(roll_deg=1.0),
+    "sensor 3 m before midships": Sea(forward_m=3.0),
+    "tilt of 2 degrees, 2 m before, damping 20 % by the square": Sea(quadratic=0.2, forward_m=2.0, tilt_deg=2.0),
+}
+
+
+def _identified(seed: int, craft: Craft) -> StepTrial:
+    return identify_steps(record(seed, craft), controls_of(("n1", "rudder1")))
+
+
+def _covered(seeds: int, craft: Craft) -> str:
+    found: dict[str, list[bool]] = {"U": [], "r": [], "T": []}
+    for seed in range(seeds):
+        trial = _identified(seed, craft)
+        for one in trial.samples:
+            if one.plateau is None:
+                continue
+            n, rudder = one.hold.commands
+            apart = one.plateau.state - [
+                float(steady_speed(np.array(n), np.array(rudder), craft)),
+                RATE_PER_RAD * rudder,
+            ]
+            for name, z in zip("Ur", apart / one.plateau.std, strict=True):
+                found[name].append(abs(z) < 1.96)
+            if one.counts and one.response is not None:
+                channel = one.hold.channel or 0
+                std = np.hypot(one.response.time_constant_std_s, trial.delays[channel][1])
+                found["T"].append(abs(one.response.time_constant_s - CONSTANTS_S[channel]) < 1.96 * std)
+    return ", ".join(f"{name} {100 * np.mean(hits):.0f} % of {len(hits)}" for name, hits in found.items())
+
+
+def _hysteresis(seeds: int, craft: Craft) -> str:
+    found = 0
+    for seed in range(seeds):
+        said = [one for one in _identified(seed, craft).found if (one.kind, one.command) == ("hysteresis", "throttle")]
+        found += any(one.p_value < 0.01 for one in said)
+    return f"said in {found} of {seeds}"
+
+
+def _astern(seeds: int) -> str:
+    """Whether a hold astern gives a steady state, and how far its speed is from that ahead of the same propeller."""
+    silent, worst = 0, 0.0
+    for seed in range(seeds):
+        try:
+            trial = _identified(seed, Craft(steps=ROUND + ASTERN))
+        except ExpdesignError:
+            continue
+        states = [(one.plateau.state[0], one.hold.commands[0]) for one in trial.samples if one.plateau is not None]
+        apart = [abs(speed - 0.4 * n) for speed, n in states if n < 0]
+        silent, worst = silent + bool(apart), max([worst, *apart])
+    return f"taken as steady ahead in {silent} of {seeds}" + (f", up to {worst:.2f} m/s off" if silent else "")
+
+
+def _half(seeds: int) -> str:
+    found, errors = 0, []
+    for seed in range(seeds):
+        try:
+            trial = _identified(seed, Craft(steps=ROUND[:7]))
+        except ExpdesignError:
+            continue
+        found += 1
+        damping = trial.model.damping[0]
+        assert damping is not None
+        errors += [damping.at(speed, 0.12) * 0.4 - speed for speed in (2.0, 3.0, 4.0)]
+    rms = f", speeds within {np.sqrt(np.mean(np.square(errors))):.3f} m/s rms" if errors else ""
+    return f"the speed's half in {found} of {seeds}{rms}"
+
+
+def steps(seeds: int) -> Iterator[tuple[str, str]]:
+    """Rows of step trials."""
+    for name, craft in COVERED.items():
+        yield f"intervals, {name}", _covered(seeds, craft)
+    yield "no hysteresis", _hysteresis(seeds, Craft(hump=True, steps=LEVELS))
+    yield "planing 0.18 m/s off at one level", _hysteresis(seeds, Craft(hump=True, steps=LEVELS, planing_play_rps=0.17))
+    yield "holds astern", _astern(seeds)
+    yield "steps of the throttle alone", _half(seeds)
+
+
+def holds(seeds: int) -> Iterator[tuple[str, str]]:
+    """Rows of short holds at 1 Hz."""
+    for hold_s in (12.0, 20.0, 40.0):
+        first, then, lengths = 0, 0, []
+        for seed in range(seeds):
+            try:
+                _identified(seed, Craft(step_s=1.0, hold_s=hold_s))
+                first += 1
+            except ExpdesignError as error:
+                would = re.search(r"; (\d+) s or more would do", str(error))
+                if would is None:
+                    continue
+                lengths.append(float(would[1]))
+                trial = _identified(seed, Craft(step_s=1.0, hold_s=lengths[-1]))
+                then += len(trial.model.halves) == 2
+        said = (
+            f"; {min(lengths):.0f} to {max(lengths):.0f} s said to do, which gives both halves in {then}"
+            if lengths
+            else ""
+        )
+        yield f"1 Hz, holds of {hold_s:g} s", f"a model in {first} of {seeds}{said}"
+
+
+def roll(seeds: int, only: str = "") -> Iterator[tuple[str, str]]:
+    """Rows of roll trials; intervals of two standard deviations where there is no profile."""
+    for name, sea in SEAS.items():
+        if not name.startswith(only):
+            continue
+        inside = trusted = answers = 0
+        errors = []
+        for seed in range(seeds):
+            one = estimated(seed, sea)
+            value, std = one.values["m"], one.std["m"]
+            low, high = getattr(one, "load_interval", None) or (value - 1.96 * std, value + 1.96 * std)
+            trusted += one.trusted
+            answers += one.answering
+            inside += one.trusted and low <= sea.load[0] <= high
+            errors += [value - sea.load[0]] * one.trusted
+        rms = f", error {np.sqrt(np.mean(np.square(errors))):.0f} kg rms" if errors else ""
+        said = f"rudder said to answer in {answers}"
+        yield name, f"trusted {trusted} of {seeds}, load inside in {inside}{rms}; {said}"
+
+
+STUDIES = {"steps": steps, "holds": holds, "roll": roll}
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("study", choices=STUDIES)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--only", default="", help="beginning of the names of cases of roll")
+    asked = parser.parse_args()
+    print("| case | found | processor s |\n|---|---|---|")
+    begun = time.process_time()
+    rows = roll(asked.seeds, asked.only) if asked.study == "roll" else STUDIES[asked.study](asked.seeds)
+    for case, text in rows:
+        print(f"| {case} | {text} | {time.process_time() - begun:.0f} |", flush=True)
+        begun = time.process_time()

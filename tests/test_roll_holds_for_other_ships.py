@@ -1,0 +1,82 @@
+"""Roll of a coaster that the project does not simulate: damping by the square, sensors out of place, waves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from expdesign.export.roll_page import RollContent, headline, parameter_rows, roll_sentences
+from expdesign.roll import Body, RollEstimate, null_space
+from expdesign.roll.record import levelled
+from expdesign.roll.runs import EFFECTS, LowPass
+from plain_roller import MASS_KG, SENSOR_HEIGHT_M, STEP_S, Sea, estimated, run
+
+FEW_S = 600.0
+
+
+@cache
+def found(seed: int, sea: Sea) -> RollEstimate:
+    return estimated(seed, sea)
+
+
+def inside(one: RollEstimate, mass_kg: float) -> bool:
+    assert one.load_interval is not None
+    return one.load_interval[0] <= mass_kg <= one.load_interval[1]
+
+
+def test_damping_by_the_square_is_estimated_and_costs_no_answer() -> None:
+    sea = Sea(quadratic=0.5, run_s=FEW_S)
+    one = found(0, sea)
+    value, std = one.effects["quadratic"]
+    assert one.trusted
+    assert abs(value - sea.quadratic / 0.1) < 4 * std < sea.quadratic / 0.1
+    assert inside(one, sea.load[0])
+
+
+def test_a_rudder_set_by_the_clock_does_not_answer_roll() -> None:
+    """A helm by the clock foresees itself, and what a model misses follows the rudder; neither is an answer."""
+    assert not any(found(seed, Sea(zigzag_s=12.0, quadratic=0.08, run_s=FEW_S)).answering for seed in range(3))
+
+
+def test_the_sensors_place_and_tilt_are_found() -> None:
+    sea = Sea(quadratic=0.2, forward_m=2.0, tilt_deg=2.0)
+    one = found(0, sea)
+    for name, truth in {"forward": sea.forward_m, "tilt": np.radians(sea.tilt_deg)}.items():
+        value, std = one.effects[name]
+        assert abs(value - truth) < 4 * std
+    assert one.trusted
+    assert inside(one, sea.load[0])
+
+
+def test_a_stated_place_and_tilt_are_those_of_a_level_sensor_at_midships() -> None:
+    """Up to the noise, and to a derivative by differences."""
+    body = Body(mass_kg=MASS_KG, z_g=0.0, z_s=-SENSOR_HEIGHT_M, forward_m=3.0, tilt_rad=np.radians(4.0))
+    plain, moved = (run(4, (0.0, 0.0), Sea(run_s=60.0, forward_m=x, tilt_deg=t)) for x, t in ((0.0, 0.0), (3.0, 4.0)))
+    corrected = levelled(moved, body, STEP_S)
+    assert np.std(corrected - plain, axis=0)[:3] == pytest.approx([0.0, 0.0, 0.0], abs=0.03)
+    assert np.std(corrected - plain, axis=0)[0] < 0.2 * np.std(moved - plain, axis=0)[0]
+
+
+def test_a_load_is_positive_and_its_interval_longer_above_than_below_in_waves() -> None:
+    """The moments tell mass times height and mass times its square: the smaller the height, the larger the mass."""
+    sea = Sea(roll_deg=1.0, run_s=FEW_S)
+    several = [found(seed, sea) for seed in range(3)]
+    for one in several:
+        assert one.load_interval is not None
+        low, high = one.load_interval
+        assert 0.0 <= low <= one.values["m"] <= high
+        assert high - one.values["m"] > one.values["m"] - low
+    assert sum(inside(one, sea.load[0]) for one in several) >= 2
+
+
+def test_nothing_to_be_trusted_is_said_first() -> None:
+    one = replace(found(0, Sea(quadratic=0.5, run_s=FEW_S)), unanswered=0.0)
+    blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
+    content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="", version="")
+    assert headline(content) == "the rudder seems to answer roll"
+    assert roll_sentences(content)[0] == f"None of these estimates is to be trusted: {headline(content)}."
+    assert all("none to be trusted" in row[3] for row in parameter_rows(content) if row[3] != "given")
+    assert set(one.effects) <= set(EFFECTS)
