@@ -224,16 +224,16 @@ class _Search:
         Raises:
             NoAnswer: none within the limits do.
         """
-        offer, tangents, found = self.offer(prices), tried[-1].tangents if tried else (), list[tuple[Choice, float]]()
+        offer, found = self.offer(prices), list[tuple[Choice, float]]()
         for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
                 level = margin + self.accuracy.margin(day.whole) - day.margin
-                choice = cheapest_runs(self.accuracy, near, level=level, tangents=tangents)
+                choice = cheapest_runs(self.accuracy, near, level=level)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
-            choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin, tangents=tangents)
+            choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin)
             found.append((choice, -np.inf))  # nothing to compare with
         return found
 
