@@ -226,8 +226,8 @@ class _Relaxation:
     def inside(self) -> Array | None:
         """Some x with all c(x) > 0, or None."""
         for share in INSIDE_SHARES:
-            x = self.low + share * (self.high - self.low)
-            x[-1] = min(x[-1], share * float(self.offer.saved_s @ x[:-1]))
+            x: Array = self.low + share * (self.high - self.low)
+            x[-1] = min(float(x[-1]), share * float(self.offer.saved_s @ x[:-1]))
             if (self.constraints(x).c > 0).all():
                 return x
         return None

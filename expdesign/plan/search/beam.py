@@ -22,7 +22,6 @@ from expdesign.plan.values import Placement
 from expdesign.processes import in_order
 from expdesign.values import Array
 
-
 BEAM_WIDTH = 400  # partial plans kept
 POLISHED_ORDERS = 6  # orders of runs of which the best plan is polished; the best one then counts
 CHECKED_AT_ONCE, SORTED_AT_ONCE = 1024, 8192  # successors checked for clearance at a time, and sorted
