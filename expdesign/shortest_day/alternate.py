@@ -31,6 +31,9 @@ from expdesign.values import Array
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
+# forecasts of what days tell without an error, that the errors seen are averaged with, and the share of the shortest
+# day that reaches the accuracy by which another must be expected to be shorter, for it to be drafted
+EXACT_FORECASTS, LEAST_SAVING = 1.0, 0.01
 PRUNED = 1  # days, the shortest first, from which runs are left out in the end
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
@@ -193,14 +196,15 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin.
 
-        None where no day is expected to be shorter than the shortest that reaches it, go-arounds included.
+        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included. Where
+        days told less than was foreseen, the more is asked for.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
         for step in range(LEVEL_STEPS):
-            margin = step * LEVEL_STEP
+            margin = step * LEVEL_STEP + _overrated(days, tried)
             try:
                 found = self.choices(prices, days, tried, margin=margin)
             except NoAnswer:
@@ -210,7 +214,7 @@ class _Search:
             fresh = [one for one in found if all(one[0].repeats != earlier.repeats for earlier in tried)]
             if fresh:
                 choice, expected_s = min(fresh, key=lambda one: one[1])
-                return choice if expected_s < reached_s else None
+                return choice if expected_s < (1 - LEAST_SAVING) * reached_s else None
         return None
 
     def choices(
@@ -228,8 +232,10 @@ class _Search:
         for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
-                level = margin + self.accuracy.margin(day.whole) - day.margin
-                choice = cheapest_runs(self.accuracy, near, level=level)
+                beside = self.accuracy.margin(day.whole) - day.margin
+                choice = cheapest_runs(self.accuracy, near, level=margin + beside)
+                told = self.accuracy.margin(near.information(np.array(choice.repeats, dtype=float)))
+                choice = replace(choice, foreseen=told - beside)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
@@ -384,6 +390,14 @@ class _Search:
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
             f"{reached_s:.0f} s; {within}; a larger most_s or less accuracy would do"
         )
+
+
+def _overrated(days: Sequence[DraftedDay], tried: Sequence[Choice]) -> float:
+    """How much less days told than was foreseen from those before, on average with forecasts that were exact."""
+    foreseen = {choice.repeats: choice.foreseen for choice in tried}
+    known = [(foreseen[day.repeats], day.margin) for day in days if np.isfinite(day.margin)]
+    missing = [told - margin for told, margin in known if told is not None]
+    return sum(missing) / (len(missing) + EXACT_FORECASTS)
 
 
 def promised_at_zero(promised: Sequence[float], margins: Sequence[float]) -> float:

@@ -115,6 +115,7 @@ class Choice:
     repeats: tuple[int, ...]  # (q,) whole runs, one at least
     cost_s: float  # of them, less what they save
     bound_s: float  # no runs, whole or not, reach the accuracy for less
+    foreseen: float | None = None  # margin of a day with them, where others have been drafted to tell it from
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -241,12 +242,12 @@ class _Relaxation:
             values, gradients, curvatures = self.accuracy.curved(M, self.offer.matrices)
             # the share of what is needed is concave as its logarithm is, and nearer to linear
             shares = np.exp(values - self.level)
-            slopes = gradients.reshape(len(gradients), -1) @ parts.T
+            slopes = gradients.reshape(-1, M.size) @ parts.T
             curvatures = shares[:, None, None] * (curvatures - slopes[:, :, None] * slopes[:, None])
             gradients = shares[:, None, None] * gradients
         gradients = np.concatenate([gradients, np.array(self.cuts).reshape(-1, *M.shape)])
         tangents = [float(np.sum(G * M)) + offset for G, offset in zip(self.cuts, self.offsets, strict=True)]
-        told = gradients.reshape(len(gradients), -1) @ parts.T
+        told = gradients.reshape(-1, M.size) @ parts.T
         needed = np.array([self.high[-1] > 0, self.low.sum() < 1])
         unit = np.eye(q + 1)[self.free]
         return _Constraints(
@@ -302,7 +303,10 @@ def _interior(task: _Relaxation, x: Array) -> tuple[Array, Array]:
         H = np.tensordot(y[: len(bent)], bent, axes=1) + slopes.T @ (slopes * (y / spare)[:, None])
         scale = 1.0 / np.sqrt(np.diag(H))
         wanted = (small - y * missing) / spare @ slopes - cost
-        step = scale * np.linalg.solve(H * np.outer(scale, scale), scale * wanted)
+        try:
+            step = scale * np.linalg.solve(H * np.outer(scale, scale), scale * wanted)
+        except np.linalg.LinAlgError:  # many tangents at nearly one place: no nearer in these numbers
+            break
         grown = slopes @ step + missing
         rise = (small - y * grown) / spare - y
         length = min(1.0, 0.99 / max(float(np.max([-rise / y, -grown / spare])), 1e-300))
@@ -332,12 +336,13 @@ def _relaxed(task: _Relaxation) -> Relaxed:
             worth=np.tensordot(y[:told], at.gradients, axes=1),
             worth_of_saved=min(float(y[told]), 1.0) if task.high[-1] > 0 else 0.0,
         )
-        short, enough = x[:-1], inner[:-1]
-        if accuracy.margin(offer.information(short)) >= task.level - TUNING.choice_gap / 10:
+        missing = task.level - accuracy.margin(offer.information(x[:-1]))
+        if missing <= TUNING.choice_gap / 10:
             break
-        for _ in range(HALVINGS):
+        short, enough = x[:-1], inner[:-1]
+        for _ in range(HALVINGS if missing > TUNING.choice_gap else 0):
             middle = (short + enough) / 2
             reaches = accuracy.margin(offer.information(middle)) >= task.level
             short, enough = (short, middle) if reaches else (middle, enough)
-        task.add(enough)
+        task.add(enough if missing > TUNING.choice_gap else short)
     return best
