@@ -86,7 +86,6 @@ def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required,
     monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places: places)
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
-    monkeypatch.setattr("expdesign.shortest_day.drafting._as_late", lambda day, others: day)
     begun = day_of(["much", "little", "less", "little"])
     found = drafting.without_spare_runs(begun)
     assert found.repeats == tuple(left.count(name) for name in NAMES)

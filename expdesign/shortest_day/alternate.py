@@ -31,10 +31,7 @@ from expdesign.values import Array
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
-# forecasts of what days tell without an error, that the errors seen are averaged with, and the share of the shortest
-# day that reaches the accuracy by which another must be expected to be shorter, for it to be drafted
-EXACT_FORECASTS, LEAST_SAVING = 1.0, 0.01
-PRUNED = 1  # days, the shortest first, from which runs are left out in the end
+LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
 
@@ -65,7 +62,6 @@ def shortest_day(
     days, last, planning = search.rounds(search.untried, progress)
     if problem.settings.draft:
         return search.draft(days, last, planning)
-    days += search.pruned(days)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
@@ -100,7 +96,7 @@ def fullest_day(
         NoAnswer: every day found takes longer.
         NoPlan: no day was found at all.
     """
-    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
+    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added), fullest=True)
     days, last, planning = search.rounds(partial(search.filling, day_s), progress)
     if problem.settings.draft:
         return replace(search.draft(days, last, planning), most_s=day_s)
@@ -136,6 +132,7 @@ class _Search:
     problem: PlanProblem
     accuracy: Accuracy
     added: tuple[str, ...]
+    fullest: bool = False  # whether the accuracy is to be as large as can be, instead of the day as short
     # runs found to have no place in the water, to be unstable for drawn ships, or to be reached by no leg in the time
     # budget; grows
     placeless: set[str] = field(default_factory=set)
@@ -143,7 +140,7 @@ class _Search:
     @property
     def drafting(self) -> Drafting:
         """How days are drafted."""
-        return Drafting(problem=self.problem, accuracy=self.accuracy)
+        return Drafting(problem=self.problem, accuracy=self.accuracy, fullest=self.fullest)
 
     def rounds(
         self, choose: Callable[[Prices, Sequence[DraftedDay], Sequence[Choice]], Choice | None], progress: Progress
@@ -165,7 +162,7 @@ class _Search:
         while rounds and (choice := choose(prices, days, choices)) is not None:
             choices.append(choice)
             try:
-                days.append(self.drafting.drafted(choice.repeats, days, rounds[0]))
+                days = self.drafting.with_another(days, choice.repeats, rounds[0])
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
@@ -196,22 +193,22 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin.
 
-        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included. Where
-        days told less than was foreseen, the more is asked for.
+        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
         """
         reached_s = min((day.expected_s for day in days if day.margin >= 0), default=np.inf)
         for step in range(LEVEL_STEPS):
-            margin = step * LEVEL_STEP + _overrated(days, tried)
+            margin = step * LEVEL_STEP
             try:
                 found = self.choices(prices, days, tried, margin=margin)
             except NoAnswer:
                 if not tried:
                     raise
                 return None  # the limits allow no more than what was tried
-            fresh = [one for one in found if all(one[0].repeats != earlier.repeats for earlier in tried)]
+            known = {other.repeats for other in tried} | {day.repeats for day in days}
+            fresh = [one for one in found if one[0].repeats not in known]
             if fresh:
                 choice, expected_s = min(fresh, key=lambda one: one[1])
                 return choice if expected_s < (1 - LEAST_SAVING) * reached_s else None
@@ -232,10 +229,8 @@ class _Search:
         for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
-                beside = self.accuracy.margin(day.whole) - day.margin
-                choice = cheapest_runs(self.accuracy, near, level=margin + beside)
-                told = self.accuracy.margin(near.information(np.array(choice.repeats, dtype=float)))
-                choice = replace(choice, foreseen=told - beside)
+                level = margin + self.accuracy.margin(day.whole) - day.margin
+                choice = cheapest_runs(self.accuracy, near, level=level)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
@@ -251,11 +246,6 @@ class _Search:
     def offer(self, prices: Prices) -> Offer:
         """What runs cost and tell with their legs, by the prices."""
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
-
-    def pruned(self, days: Sequence[DraftedDay]) -> list[DraftedDay]:
-        """The shortest days that reach the accuracy, less runs that it does not need; none of which all are needed."""
-        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[:PRUNED]
-        return [other for day in reached if (other := self.drafting.without_spare_runs(day)) is not day]
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""
@@ -390,14 +380,6 @@ class _Search:
             f"design.accuracy.most_s is {most_s:g}: the shortest day found that reaches the accuracy takes "
             f"{reached_s:.0f} s; {within}; a larger most_s or less accuracy would do"
         )
-
-
-def _overrated(days: Sequence[DraftedDay], tried: Sequence[Choice]) -> float:
-    """How much less days told than was foreseen from those before, on average with forecasts that were exact."""
-    foreseen = {choice.repeats: choice.foreseen for choice in tried}
-    known = [(foreseen[day.repeats], day.margin) for day in days if np.isfinite(day.margin)]
-    missing = [told - margin for told, margin in known if told is not None]
-    return sum(missing) / (len(missing) + EXACT_FORECASTS)
 
 
 def promised_at_zero(promised: Sequence[float], margins: Sequence[float]) -> float:

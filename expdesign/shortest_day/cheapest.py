@@ -115,7 +115,6 @@ class Choice:
     repeats: tuple[int, ...]  # (q,) whole runs, one at least
     cost_s: float  # of them, less what they save
     bound_s: float  # no runs, whole or not, reach the accuracy for less
-    foreseen: float | None = None  # margin of a day with them, where others have been drafted to tell it from
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
