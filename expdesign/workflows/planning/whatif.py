@@ -13,7 +13,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
-from expdesign.errors import InputError, NoAnswer
+from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
 from expdesign.export.whatif_page.page import table_header, table_row
@@ -90,9 +90,9 @@ def whatif(
         remembering((user_memory() if cache else None) or Memory(Path(folder))) as memory,
         workers(jobs, scheduler=scheduler, load=load_plans),
     ):
-        for case, _ in cases if with_plan else ():
+        for (case, _), path in zip(cases, (scenario, *variants), strict=True) if with_plan else ():
             with suppress(NoAnswer):
-                _check(case, seed)
+                _check(case, path, seed)
         if searched:
             with suppress(NoAnswer):  # the case itself says so
                 _search(base, seed, within(progress, 0.0, searched))
@@ -115,16 +115,18 @@ def whatif(
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
 
 
-def _check(case: Scenario, seed: int) -> None:
-    """Raise InputError for what is wrong with a case and would else be found once others have been planned for long."""
+def _check(case: Scenario, path: Path, seed: int) -> None:
+    """Raise FileError for what is wrong with a case and would else be found once others have been planned for long."""
     try:
         check_plannable(case)
         information = scored(case)
         design = designed(case, information, seed=seed)
         if case.design.accuracy is not None:
             checked_day(case, information, design)
+    except FileError:
+        raise
     except InputError as error:
-        raise InputError(f"{case.name}: {error}") from None
+        raise FileError(path, "", str(error)) from None
 
 
 def _search(case: Scenario, seed: int, progress: Progress) -> None:
