@@ -100,15 +100,7 @@ def test_wrong_variants_are_one_line_of_their_own_file(tmp_path, capsys, text, w
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        'robust = "worst"',
-        "balance = 0.5",
-        'predictor = "velocity"',
-        'budgets = [{name = "b", most = 900.0, cost = {}}]',
-    ],
-)
+@pytest.mark.parametrize("text", ['robust = "worst"', "balance = 0.5", 'predictor = "velocity"'])
 def test_what_is_wrong_with_a_variant_is_said_before_anything_is_planned(tmp_path, monkeypatch, capsys, text):
     path = variant(tmp_path, "wrong", f'[design]\n{text}\n[design.accuracy]\nas = "durations"\n')
 

@@ -40,19 +40,20 @@ class Drafting:
         """Days with that of these runs; the water and the transitions of the day before are not worked out again.
 
         Where it reaches the accuracy and the shortest day is sought, the shorter day without runs that it does not need
-        follows. Drawn trials tell how late that is, as days that reach the accuracy are compared by it, and others are
-        taken to be as late. Where a draft is all that is asked for, no runs are left out, and no trials are drawn.
+        follows. Drawn trials tell how late the first such day is; others are taken to be as late, second for second.
+        Where a draft is all that is asked for, no runs are left out, and no trials are drawn.
         """
         like = days[-1].draft if days else None
         drafted = [*days, self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))]
+        if self.problem.settings.draft:
+            return drafted
         reached = drafted[-1].margin >= 0
-        if self.problem.settings.draft or not (reached or (self.fullest and not days)):
-            return _alike_late(drafted)
         if reached and not self.fullest and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
             drafted.append(shorter)
-        draft = drafted[-1].draft
-        problem = replace(self._of(drafted[-1].repeats), area=draft.area)
-        drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
+        if (reached or self.fullest) and not any(day.drawn for day in days):
+            draft = drafted[-1].draft
+            problem = replace(self._of(drafted[-1].repeats), area=draft.area)
+            drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
         return _alike_late(drafted)
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
@@ -101,12 +102,9 @@ class Drafting:
 
 
 def _alike_late(days: list[DraftedDay]) -> list[DraftedDay]:
-    """Days as late as drawn trials say; those that none were drawn of as late as the others, second for second."""
-    known = [day for day in days if day.drawn]
-    if not known:
-        return days
-    share = float(np.mean([day.expected_s / day.day_s for day in known])) - 1.0
-    return [day if day.drawn else day.taken_late(share) for day in days]
+    """Days as late as the one that trials were drawn of, second for second."""
+    shares = [day.expected_s / day.day_s - 1.0 for day in days if day.drawn]
+    return [day if day.drawn or not shares else day.taken_late(shares[0]) for day in days]
 
 
 def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:
