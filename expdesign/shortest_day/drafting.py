@@ -50,7 +50,7 @@ class Drafting:
         reached = drafted[-1].margin >= 0
         if reached and not self.fullest and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
             drafted.append(shorter)
-        if (reached or self.fullest) and not any(day.drawn for day in days):
+        if (reached or self.fullest) and _late_share(days) is None:
             draft = drafted[-1].draft
             problem = replace(self._of(drafted[-1].repeats), area=draft.area)
             drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
@@ -103,8 +103,13 @@ class Drafting:
 
 def _alike_late(days: list[DraftedDay]) -> list[DraftedDay]:
     """Days as late as the one that trials were drawn of, second for second."""
-    shares = [day.expected_s / day.day_s - 1.0 for day in days if day.drawn]
-    return [day if day.drawn or not shares else day.taken_late(shares[0]) for day in days]
+    share = _late_share(days)
+    return [day if day.drawn or share is None else day.taken_late(share) for day in days]
+
+
+def _late_share(days: Sequence[DraftedDay]) -> float | None:
+    """How late drawn trials were, as a share of the day; None where none were drawn, or none ended at the goal."""
+    return next((day.expected_s / day.day_s - 1.0 for day in days if day.drawn and np.isfinite(day.expected_s)), None)
 
 
 def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:
