@@ -40,20 +40,20 @@ class Drafting:
         """Days with that of these runs; the water and the transitions of the day before are not worked out again.
 
         Where it reaches the accuracy and the shortest day is sought, the shorter day without runs that it does not need
-        follows. Drawn trials tell how late the first such day is; others are taken to be as late, second for second.
-        Where a draft is all that is asked for, no runs are left out, and no trials are drawn.
+        follows. Drawn trials tell how late the first day is; others are taken to be as late, second for second. Where a
+        draft is all that is asked for, no runs are left out, and no trials are drawn.
         """
         like = days[-1].draft if days else None
         drafted = [*days, self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))]
         if self.problem.settings.draft:
             return drafted
-        reached = drafted[-1].margin >= 0
-        if reached and not self.fullest and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
-            drafted.append(shorter)
-        if (reached or self.fullest) and _late_share(days) is None:
+        if _late_share(days) is None:
             draft = drafted[-1].draft
-            problem = replace(self._of(drafted[-1].repeats), area=draft.area)
+            problem = replace(self._of(repeats), area=draft.area)
             drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
+        reached = drafted[-1].margin >= 0 and not self.fullest
+        if reached and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
+            drafted.append(shorter)
         return _alike_late(drafted)
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
