@@ -1,6 +1,6 @@
 """Runs that a drafted day does not need are left out, and the others stay where they are."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +11,7 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import draft_trial, redrafted
 from expdesign.plan.values import Leg, Placement
+from expdesign.progress import silent
 from expdesign.shortest_day.drafting import Drafting
 from expdesign.shortest_day.prices import DraftedDay
 from expdesign.simulation import CALM
@@ -19,6 +20,18 @@ from plan_case import acceleration, area, ship
 TOLD = {"much": 5.0, "little": 1.0, "less": 0.5}
 NAMES = tuple(TOLD)
 NEEDED = 6.5
+
+
+@dataclass(frozen=True)
+class FewDraft:
+    """What is read of a draft."""
+
+    sailed: SimpleNamespace
+    made_good_m: np.ndarray
+    late_s: np.ndarray
+    transit_mps: float = 1.0
+    area: None = None
+    water: None = None
 
 
 def of_runs(*counts: int) -> SimpleNamespace:
@@ -69,7 +82,7 @@ def day_of(runs: list[str]) -> DraftedDay:
     told = np.array([TOLD[name] if kind == "primitive" else 0.2 for kind, name in kinds])
     places = tuple(Placement(primitive=name, pose=np.zeros(3)) for name in runs)
     sailed = SimpleNamespace(legs=legs, legs_s=np.array(lengths, dtype=float), day_s=float(ends[-1]), placements=places)
-    draft = SimpleNamespace(sailed=sailed, made_good_m=np.zeros(len(legs)), transit_mps=1.0, late_s=np.zeros(len(legs)))
+    draft = FewDraft(sailed=sailed, made_good_m=np.zeros(len(legs)), late_s=np.zeros(len(legs)))
     repeats = tuple(runs.count(name) for name in NAMES)
     return DraftedDay(
         repeats=repeats, draft=draft, information=told[:, None, None], margin=float(np.log(told.sum() / NEEDED))
@@ -86,9 +99,38 @@ def test_as_many_runs_are_left_out_as_the_accuracy_allows(monkeypatch, required,
     monkeypatch.setattr("expdesign.shortest_day.drafting.redrafted", lambda _, draft, places: places)
     monkeypatch.setattr(Drafting, "_of", lambda self, repeats: None)
     monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, places: day_of([one.primitive for one in places]))
-    monkeypatch.setattr("expdesign.shortest_day.drafting._as_late", lambda day, others: day)
     begun = day_of(["much", "little", "less", "little"])
     found = drafting.without_spare_runs(begun)
     assert found.repeats == tuple(left.count(name) for name in NAMES)
     assert found.margin >= 0
     assert drafting.without_spare_runs(found) is found
+
+
+@pytest.mark.parametrize(("fullest", "kept"), [(False, [8, 4, 2, 4, 2]), (True, [8, 4, 4])])
+def test_spare_runs_go_at_once_and_all_days_are_as_late_as_the_one_that_trials_are_drawn_of(monkeypatch, fullest, kept):
+    """A day of 8 runs that falls short, and twice one of 4 that reaches the accuracy with 2."""
+    days_of = {8: ["less"] * 8, 4: ["much", "little", "less", "little"]}
+    drafting = Drafting(
+        problem=SimpleNamespace(design=of_runs(1, 2, 1), settings=SimpleNamespace(draft=False)),
+        accuracy=SimpleNamespace(margin=lambda M: float(np.log(M[0, 0] / NEEDED))),
+        fullest=fullest,
+    )
+    drawn = []
+
+    def lateness_s(problem, water, sailed):
+        drawn.append(sailed)
+        return 0.1 * sailed.legs_s
+
+    module = "expdesign.shortest_day.drafting"
+    monkeypatch.setattr(f"{module}.redrafted", lambda _, draft, places: [one.primitive for one in places])
+    monkeypatch.setattr(f"{module}.draft_trial", lambda problem, *, like, progress: days_of[problem])
+    monkeypatch.setattr(f"{module}.drawn_lateness_s", lateness_s)
+    monkeypatch.setattr(f"{module}.replace", lambda problem, **_: problem)
+    monkeypatch.setattr(Drafting, "_of", lambda self, repeats: sum(repeats))
+    monkeypatch.setattr(Drafting, "_judged", lambda self, repeats, names: day_of(names))
+    days: list[DraftedDay] = []
+    for repeats in ((0, 0, 8), (1, 2, 1), (1, 2, 1)):
+        days = drafting.with_another(days, repeats, silent)
+    assert [sum(day.repeats) for day in days] == kept
+    assert len(drawn) == 1
+    assert [day.expected_s for day in days] == pytest.approx([1.1 * day.day_s for day in days])

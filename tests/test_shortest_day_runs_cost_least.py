@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from expdesign.durations import Collected, DurationProblem, optimal_shares
+from expdesign.durations import Aim, Collected, DurationProblem, optimal_shares
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day import Accuracy, cheapest_runs
 from expdesign.shortest_day.alternate import promised_at_zero
@@ -184,6 +184,63 @@ def test_no_run_offered_is_worth_more_than_it_costs_and_those_chosen_are_worth_i
     assert (net_s >= -1e-6 * cost_s).all()
     assert np.abs(net_s[found.runs > 1e-9]) == pytest.approx(0.0, abs=1e-6 * cost_s.max())
     assert 0.0 <= found.worth_of_saved <= 1.0
+
+
+@pytest.mark.parametrize("kind", range(4))
+def test_runs_and_prices_hang_on_no_rounding_of_the_information(kind):
+    rng = np.random.default_rng(kind)
+    matrices, cost_s = random_information(rng, 40), rng.uniform(30.0, 60.0, 40)
+    accuracy, known = accuracies(matrices[:5])[kind], 0.5 * random_information(rng, 1)[0]
+    offer = offered(matrices, cost_s, known=known, most=np.full(40, 200.0), saved_s=cost_s / 3, way_s=1e6)
+    found = cheapest_shares(accuracy, offer)
+    for _ in range(10):
+        rounded = matrices * (1 + 1e-12 * rng.standard_normal((40, 1, 1)))
+        other = cheapest_shares(accuracy, replace(offer, matrices=rounded))
+        assert other.runs == pytest.approx(found.runs, abs=1e-7)
+        assert other.worth == pytest.approx(found.worth, abs=1e-8 * np.abs(found.worth).max())
+
+
+@pytest.mark.parametrize("current", [0, 2])
+@pytest.mark.parametrize("kind", range(4))
+def test_margins_bend_as_their_supergradients_change(kind, current):
+    rng = np.random.default_rng(kind)
+    accuracy = accuracies(random_information(rng, 5))[kind]
+    matrices, runs = random_information(rng, 5, dimension=3 + current, rows=8), rng.uniform(1.0, 9.0, 5)
+
+    def at(runs):
+        M = np.tensordot(runs, matrices, axes=1)
+        values, gradients, curvatures = accuracy.curved(M, matrices)
+        return values, np.einsum("kij,qji->kq", gradients, matrices), curvatures, accuracy.margin(M)
+
+    values, slopes, curvatures, margin = at(runs)
+    assert values.min() == pytest.approx(margin)
+    for place, step in enumerate(1e-5 * np.eye(5)):
+        (higher, above, *_), (lower, below, *_) = at(runs + step), at(runs - step)
+        assert slopes[:, place] == pytest.approx((higher - lower) / 2e-5, rel=1e-6)
+        assert curvatures[:, place] == pytest.approx((below - above) / 2e-5, rel=1e-5, abs=1e-8)
+
+
+def test_where_the_margin_has_kinks_tangents_lead_to_the_cheapest_runs():
+    rng = np.random.default_rng(2)
+    matrices, cost_s = random_information(rng, 6), rng.uniform(10.0, 60.0, 6)
+    problem = DurationProblem(
+        names=tuple(f"run{k}" for k in range(6)),
+        parameters=PARAMETERS,
+        mean_subtraction="none",
+        matrices=matrices,
+        run_s=np.ones(6),
+        total_s=SAMPLES,
+        aim=Aim(criterion="E", unit=np.ones(3), noise=np.ones(3)),
+    )
+    design, collected = optimal_shares(problem), Collected.of(problem)
+    accuracy = replace(
+        std_accuracy(np.full(3, np.inf)), collected=collected, level=collected.value(design.fractions), samples=SAMPLES
+    )
+    offer = offered(matrices, np.ones(6), known=np.zeros((3, 3)), most=np.full(6, 200.0))
+    assert cheapest_shares(accuracy, offer).bound_s == pytest.approx(SAMPLES, rel=1e-3)
+    found = cheapest_shares(accuracy, replace(offer, cost_s=cost_s))
+    assert found.bound_s <= cost_s @ found.runs + 1e-6 <= 1.001 * found.bound_s
+    assert accuracy.margin(offer.information(found.runs)) >= -1e-3
 
 
 def test_an_outcome_is_as_accurate_as_the_parameters_along_its_gradient():

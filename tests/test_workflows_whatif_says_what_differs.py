@@ -100,6 +100,23 @@ def test_wrong_variants_are_one_line_of_their_own_file(tmp_path, capsys, text, w
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("text", ['robust = "worst"', "balance = 0.5", 'predictor = "velocity"'])
+def test_what_is_wrong_with_a_variant_is_said_before_anything_is_planned(tmp_path, monkeypatch, capsys, text):
+    path = variant(tmp_path, "wrong", f'[design]\n{text}\n[design.accuracy]\nas = "durations"\n')
+
+    def planned(*_, **__):
+        raise AssertionError("a trial is planned")
+
+    monkeypatch.setattr("expdesign.workflows.planning.whatif.planned_day", planned)
+    monkeypatch.setattr("expdesign.workflows.planning.whatif.search_additions", planned)
+    command = ["whatif", str(MODEL_SHIP), str(path), "--plan", "--jobs", "1", "--no-cache"]
+    assert main([*command, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert str(path) in error
+    assert f"design.{text.split()[0]}" in error
+    assert not (tmp_path / "out").exists()
+
+
 def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
     path = variant(tmp_path, "model-ship", "[design]\n")
     with pytest.raises(InputError, match="'model-ship' is given to 2 cases"):

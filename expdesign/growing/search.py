@@ -23,6 +23,7 @@ from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
+EQUAL = 9  # decimals to which worths are compared, so that rounding does not choose between mirror images
 LIMIT_ROUNDING = 1e-9  # excess over a limit that counts as rounding, as a share of its range
 FEWEST_CLOSED_LOOP = 8  # least number of candidates of a closed-loop family
 # closed-loop families, simulated one by one, get this many times fewer candidates and no local steps
@@ -160,7 +161,7 @@ class Archive:
     def merits(self, worth: Worth) -> Array:
         """(n,) worth of those within limits, minus the violation of the others."""
         found = worth.of(self.runs.matrices, self.runs.made_good_m, self.space.run_s)
-        return np.where(self.runs.excess <= LIMIT_ROUNDING, found, -self.runs.excess)
+        return np.where(self.runs.excess <= LIMIT_ROUNDING, np.round(found, EQUAL), -self.runs.excess)
 
     def best(self, worth: Worth) -> Candidate | None:
         """The candidate within limits that is worth most, if any is within them."""

@@ -10,7 +10,7 @@ Source: F. Pukelsheim, Optimal Design of Experiments (2006), 3.10 for the inform
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -88,6 +88,29 @@ def slope_of_whole(whole: Array, parameters: int, slope: Array) -> Array:
     found = left.T @ slope[:p, :p] @ left
     found[p:d, p:d] += slope[p:, p:]
     return np.asarray(found)
+
+
+def curved_beside_current(whole: Array, parameters: int, parts: Array) -> tuple[Callable[[Array], Array], Array]:
+    """How `beside_current` changes with the weights of parts (c, d + 2, d + 2).
+
+    Returns:
+        a function from the derivative (p, p) of a measure by what is left about the ship's parameters to what its
+        curvature gains, minus the second derivatives (c, c), and the first derivatives (c, d, d).
+    """
+    p, d = parameters, len(whole) - len(STEADY_CURRENT)
+    inverse = _pseudo_inverse(whole[p:, p:])
+    left = np.concatenate([np.eye(p), -whole[:p, p:] @ inverse], axis=1)
+    seen = left @ parts  # (c, p, d + 2)
+    moved = np.zeros((len(parts), d, d))
+    moved[:, p:, p:] = parts[:, p:d, p:d]
+    moved[:, :p, :p] = seen @ left.T
+    rest = seen[:, :, p:]
+
+    def gained(slope: Array) -> Array:
+        told = slope @ rest @ inverse
+        return np.asarray(2 * told.reshape(len(parts), -1) @ rest.reshape(len(parts), -1).T)
+
+    return gained, moved
 
 
 def _pseudo_inverse(M: Array) -> Array:

@@ -25,12 +25,14 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.durations import Collected, DurationDesign
+from expdesign.durations.criteria import LogTrace
+from expdesign.durations.criteria.measures import SmoothMeasure
 from expdesign.durations.criteria.models import congruent
 from expdesign.errors import InputError, NotInformative
 from expdesign.information.expected import expected_covariance
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise
-from expdesign.information.unknown_current import beside_current, slope_of_whole
+from expdesign.information.unknown_current import beside_current, curved_beside_current, slope_of_whole
 from expdesign.rehearsal import trial_parts
 from expdesign.shortest_day.values import AccuracySettings
 from expdesign.simulation import CALM, Environment
@@ -215,6 +217,40 @@ class Accuracy:
         direction = self._directions[index]
         column = self._inverse(information) @ direction
         return np.asarray(np.outer(column, column) / (column @ direction))
+
+    def curved(self, information: Array, parts: Array) -> tuple[Array, Array, Array]:
+        """What f is the least of, as functions of the weights of parts of regular information.
+
+        Args:
+            information: as of `margin`.
+            parts: (c, d, d) or (c, d + 2, d + 2), shaped as it.
+
+        Returns:
+            (k,) values, (k, ...) derivatives by the information, shaped as it, and (k, c, c) minus the second ones by
+            the weights; without E, which has none.
+        """
+        p, whole, current = len(self.parameters), information, len(information) > len(self.prior)
+        moved, information = parts, self.about_ship(information)
+        if current:
+            bent, moved = curved_beside_current(whole, p, parts)
+        found = list[tuple[float, Array, Array]]()
+        if self.collected is not None and isinstance(measure := self.collected.pieces[0].measure, SmoothMeasure):
+            white = congruent(self.collected.pieces[0].transformation, moved / self.samples)
+            M, degree = self._whitened(information), self.collected.degree
+            G, T = measure.gradient(M) / degree, self.collected.pieces[0].transformation
+            curvature = measure.curvature(M, white) / degree
+            found.append((self._criterion_margin(information), T.T @ G @ T / self.samples, curvature))
+        margins = self._margins(information)
+        for index in np.flatnonzero(np.isfinite(margins)).tolist():
+            measure = LogTrace(self._directions[index][:, None])
+            total = self.prior + information
+            found.append((float(margins[index]), measure.gradient(total), measure.curvature(total, moved)))
+        values, gradients = np.array([value for value, _, _ in found]), [gradient for _, gradient, _ in found]
+        curvatures = np.array([curvature for _, _, curvature in found]).reshape(-1, len(parts), len(parts))
+        if current:
+            curvatures += np.array([bent(G[:p, :p]) for G in gradients]).reshape(curvatures.shape)
+            gradients = [slope_of_whole(whole, p, G) for G in gradients]
+        return values, np.array(gradients).reshape(-1, *whole.shape), curvatures
 
     def scarcest(self, information: Array) -> str:
         """The parameter or outcome whose standard deviation is furthest from its limit; "" where the criterion is."""

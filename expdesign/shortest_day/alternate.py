@@ -31,7 +31,7 @@ from expdesign.values import Array
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
 LEVEL_STEP, LEVEL_STEPS = 0.05, 10
-PRUNED = 1  # days, the shortest first, from which runs are left out in the end
+LEAST_SAVING = 0.01  # share of the shortest day that reaches the accuracy, for which another is drafted
 # information, in shares of what is needed, for which the day is estimated
 CURVE_SHARES = (0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
 
@@ -62,7 +62,6 @@ def shortest_day(
     days, last, planning = search.rounds(search.untried, progress)
     if problem.settings.draft:
         return search.draft(days, last, planning)
-    days += search.pruned(days)
     reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)
     allowed = [day for day in reached if most_s is None or day.day_s <= most_s]
     if reached and not allowed and most_s is not None:
@@ -97,7 +96,7 @@ def fullest_day(
         NoAnswer: every day found takes longer.
         NoPlan: no day was found at all.
     """
-    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added))
+    search = _Search(problem=problem, accuracy=accuracy, added=tuple(added), fullest=True)
     days, last, planning = search.rounds(partial(search.filling, day_s), progress)
     if problem.settings.draft:
         return replace(search.draft(days, last, planning), most_s=day_s)
@@ -133,6 +132,7 @@ class _Search:
     problem: PlanProblem
     accuracy: Accuracy
     added: tuple[str, ...]
+    fullest: bool = False  # whether the accuracy is to be as large as can be, instead of the day as short
     # runs found to have no place in the water, to be unstable for drawn ships, or to be reached by no leg in the time
     # budget; grows
     placeless: set[str] = field(default_factory=set)
@@ -140,7 +140,7 @@ class _Search:
     @property
     def drafting(self) -> Drafting:
         """How days are drafted."""
-        return Drafting(problem=self.problem, accuracy=self.accuracy)
+        return Drafting(problem=self.problem, accuracy=self.accuracy, fullest=self.fullest)
 
     def rounds(
         self, choose: Callable[[Prices, Sequence[DraftedDay], Sequence[Choice]], Choice | None], progress: Progress
@@ -162,7 +162,7 @@ class _Search:
         while rounds and (choice := choose(prices, days, choices)) is not None:
             choices.append(choice)
             try:
-                days.append(self.drafting.drafted(choice.repeats, days, rounds[0]))
+                days = self.drafting.with_another(days, choice.repeats, rounds[0])
                 prices = self.prices(days)
             except NoPlan as error:  # other runs may find their places
                 refused = error
@@ -193,7 +193,7 @@ class _Search:
     def untried(self, prices: Prices, days: Sequence[DraftedDay], tried: Sequence[Choice]) -> Choice | None:
         """The cheapest runs not tried yet that should reach the accuracy, by some margin.
 
-        None where no day is expected to be shorter than the shortest that reaches it, go-arounds included.
+        None where no day is expected to be much shorter than the shortest that reaches it, go-arounds included.
 
         Raises:
             NoAnswer: by the first prices, no runs within the limits reach it.
@@ -207,10 +207,11 @@ class _Search:
                 if not tried:
                     raise
                 return None  # the limits allow no more than what was tried
-            fresh = [one for one in found if all(one[0].repeats != earlier.repeats for earlier in tried)]
+            known = {other.repeats for other in tried} | {day.repeats for day in days}
+            fresh = [one for one in found if one[0].repeats not in known]
             if fresh:
                 choice, expected_s = min(fresh, key=lambda one: one[1])
-                return choice if expected_s < reached_s else None
+                return choice if expected_s < (1 - LEAST_SAVING) * reached_s else None
         return None
 
     def choices(
@@ -224,16 +225,16 @@ class _Search:
         Raises:
             NoAnswer: none within the limits do.
         """
-        offer, tangents, found = self.offer(prices), tried[-1].tangents if tried else (), list[tuple[Choice, float]]()
+        offer, found = self.offer(prices), list[tuple[Choice, float]]()
         for day in sorted(days, key=lambda day: abs(day.margin))[:NEAREST]:
             near = near_day(offer, prices.runs, day, self.problem.design.problem.names)
             with suppress(NoAnswer):
                 level = margin + self.accuracy.margin(day.whole) - day.margin
-                choice = cheapest_runs(self.accuracy, near, level=level, tangents=tangents)
+                choice = cheapest_runs(self.accuracy, near, level=level)
                 saved_s = offer.total_s(np.array(day.repeats, dtype=float)) - choice.cost_s
                 found.append((choice, day.expected_s - saved_s))
         if not found:
-            choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin, tangents=tangents)
+            choice = cheapest_runs(self.accuracy, offer, level=prices.level + margin)
             found.append((choice, -np.inf))  # nothing to compare with
         return found
 
@@ -245,11 +246,6 @@ class _Search:
     def offer(self, prices: Prices) -> Offer:
         """What runs cost and tell with their legs, by the prices."""
         return offered(self.problem, prices, free=self.added, placeless=self.placeless)
-
-    def pruned(self, days: Sequence[DraftedDay]) -> list[DraftedDay]:
-        """The shortest days that reach the accuracy, less runs that it does not need; none of which all are needed."""
-        reached = sorted((day for day in days if day.margin >= 0), key=lambda day: day.expected_s)[:PRUNED]
-        return [other for day in reached if (other := self.drafting.without_spare_runs(day)) is not day]
 
     def prices(self, days: Sequence[DraftedDay]) -> Prices:
         """Prices by the days so far; the level is what they promise where the accuracy is just reached."""

@@ -3,13 +3,14 @@
     minimise  sum_q n_q c_q - s   subject to  f(K + sum_q n_q M_q) >= 0,  n_q whole numbers within limits,
                                               0 <= s <= sum_q n_q s_q,  s <= time of the way
 
-s is the time of transit that the runs' own way made good saves, as far as there is a way to go. f is concave, so every
-supergradient G at any M gives a linear inequality that all solutions satisfy. They are added until the solution of the
-linear program without whole numbers satisfies f itself (outer approximation). Its cost is a bound, which is computed
-from the multipliers of the linear inequalities by weak duality, and so holds whatever the solver's accuracy. Whole runs
-are found from its runs by exchanges, see `whole_runs`.
+s is the time of transit that the runs' own way made good saves, as far as there is a way to go. f is concave, so
+without whole numbers an interior point finds the optimum to the last digits: what is chosen by its runs and by its
+prices of information does not hang on rounding. Its cost is a bound, which is computed from the multipliers by weak
+duality, and so holds whatever the accuracy. Where f has no second derivatives, as by E, tangents stand
+for it, one more at a time. Whole runs are found from the optimum's runs by exchanges, see `exchanged`.
 
-Source: J. E. Kelley 1960; A. F. Veinott 1967 for cuts where the way to inner points meets the boundary.
+Source: S. Boyd and L. Vandenberghe, Convex Optimization (2004), 11.7, for the interior point; A. F. Veinott 1967 for
+tangents where the way to inner points meets the boundary.
 
 Whole runs that reach an accuracy at little cost, from those of the continuous problem.
 
@@ -28,23 +29,29 @@ exchanges.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.prices import MOST_RUNS, Offer
 from expdesign.shortest_day.tuning import TUNING
-from expdesign.values import Array, seal
+from expdesign.values import Array
 
 LEAST_LEVEL, LEVEL_HALVINGS = -4.0, 12  # least margin of a day of a given length, and steps in search of the largest
-CUTS = 200  # most linear bounds on the accuracy in the choice of runs, not whole
-TANGENTS = 60  # most of them carried over to a like choice
+CUTS = 200  # most linear bounds on an accuracy without second derivatives, in the choice of runs, not whole
 HALVINGS = 12  # of the way to inner runs, in search of the boundary
+# shares of the way from the fewest runs to the most at which inner runs are sought, and by how much of the margin the
+# most runs are taken to be inside
+INSIDE_SHARES, INSIDE = (0.5, 0.9, 0.99, 0.999, 1 - 1e-6), 1e-5
+# most Newton steps to the cheapest runs, not whole, the gap at which they end in costs of a run, and the share of it
+# that each aims for
+NEWTON_STEPS, GAP, NEARER = 100, 1e-11, 0.1
+EQUAL = 6  # decimals to which costs [s] are compared, so that rounding does not choose between equals
 REACHED = 1e-9  # shortfall of the accuracy's margin that counts as reached
 EXCHANGED = 24  # most manoeuvres of which runs are left out, and put in, in the search for whole runs
 
@@ -73,7 +80,7 @@ def _cheaper(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Ite
     cost_s = after(offer.cost_s) - np.minimum(after(offer.saved_s), offer.way_s)
     tangent = accuracy.margin(M) + after(slope) - runs @ slope
     kept = np.nonzero((cost_s < offer.total_s(runs) * (1 - TUNING.choice_gap)) & (tangent >= least))
-    order = np.argsort(cost_s[kept], kind="stable")
+    order = np.argsort(np.round(cost_s[kept], EQUAL), kind="stable")
     for left, taken in zip(*(places[order] for places in kept), strict=True):
         other = runs + put[taken] - out[left]
         if other.any() and accuracy.margin(offer.information(other)) >= least:
@@ -108,18 +115,6 @@ class Choice:
     repeats: tuple[int, ...]  # (q,) whole runs, one at least
     cost_s: float  # of them, less what they save
     bound_s: float  # no runs, whole or not, reach the accuracy for less
-    tangents: tuple[Tangent, ...] = field(default=(), repr=False, compare=False)  # on the margin, see `Relaxed`
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Tangent:
-    """A linear bound on the margin of an accuracy: f(M) <= <slope, M> + offset, for all runs, costs and levels."""
-
-    slope: Array  # (d, d)
-    offset: float  # of the margin
-
-    def __post_init__(self) -> None:
-        seal(self, slope="d d")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,43 +125,34 @@ class Relaxed:
     bound_s: float  # no runs, whole or not, cost less
     worth: Array  # (d, d) what information is worth at the margin: trace(G M) seconds
     worth_of_saved: float  # of a second of transit saved, from 0 to 1
-    tangents: tuple[Tangent, ...] = ()  # on the margin, with which a like problem is soon solved
 
 
-def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0, tangents: Sequence[Tangent] = ()) -> Choice:
+def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Choice:
     """Whole runs that reach an accuracy at little cost.
 
     Args:
         accuracy: gives the margin f.
         offer: runs and their costs.
         level: of f that is to be reached; 0 reaches the accuracy.
-        tangents: of earlier choices for the same accuracy.
 
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    relaxed = cheapest_shares(accuracy, offer, level=level, tangents=tangents)
+    relaxed = cheapest_shares(accuracy, offer, level=level)
     runs = np.clip(np.ceil(relaxed.runs - TUNING.choice_gap), offer.fewest, offer.most)
     if not runs.any() or accuracy.margin(offer.information(runs)) < level:
         runs = np.minimum(runs + 1.0, offer.most)
     runs = exchanged(accuracy, offer, runs, level)
-    return Choice(
-        repeats=tuple(int(n) for n in runs),
-        cost_s=offer.total_s(runs),
-        bound_s=relaxed.bound_s,
-        tangents=relaxed.tangents,
-    )
+    return Choice(repeats=tuple(int(n) for n in runs), cost_s=offer.total_s(runs), bound_s=relaxed.bound_s)
 
 
-def cheapest_shares(
-    accuracy: Accuracy, offer: Offer, *, level: float = 0.0, tangents: Sequence[Tangent] = ()
-) -> Relaxed:
+def cheapest_shares(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Relaxed:
     """The cheapest runs, whole or not, and what information and way are worth at the margin; see `cheapest_runs`.
 
     Raises:
         NoAnswer: no runs within the limits reach it.
     """
-    return _relaxed(_Cuts(accuracy=accuracy, offer=offer, level=level, tangents=tangents))
+    return _relaxed(_Relaxation(accuracy, offer, level))
 
 
 def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
@@ -175,28 +161,23 @@ def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
     Levels are searched from `LEAST_LEVEL` to that of the most runs; the least where even it costs more.
     """
     low, high = LEAST_LEVEL, accuracy.margin(offer.information(offer.most))
-    tangents: tuple[Tangent, ...] = ()
     for _ in range(LEVEL_HALVINGS):
         middle = (low + high) / 2
         try:
-            found = cheapest_shares(accuracy, offer, level=middle, tangents=tangents)
+            found = cheapest_shares(accuracy, offer, level=middle)
         except NoAnswer:
             high = middle
             continue
-        tangents = found.tangents
         low, high = (middle, high) if found.bound_s <= most_s else (low, middle)
     return low
 
 
 def shares_costs_s(accuracy: Accuracy, offer: Offer, levels: Sequence[float]) -> Array:
     """(n,) least cost of runs, whole or not, that reach levels; inf where none do [s]."""
-    costs_s, tangents = np.full(len(levels), np.inf), tuple[Tangent, ...]()
+    costs_s = np.full(len(levels), np.inf)
     for place, level in enumerate(levels):
-        try:
-            found = cheapest_shares(accuracy, offer, level=level, tangents=tangents)
-        except NoAnswer:
-            continue
-        costs_s[place], tangents = found.bound_s, found.tangents
+        with suppress(NoAnswer):
+            costs_s[place] = cheapest_shares(accuracy, offer, level=level).bound_s
     return costs_s
 
 
@@ -215,113 +196,152 @@ def _refuse(accuracy: Accuracy, information: Array) -> None:
     )
 
 
-class _Cuts:
-    """Linear inequalities A x >= b that all x = (runs n, time saved s) with margin above the level satisfy."""
+class _Relaxation:
+    """The continuous problem: minimise <cost, x> over x = (runs n, time saved s) with all of c(x) >= 0.
 
-    def __init__(self, *, accuracy: Accuracy, offer: Offer, level: float, tangents: Sequence[Tangent] = ()) -> None:
-        """The inequality of the time saved, tangents known already, and a first one.
+    The c are concave: what the margin is the least of, tangents in the place of what has no second derivatives, what
+    the time saved and the number of runs obey, and the limits of x.
+    """
 
-        Raises:
-            NoAnswer: the most runs do not reach the level.
-        """
-        self.accuracy, self.offer, self.level = accuracy, offer, level
-        most = offer.information(offer.most)
-        if accuracy.margin(most) < level - REACHED:
-            _refuse(accuracy, most)
-        count = len(offer.cost_s)
+    def __init__(self, accuracy: Accuracy, offer: Offer, level: float) -> None:
+        """Raise NoAnswer where the most runs do not reach the level."""
+        self.accuracy, self.offer = accuracy, offer
+        most = accuracy.margin(offer.information(offer.most))
+        if most < level - REACHED:
+            _refuse(accuracy, offer.information(offer.most))
+        self.level = min(level, most - INSIDE)
         self.cost_s = np.r_[offer.cost_s, -1.0]
-        self.bounds = np.r_[offer.fewest, 0.0], np.r_[offer.most, max(offer.way_s, 0.0)]
-        self.inner = self._moved(offer.fewest, offer.most, min(level + 1.0, accuracy.margin(most)))
-        self._A, self._b = [np.r_[offer.saved_s, -1.0], np.r_[np.ones(count), 0.0]], [0.0, 1.0]  # a trial has a run
-        self._gradients = [np.zeros_like(most)] * 2
-        self.tangents = list[Tangent]()
-        for tangent in tangents:
-            self._keep(tangent)
-        self.add(offer.fewest)
+        self.low, self.high = np.r_[offer.fewest, 0.0], np.r_[offer.most, max(offer.way_s, 0.0)]
+        self.free = np.flatnonzero(self.high > self.low)
+        has_run = np.r_[np.ones(len(offer.cost_s)), 0.0]
+        self.A, self.b = np.array([np.r_[offer.saved_s, -1.0], has_run]), np.array([0.0, 1.0])
+        self.cuts, self.offsets = list[Array](), list[float]()
 
     def add(self, runs: Array) -> None:
-        """The inequality that is tangent where the way from runs (q,) that fall short to inner ones meets the level."""
-        M = self.offer.information(self._reaching(runs))
-        G = self.accuracy.supergradient(M)
-        self._keep(Tangent(slope=G, offset=self.accuracy.margin(M) - float(np.sum(G * M))))
+        """The tangent of the margin at runs (q,)."""
+        M = self.offer.information(runs)
+        self.cuts.append(self.accuracy.supergradient(M))
+        self.offsets.append(self.accuracy.margin(M) - float(np.sum(self.cuts[-1] * M)))
 
-    def _keep(self, tangent: Tangent) -> None:
-        matrices, G = self.offer.matrices, tangent.slope
-        slope = matrices.reshape(len(matrices), -1) @ G.ravel()
-        short = self.level - tangent.offset - float(np.sum(G * self.offer.known))
-        self.tangents.append(tangent)
-        size = max(float(np.abs(slope).max()), np.finfo(float).tiny)
-        self._A.append(np.r_[slope / size, 0.0])
-        self._b.append(short / size)
-        self._gradients.append(G / size)
+    def inside(self) -> Array | None:
+        """Some x with all c(x) > 0, or None."""
+        for share in INSIDE_SHARES:
+            x: Array = self.low + share * (self.high - self.low)
+            x[-1] = min(float(x[-1]), share * float(self.offer.saved_s @ x[:-1]))
+            if (self.constraints(x).c > 0).all():
+                return x
+        return None
 
-    def _reaching(self, runs: Array) -> Array:
-        """Runs (q,) themselves where they nearly reach the level, else the first to do so on the way to the inner ones.
-
-        At runs that tell far too little, information is nearly singular, and a tangent there says next to nothing.
-        """
-        return self._moved(runs, self.inner, self.level - TUNING.choice_gap)
-
-    def _moved(self, runs: Array, inner: Array, level: float) -> Array:
-        """The first runs that reach a level, from given ones to inner ones that do, on a grid of the way between.
-
-        The margin is concave, so it rises where it is below the level. Its excess is interpolated between both ends of
-        what is left, by the Illinois rule; where it is infinite, what is left is halved.
-        """
-
-        def excess(part: int) -> float:
-            return self.accuracy.margin(self.offer.information(runs + part / most * (inner - runs))) - level
-
-        most = 2**HALVINGS
-        low, high, below = 0, most, excess(0)
-        if below >= 0:
-            return runs
-        above, last = excess(most), 0
-        while high - low > 1:
-            share = below / (below - above) if np.isfinite(below) and above > 0 else 0.5
-            middle = min(max(low + round(share * (high - low)), low + 1), high - 1)
-            if (found := excess(middle)) >= 0:
-                high, above, below = middle, found, below / (2 if last > 0 else 1)
-            else:
-                low, below, above = middle, found, above / (2 if last < 0 else 1)
-            last = 1 if found >= 0 else -1
-        return np.asarray(runs + high / most * (inner - runs))
-
-    @property
-    def rows(self) -> tuple[Array, Array]:
-        """A (c, q + 1) and b (c,)."""
-        return np.array(self._A), np.array(self._b)
-
-    def worth(self, multipliers: Array) -> Array:
-        """(d, d) of information, by the multipliers of the rows."""
-        return np.asarray(np.tensordot(multipliers, np.array(self._gradients), axes=1))
-
-
-def _relaxed(cuts: _Cuts) -> Relaxed:
-    """The continuous problem, which leaves its tangents among the cuts."""
-    offer, (low, high) = cuts.offer, cuts.bounds
-    best = Relaxed(runs=offer.most, bound_s=-np.inf, worth=np.zeros_like(offer.known), worth_of_saved=0.0)
-    for _ in range(CUTS):
-        A, b = cuts.rows
-        found = linprog(cuts.cost_s, A_ub=-A, b_ub=-b, bounds=np.column_stack([low, high]), method="highs")
-        if found.x is None:
-            break
-        multipliers, runs = np.maximum(-found.ineqlin.marginals, 0.0), found.x[:-1]
-        bound_s = max(best.bound_s, _dual_bound(A, b, cuts, multipliers))
-        best = Relaxed(
-            runs=runs,
-            bound_s=bound_s,
-            worth=cuts.worth(multipliers),
-            worth_of_saved=min(float(multipliers[0]), 1.0),
-            tangents=tuple(cuts.tangents[-TANGENTS:]),
+    def constraints(self, x: Array) -> _Constraints:
+        """The constraints at some x."""
+        M, q = self.offer.information(x[:-1]), len(x) - 1
+        parts = self.offer.matrices.reshape(q, -1)
+        shares, gradients, curvatures = np.zeros(1), np.zeros((1, *M.shape)), np.zeros((0, q, q))
+        if np.isfinite(self.accuracy.margin(M)):
+            values, gradients, curvatures = self.accuracy.curved(M, self.offer.matrices)
+            # the share of what is needed is concave as its logarithm is, and nearer to linear
+            shares = np.exp(values - self.level)
+            slopes = gradients.reshape(-1, M.size) @ parts.T
+            curvatures = shares[:, None, None] * (curvatures - slopes[:, :, None] * slopes[:, None])
+            gradients = shares[:, None, None] * gradients
+        gradients = np.concatenate([gradients, np.array(self.cuts).reshape(-1, *M.shape)])
+        tangents = [float(np.sum(G * M)) + offset for G, offset in zip(self.cuts, self.offsets, strict=True)]
+        told = gradients.reshape(-1, M.size) @ parts.T
+        needed = np.array([self.high[-1] > 0, self.low.sum() < 1])
+        unit = np.eye(q + 1)[self.free]
+        return _Constraints(
+            c=np.concatenate(
+                [
+                    shares - 1.0,
+                    np.array(tangents) - self.level,
+                    (self.A @ x - self.b)[needed],
+                    (x - self.low)[self.free],
+                    (self.high - x)[self.free],
+                ]
+            ),
+            slopes=np.concatenate([np.pad(told, ((0, 0), (0, 1))), self.A[needed], unit, -unit]),
+            curvatures=np.pad(curvatures, ((0, 0), (0, 1), (0, 1))),
+            gradients=gradients,
         )
-        if cuts.accuracy.margin(offer.information(runs)) >= cuts.level - TUNING.choice_gap / 10:
+
+    def bound_s(self, at: _Constraints, x: Array, y: Array) -> float:
+        """Least cost by weak duality, for multipliers (m,) that are not negative of the constraints at x."""
+        some = len(y) - 2 * len(self.free)
+        reduced = self.cost_s - y[:some] @ at.slopes[:some]
+        least = np.where(reduced > 0, reduced * self.low, reduced * self.high).sum()
+        return float(least + y[:some] @ (at.slopes[:some] @ x - at.c[:some]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Constraints:
+    """Constraints c >= 0, the limits of x last."""
+
+    c: Array  # (m,)
+    slopes: Array  # (m, q + 1)
+    curvatures: Array  # (k, q + 1, q + 1) minus the second derivatives of the first k
+    gradients: Array  # (g, d, d) by the information, of the first g
+
+
+def _interior(task: _Relaxation, x: Array) -> tuple[Array, Array]:
+    """The solution (q + 1,) and the multipliers (m,) of its constraints, from some x inside them.
+
+    Newton's method for the conditions of an optimum, in which what c_i has to spare times its multiplier is small
+    instead of zero. What is spare is a number of its own, so that a step need not keep to curved constraints. Where
+    there are several optima it ends in the midst of them.
+    """
+    free, size = task.free, float(np.abs(task.cost_s).max())
+    cost, at = task.cost_s[free] / size, task.constraints(x)
+    spare = at.c
+    y = float(np.abs(cost @ x[free])) / (len(spare) * spare)
+    for _ in range(NEWTON_STEPS):
+        slopes, missing = at.slopes[:, free], at.c - spare
+        gap, off = float(spare @ y), float(max(np.abs(cost - y @ slopes).max(), np.abs(missing).max()))
+        if max(gap, off) < GAP:
             break
-        cuts.add(runs)
+        small, bent = NEARER * max(gap, GAP) / len(y), at.curvatures[:, free][:, :, free]
+        H = np.tensordot(y[: len(bent)], bent, axes=1) + slopes.T @ (slopes * (y / spare)[:, None])
+        scale = 1.0 / np.sqrt(np.diag(H))
+        wanted = (small - y * missing) / spare @ slopes - cost
+        try:
+            step = scale * np.linalg.solve(H * np.outer(scale, scale), scale * wanted)
+        except np.linalg.LinAlgError:  # many tangents at nearly one place: no nearer in these numbers
+            break
+        grown = slopes @ step + missing
+        rise = (small - y * grown) / spare - y
+        length = min(1.0, 0.99 / max(float(np.max([-rise / y, -grown / spare])), 1e-300))
+        x[free] += length * step
+        y, spare, at = y + length * rise, spare + length * grown, task.constraints(x)
+    return x, y * size
+
+
+def _relaxed(task: _Relaxation) -> Relaxed:
+    """The continuous problem's solution; where the margin has no second derivatives, by tangents, one more at a time.
+
+    They are added where the way from runs that fall short to inner ones reaches the level.
+    """
+    offer, accuracy, inner = task.offer, task.accuracy, task.inside()
+    best = Relaxed(runs=offer.most, bound_s=-np.inf, worth=np.zeros_like(offer.known), worth_of_saved=0.0)
+    if inner is None:
+        return best
+    if not len(task.constraints(inner).curvatures):
+        task.add(inner[:-1])
+    for _ in range(CUTS):
+        x, y = _interior(task, inner.copy())
+        at = task.constraints(x)
+        told = len(at.gradients)
+        best = Relaxed(
+            runs=x[:-1],
+            bound_s=max(best.bound_s, task.bound_s(at, x, y)),
+            worth=np.tensordot(y[:told], at.gradients, axes=1),
+            worth_of_saved=min(float(y[told]), 1.0) if task.high[-1] > 0 else 0.0,
+        )
+        missing = task.level - accuracy.margin(offer.information(x[:-1]))
+        if missing <= TUNING.choice_gap / 10:
+            break
+        short, enough = x[:-1], inner[:-1]
+        for _ in range(HALVINGS if missing > TUNING.choice_gap else 0):
+            middle = (short + enough) / 2
+            reaches = accuracy.margin(offer.information(middle)) >= task.level
+            short, enough = (short, middle) if reaches else (middle, enough)
+        task.add(enough if missing > TUNING.choice_gap else short)
     return best
-
-
-def _dual_bound(A: Array, b: Array, cuts: _Cuts, multipliers: Array) -> float:
-    """Least cost within the limits by weak duality, for any multipliers that are not negative."""
-    reduced, (low, high) = cuts.cost_s - multipliers @ A, cuts.bounds
-    return float(multipliers @ b + np.where(reduced > 0, reduced * low, reduced * high).sum())

@@ -34,31 +34,36 @@ class Drafting:
 
     problem: PlanProblem  # gives the dictionary, the limits on runs and the water; the runs of its design are not used
     accuracy: Accuracy  # to be reached by the whole track, legs included
+    fullest: bool = False  # whether the accuracy is to be as large as can be, instead of the day as short
 
-    def drafted(self, repeats: Sequence[int], days: Sequence[DraftedDay], progress: Progress) -> DraftedDay:
-        """The day with these runs; the water and the transitions of the day before are not worked out again.
+    def with_another(self, days: Sequence[DraftedDay], repeats: Sequence[int], progress: Progress) -> list[DraftedDay]:
+        """Days with that of these runs; the water and the transitions of the day before are not worked out again.
 
-        Drawn trials tell how late the first day is, and those that reach the accuracy, which are compared by it; others
-        are taken to be as late as the days before. Where a draft is all that is asked for, no trials are drawn.
+        Where it reaches the accuracy and the shortest day is sought, the shorter day without runs that it does not need
+        follows. Drawn trials tell how late the first day is; others are taken to be as late, second for second. Where a
+        draft is all that is asked for, no runs are left out, and no trials are drawn.
         """
-        like, problem = days[-1].draft if days else None, self._of(repeats)
-        day = self._judged(repeats, draft_trial(problem, like=like, progress=progress))
-        if problem.settings.draft:
-            return day
-        if day.margin >= 0 or not days:
-            draft = day.draft
-            return day.late(drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
-        return _as_late(day, days)
+        like = days[-1].draft if days else None
+        drafted = [*days, self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))]
+        if self.problem.settings.draft:
+            return drafted
+        if _late_share(days) is None:
+            draft = drafted[-1].draft
+            problem = replace(self._of(repeats), area=draft.area)
+            drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
+        reached = drafted[-1].margin >= 0 and not self.fullest
+        if reached and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
+            drafted.append(shorter)
+        return _alike_late(drafted)
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
-        """The day, or a shorter one with fewer of its runs that reaches the accuracy too, as late second for second."""
-        begun = day
+        """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""
         while True:
             drafts = (self._redrafted(day.draft, rest) for rest in _with_one_fewer(day, self.accuracy))
             shorter = (other for other in drafts if other and other.margin >= 0 and other.day_s < day.day_s)
             found = next(shorter, None)
             if found is None:
-                return day if day is begun else _as_late(day, [begun])
+                return day
             day = found
 
     def told_by(self, sailed: SailedTrial) -> tuple[Array, Array | None, float]:
@@ -96,10 +101,15 @@ class Drafting:
         return None if other is None else self._judged(repeats, other)
 
 
-def _as_late(day: DraftedDay, others: Sequence[DraftedDay]) -> DraftedDay:
-    """The day as late as others, second for second."""
-    share = np.mean([other.expected_s / other.day_s for other in others]) - 1.0
-    return day.late(share * day.draft.sailed.legs_s)
+def _alike_late(days: list[DraftedDay]) -> list[DraftedDay]:
+    """Days as late as the one that trials were drawn of, second for second."""
+    share = _late_share(days)
+    return [day if day.drawn or share is None else day.taken_late(share) for day in days]
+
+
+def _late_share(days: Sequence[DraftedDay]) -> float | None:
+    """How late drawn trials were, as a share of the day; None where none were drawn, or none ended at the goal."""
+    return next((day.expected_s / day.day_s - 1.0 for day in days if day.drawn and np.isfinite(day.expected_s)), None)
 
 
 def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]]:

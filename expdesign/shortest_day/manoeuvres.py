@@ -100,7 +100,7 @@ def manoeuvres_worth_adding(
             break
         specs += [candidate.spec for candidate in found]
         offer = _with(offer, found, problem, transit_mps)
-        shares = cheapest_shares(accuracy, offer, level=level, tangents=shares.tangents)
+        shares = cheapest_shares(accuracy, offer, level=level)
         if number + 1 == searches or shares.bound_s > (1 - GROWTH_GAIN) * before_s:
             break
     runs = shares.runs[given:]

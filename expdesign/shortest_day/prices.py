@@ -130,6 +130,7 @@ class DraftedDay:
     margin: float  # of the accuracy, by the whole track
     # (p, p) of estimates from the whole track; None where it does not determine every parameter
     covariance: Array | None = None
+    drawn: bool = False  # whether drawn trials tell how late it is
 
     @property
     def whole(self) -> Array:
@@ -148,7 +149,11 @@ class DraftedDay:
 
     def late(self, late_s: Array) -> DraftedDay:
         """The day whose legs take drawn trials so much longer (legs,) [s]."""
-        return replace(self, draft=replace(self.draft, late_s=late_s))
+        return replace(self, draft=replace(self.draft, late_s=late_s), drawn=True)
+
+    def taken_late(self, share: float) -> DraftedDay:
+        """The day whose legs are taken to take longer by a share."""
+        return replace(self, draft=replace(self.draft, late_s=share * self.draft.sailed.legs_s))
 
 
 def first_prices(problem: PlanProblem) -> Prices:

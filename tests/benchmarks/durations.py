@@ -1,11 +1,13 @@
 """Speed of the durations: the examples, growth with candidates, every criterion under limits, other solvers, scoring.
 
-Run with ``python tests/benchmarks/durations.py``. What counts is the ratio of processor times in one run, all on one
+Run with ``python tests/benchmarks/durations.py [PART ...] [--most N]``, by default all parts, and growth up to 10,000
+candidates. What counts is the ratio of processor times in one run, all on one
 thread; gaps are relative to the dimension. Baselines that take too long are stopped; their ratio is then "at least".
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
 import subprocess
@@ -60,15 +62,6 @@ LOADING = "import time, scipy.optimize; t, c = time.perf_counter(), time.process
 LOADING += "print(time.perf_counter() - t, time.process_time() - c)"
 
 
-def main() -> None:
-    examples()
-    growth()
-    many_candidates()
-    dense_candidates()
-    every_criterion()
-    scoring()
-
-
 def examples() -> None:
     """The durations of the examples: the problem as stated to cvxpy, polished, beside the quickest method."""
     times = np.array(
@@ -90,11 +83,11 @@ def examples() -> None:
         print(f"| {name} | {row} | {step:.2f} s | {comparing:.2f} s |", flush=True)
 
 
-def growth() -> None:
+def growth(most: int = GROWTH[-1]) -> None:
     """The same with the number of candidates; cvxpy also beyond the number up to which it is asked."""
     print("| criterion | candidates | cvxpy | gap | quickest | gap | times as long |")
     print("|---|---|---|---|---|---|---|")
-    for count in GROWTH:
+    for count in (count for count in GROWTH if count <= most):
         chosen = dict(variants(count, samples=12 if count > 10 else 60))
         for what in (
             "D, no limits",
@@ -279,4 +272,12 @@ def scoring() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    parts = {
+        part.__name__: part for part in (examples, growth, many_candidates, dense_candidates, every_criterion, scoring)
+    }
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", default=[*parts], choices=[*parts])
+    parser.add_argument("--most", type=int, default=GROWTH[-1], help="candidates, in the growth with their number")
+    asked = parser.parse_args()
+    for name in asked.parts:
+        parts[name](*([asked.most] if name == "growth" else []))

@@ -17,7 +17,7 @@ from expdesign.conventions import wrap_angle
 from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
-from expdesign.plan.search.local_search import ChainEnds, clear_successors, polished
+from expdesign.plan.search.local_search import EQUAL, ChainEnds, clear_successors, polished
 from expdesign.plan.values import Placement
 from expdesign.processes import in_order
 from expdesign.values import Array
@@ -99,7 +99,7 @@ def place_runs(
     ahead = orders_ahead(space, repeats, made_good=path_exceeds_displacement(space, repeats, start))
     for _ in range(int(np.sum(repeats))):
         beam = _advance(space, beam, width, ahead)
-    final_s = beam.cost_s + space.planner.to_goal_s(space, beam)
+    final_s = np.round(beam.cost_s + space.planner.to_goal_s(space, beam), EQUAL)
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
         raise NoRoom("no path to the goal from where the last run ends", place=beam.pose[best, :2])
@@ -108,7 +108,7 @@ def place_runs(
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
         chains = list(_different(beam, final_s, orders))
         better = list(in_order(polished, (space, ends), chains))
-        best = int(np.argmin([seconds for _, seconds in better]))
+        best = int(np.argmin([round(seconds, EQUAL) for _, seconds in better]))
         runs, poses = chains[best][0], better[best][0]
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
@@ -168,7 +168,7 @@ def _totals_s(
         ahead_m = space.goal_distance.to_goal(place) - made_good_m[next_run] - helped_m
         rest_s = np.clip(ahead_m, 0.0, None) / speed_mps + lost_s[next_run]
         totals.append(beam.cost_s[part.parent] + part.leg_s + rest_s)
-    return np.concatenate(totals)
+    return np.round(np.concatenate(totals), EQUAL)
 
 
 def _select(

@@ -25,6 +25,7 @@ TURN_DEG = (90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0)  # steps of the local s
 BLOCKS_AT_ONCE = 4  # moves of a block looked at together at first, four times as many then
 SWEEPS = 20  # over all blocks of runs at most
 SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
+EQUAL = 6  # decimals to which times [s] are compared, so that rounding does not choose between mirror images
 LEAST_GAIN_S = 0.05  # for which a block is moved
 
 
@@ -205,7 +206,7 @@ class _Legs:
         gain_s = chain.legs_s[i] + chain.legs_s[j + 1] - arrive_s - leave_s
         before, after = [*froms[i : i + 1, :2], *chain.bends[i]][-1], [*chain.bends[j + 1], *tos[j + 1 : j + 2, :2]][0]
         gain_s[(legs_m[0] < self._least_m(chain.runs, i)) | (legs_m[1] < self._least_m(chain.runs, j + 1))] = -np.inf
-        order = np.argsort(-gain_s, kind="stable")
+        order = np.argsort(-np.round(gain_s, EQUAL), kind="stable")
         row = self._first_clear(chain.runs[i : j + 1], blocks, order[gain_s[order] > LEAST_GAIN_S], before, after)
         if row is None:
             return chain

@@ -13,7 +13,7 @@ import numpy as np
 
 from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
-from expdesign.errors import InputError, NoAnswer
+from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
 from expdesign.export.whatif_page.page import table_header, table_row
@@ -27,10 +27,10 @@ from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
 from expdesign.workflows.outcome import Outcome, TextTable, command_text
-from expdesign.workflows.steps.day import planned_day, search_additions
+from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed
-from expdesign.workflows.steps.planned import plan_summary
-from expdesign.workflows.steps.scored import ready
+from expdesign.workflows.steps.planned import check_plannable, plan_summary
+from expdesign.workflows.steps.scored import ready, scored
 from expdesign.workflows.steps.workers import load_plans, workers
 
 WHOLE_RUNS = "repeats"
@@ -56,7 +56,8 @@ def whatif(
 ) -> Outcome:
     """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
 
-    Every file is read before anything is computed. A variant without an answer is listed as such beside the others.
+    Every file is read before anything is computed, and every case's dictionary and durations are checked before
+    anything is planned. A variant without an answer is listed as such beside the others.
     Before trials are planned, manoeuvres are searched for that shorten the scenario's day: variants that leave that
     search as it is take over what it found, others the candidates simulated in it.
 
@@ -89,6 +90,9 @@ def whatif(
         remembering((user_memory() if cache else None) or Memory(Path(folder))) as memory,
         workers(jobs, scheduler=scheduler, load=load_plans),
     ):
+        for (case, _), path in zip(cases, (scenario, *variants), strict=True) if with_plan else ():
+            with suppress(NoAnswer):
+                _check(case, path, seed)
         if searched:
             with suppress(NoAnswer):  # the case itself says so
                 _search(base, seed, within(progress, 0.0, searched))
@@ -109,6 +113,20 @@ def whatif(
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
     return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+
+
+def _check(case: Scenario, path: Path, seed: int) -> None:
+    """Raise FileError for what is wrong with a case and would else be found once others have been planned for long."""
+    try:
+        check_plannable(case)
+        information = scored(case)
+        design = designed(case, information, seed=seed)
+        if case.design.accuracy is not None:
+            checked_day(case, information, design)
+    except FileError:
+        raise
+    except InputError as error:
+        raise FileError(path, "", str(error)) from None
 
 
 def _search(case: Scenario, seed: int, progress: Progress) -> None:

@@ -84,16 +84,9 @@ def planned_day(
     if asked is None:
         plan = planned(case, information, design, seed=seed, progress=progress)
         return Day(information=information, design=design, plan=plan)
-    from expdesign.shortest_day import check_way_fits
-
-    accuracy = _accuracy(case, information, design)
+    case, accuracy = checked_day(case, information, design)
     if reference is not None:
         accuracy = replace(accuracy, level=_accuracy(case, information, reference).level)
-    case = replace(case, plan=with_leg_speed(case))
-    problem = plan_problem(case, information, design, seed=seed)
-    check_start(problem, ship_on_legs(problem))
-    if asked.day_s is not None:
-        check_way_fits(problem, asked.day_s)
     if asked.starts == 1 or case.plan.draft:
         return _searched(case, information, design, accuracy, stated, seed, 0, progress)
     return _shortest_of(asked.starts, (case, information, design, accuracy, stated, seed), progress)
@@ -128,6 +121,24 @@ def _first_day(
         return Day(information=information, design=design, plan=plan)
     note = first_note([item.primitive for item in told], case.dictionary)
     return Day(information=told, design=shared, plan=plan, note=note)
+
+
+def checked_day(
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign
+) -> tuple[Scenario, Accuracy]:
+    """The scenario with a speed of legs, and the accuracy that it asks for.
+
+    Raises:
+        InputError, NoAnswer: what can be told beforehand of those of `planned_day`.
+    """
+    from expdesign.shortest_day import check_way_fits
+
+    accuracy, case = _accuracy(case, information, design), replace(case, plan=with_leg_speed(case))
+    problem = plan_problem(case, information, design)
+    check_start(problem, ship_on_legs(problem))
+    if case.design.accuracy is not None and case.design.accuracy.day_s is not None:
+        check_way_fits(problem, case.design.accuracy.day_s)
+    return case, accuracy
 
 
 def search_additions(
