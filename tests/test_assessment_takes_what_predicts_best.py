@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess
-from expdesign.assessment.held_out import Ahead, HeldOut, folds, ranked
+from expdesign.assessment.held_out import Ahead, HeldOut, folds, ranked, stay_bounded
 from expdesign.cli import main
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
@@ -121,9 +121,49 @@ def test_every_sample_is_left_out_once_and_never_used_for_its_own_prediction(run
     for rest, apart in folds(Record(batches=batches)):
         seen += [batch.velocity for batch in apart.batches]
         used = {row.tobytes() for batch in rest.batches for row in batch.velocity}
+        if runs > 1:  # the rest of a run would tell what no other run is told
+            assert not {batch.name for batch in rest.batches} & {batch.name for batch in apart.batches}
         assert not used & {row.tobytes() for batch in apart.batches for row in batch.velocity}
         assert used
     assert sum(map(len, seen)) == 50 * runs
+
+
+def test_a_run_that_is_most_of_the_data_is_cut() -> None:
+    """Left out whole, it would leave too little."""
+    record = Record(batches=(yaw_run(1, samples=240), yaw_run(2, samples=40)))
+    for rest, apart in folds(record):
+        assert sum(map(len, rest.batches)) > 1.5 * sum(map(len, apart.batches))
+
+
+@pytest.mark.parametrize("steepest", [0.9, 1.1])
+@pytest.mark.parametrize("most", [0.35, 0.7])
+def test_a_model_that_runs_away_with_the_rudder_hard_over_goes_last(steepest: float, most: float) -> None:
+    """dr = -a r + c |r| r + g d has a steady turn only where c < a^2 / (4 g d); the data lay half of the rudder."""
+    ship = yaw_ship()
+    terms = (*ship.model.terms, Term("r", "N_rr", "abs(r)*r"))
+    rudder = Actuator(kind="rudder", number=1, limits=(Limit(low=-most, high=most),))
+    model = replace(
+        ship.model, terms=terms, parameters=np.zeros(3), parameter_std=np.zeros(3), actuators=(rudder,)
+    )  # fmt: skip
+    ship = replace(ship, model=model)
+    c = steepest * DECAY**2 / (4 * GAIN * most)
+    models = [model.with_parameters({"N_r": DECAY, "N_d": GAIN, "N_rr": value}) for value in (0.0, c)]
+    run = yaw_run(3)
+    batch = replace(run, inputs=run.inputs * 0.3 / np.abs(run.inputs).max())
+    found = stay_bounded(models, ship, (batch,), RK4)
+    assert found == [True, steepest < 1]
+    held = [
+        HeldOut(
+            method=method_named("oe"),
+            horizon_s=None,
+            outputs=("r",),
+            shares=np.array([share]),
+            unseen=True,
+            bounded=own,
+        )
+        for share, own in zip((0.3, 0.2), found, strict=True)
+    ]
+    assert ranked(held)[0] == (0 if steepest > 1 else 1)
 
 
 @pytest.mark.parametrize(

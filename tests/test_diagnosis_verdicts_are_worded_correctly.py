@@ -194,6 +194,11 @@ def test_causes_that_would_harm_the_simulation_are_said_in_one_sentence():
     assert said == "With wind the simulation of these data would diverge or be worse, so it is not written."
 
 
+def test_what_is_left_beside_findings_is_said():
+    (said,) = remarks("runs", None, (), (), (), ("a lag of rudder that changes with speed (-1.2 s)",))
+    assert "left beside the findings looks like a lag of rudder that changes with speed (-1.2 s)" in said
+
+
 @pytest.mark.parametrize("fault", ["the gyro is late.", "is the rudder positive to port?", "read every 5 s"])
 def test_a_fault_of_the_record_comes_first_and_then_no_model_is_called_free_of_error(fault):
     mark = "[?]" if fault.endswith("?") else "[.]"

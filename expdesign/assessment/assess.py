@@ -93,7 +93,8 @@ def settled(
 
     def attempt(ship: Vessel, record: Record, times: tuple[ActuatorTime, ...]) -> Estimate:
         work = Work(vessel=ship, stated=vessel, record=record, options=options)
-        work = replace(work, options=replace(options, horizon_s=horizons_of(work)[0]))
+        *_, horizon_s = (None, *(item for item in horizons_of(work) if item is not None))
+        work = replace(work, options=replace(options, horizon_s=horizon_s))
         return attempted(work, ship, work.seen(record), methods[0], times=times, progress=progress)
 
     try:

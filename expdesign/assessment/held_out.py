@@ -1,12 +1,17 @@
 """Which estimate predicts best: errors of predictions from measured states, on runs that an estimate has not seen.
 
-Runs are left out in turn, or pieces of a few, and every method estimates from the rest. Its model then predicts what
-was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states would hide a useless model,
-and one simulation of a whole run tells more of the ship's stability than of the model. An error is over the standard
-deviation of the measured output; 1 is no better than a constant, and more counts as 1. Runs and outputs are joined by
-geometric means, in which no single one decides. Errors that differ by less than `SAME_ERROR` of themselves count
-as equal. Of such methods the one goes first that noise in the measured velocities does not bias: instrumental
-variables, then output error, then least squares.
+Runs are left out in turn, and every method estimates from the rest. They are left out whole: with half of a run in the
+estimate, its other half asks for no motion that the estimate has not seen. Only a run that is most of the data is cut.
+The model then predicts what was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states
+would hide a useless model, and one simulation of a whole run tells more of the ship's stability than of the model. An
+error is over the standard deviation of the measured output; 1 is no better than a constant, and more counts as 1. Runs
+and outputs are joined by geometric means, in which no single one decides. Errors that differ by less than `SAME_ERROR`
+of themselves count as equal. Of such methods the one goes first that noise in the measured velocities does not bias:
+instrumental variables, then output error, then least squares.
+
+Predictions of what was recorded do not show what a model does beyond it. A hull dissipates: driven no harder than in
+the data, but with its rudders hard over, no point of it gets many times as fast as in the data. A model in which one
+does goes last.
 
 Source: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147, for leaving out.
 """
@@ -22,16 +27,20 @@ import numpy as np
 from expdesign.assessment.misfit import whole
 from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
-from expdesign.errors import InputError, NoAnswer
+from expdesign.errors import Diverged, InputError, NoAnswer
 from expdesign.estimation.methods import Method
 from expdesign.estimation.regression import Integers, drive_of, model_for, parts_of
-from expdesign.estimation.replay import Compiled, Integration, Stretches, compiled
+from expdesign.estimation.replay import Compiled, Integration, Stretches, build_replay, compiled
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
-from expdesign.vessel import VesselModel
+from expdesign.vessel import Limit, Vessel, VesselModel
 
 SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
 MOST_FOLDS = 4  # into which runs are divided, to be left out in turn
+MOST_OF_DATA = 2 / 3  # share of the data from which on a run is not left out whole
+HELD_LENGTHS = 20.0  # for which inputs are held, in ship lengths sailed: two turning circles
+MOST_HELD = 5000  # samples of that
+RUNS_AWAY = 10.0  # times as fast as in the data that no hull gets
 SMALLEST_ERROR = 1e-4  # over the standard deviation of an output, that count
 
 
@@ -48,6 +57,7 @@ class HeldOut:
     outputs: tuple[str, ...]  # names
     shares: Array  # (n,) errors over standard deviations, geometric means over runs; nan where one never changes
     unseen: bool  # whether each run was predicted without it
+    bounded: bool = True  # whether the model stays near the speeds of the data where its inputs are held
 
     def __post_init__(self) -> None:
         seal(self, shares="n")
@@ -71,13 +81,13 @@ class HeldOut:
 
 
 def ranked(found: Sequence[HeldOut]) -> list[int]:
-    """Indices, the best first; of errors that count as equal, the least biased first."""
-    least = min((item.share for item in found), default=0.0)
+    """Indices, the best first, models that run away last; of errors that count as equal, the least biased first."""
+    least = min((item.share for item in found if item.bounded), default=0.0)
 
-    def place(index: int) -> tuple[bool, int, float]:
+    def place(index: int) -> tuple[bool, bool, int, float]:
         item = found[index]
-        equal = item.share <= (1.0 + SAME_ERROR) * least
-        return not equal, UNBIASED.index(item.method.solver) if equal else 0, item.share
+        equal = item.bounded and item.share <= (1.0 + SAME_ERROR) * least
+        return not item.bounded, not equal, UNBIASED.index(item.method.solver) if equal else 0, item.share
 
     return sorted(range(len(found)), key=place)
 
@@ -99,10 +109,12 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     text = f"predicts {data} {TUNING.ahead_s:g} s ahead with an error of {_bounded(own.share)}"
     if own is least:
         text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
-    elif own is order[0] and own.method.solver != least.method.solver:
+    elif own is order[0] and least.bounded and own.method.solver != least.method.solver:
         text += f", {least.label} with {_bounded(least.share)}; noise of the sensors biases {own.label} less"
     elif own is not order[0]:
         text += f"; the model of {order[0].label} cannot simulate every run"
+    elif not least.bounded:
+        text += f", {least.label} with {_bounded(least.share)}, but its model runs away where inputs are held"
     return f"{text}; output error starts from it" if asked and own.method.name not in asked else text
 
 
@@ -114,9 +126,10 @@ def _bounded(share: float) -> str:
 def folds(record: Record) -> Iterator[tuple[Record, Record]]:
     """(estimate from, predict): every run left out once, several at a time where there are many.
 
-    Few runs are cut, so that what is left is most of the data, but not into pieces shorter than a prediction.
+    A run that is most of the data is cut, but not into pieces shorter than a prediction.
     """
-    pieces = [piece for batch in record.batches for piece in _cut(batch, -(-MOST_FOLDS // len(record.batches)))]
+    most = MOST_OF_DATA * sum(map(len, record.batches))
+    pieces = [piece for batch in record.batches for piece in _cut(batch, MOST_FOLDS if len(batch) > most else 1)]
     count = min(len(pieces), MOST_FOLDS)
     for number in range(count):
         rest, apart = (
@@ -151,7 +164,12 @@ class Candidate:
 
 
 def held_out(
-    record: Record, candidates: Sequence[Candidate], *, seen_as: Callable[[Record], Record], integration: Integration
+    record: Record,
+    candidates: Sequence[Candidate],
+    *,
+    ship: Vessel,
+    seen_as: Callable[[Record], Record],
+    integration: Integration,
 ) -> tuple[HeldOut, ...]:
     """Errors of the predictions of every candidate.
 
@@ -161,6 +179,7 @@ def held_out(
     Args:
         record: the data.
         candidates: with estimates from them.
+        ship: gives the limits of rudders, and the length.
         seen_as: what of a record is predicted.
         integration: how models are simulated.
     """
@@ -176,6 +195,7 @@ def held_out(
     if not unseen:
         apart = list(seen_as(record).batches)
         models = [[candidate.model for candidate in candidates]] * len(apart)
+    bounded = stay_bounded([candidate.model for candidate in candidates], ship, seen_as(record).batches, integration)
     ahead = {
         wind: Ahead(candidates[0].model, apart, wind=wind, integration=integration)
         for wind in {candidate.wind for candidate in candidates}
@@ -187,6 +207,7 @@ def held_out(
             outputs=candidate.model.outputs,
             shares=typical(ahead[candidate.wind].shares([row[number] for row in models])),
             unseen=unseen,
+            bounded=bounded[number],
         )
         for number, candidate in enumerate(candidates)
     )
@@ -197,6 +218,64 @@ def _model(candidate: Candidate, rest: Record) -> VesselModel | None:
         return candidate.again(rest)
     except (NoAnswer, InputError):
         return None
+
+
+def hardest(ship: Vessel, batches: Sequence[Batch]) -> tuple[Batch, ...]:
+    """What was recorded where an input was least and where it was greatest, held; rudders are laid to their limits.
+
+    Only rudders are: other actuators also stop and reverse a ship, of which data of a ship under way tell nothing.
+    """
+    names, step_s = batches[0].input_names, batches[0].sample_time_s
+    inputs, velocity = (np.concatenate(rows) for rows in zip(*((b.inputs, b.velocity) for b in batches), strict=True))
+    seen = np.isfinite(velocity).all(axis=1) & np.isfinite(inputs).all(axis=1)
+    if not seen.any():
+        return ()
+    inputs, velocity = inputs[seen], velocity[seen]
+    limits = dict(zip(ship.model.inputs, ship.limits, strict=True))
+    rudders = np.array([name.startswith("rudder") and name in limits for name in names])
+    count = 1 + HELD_LENGTHS * ship.length_m / max(_fastest(velocity, ship.length_m), 1e-9) / step_s
+
+    def held(column: int, row: int, side: str) -> Batch:
+        bounds = [getattr(limits.get(name, Limit()), side) for name in names]
+        laid = rudders & rudders[column] & np.isfinite(bounds)
+        return Batch(
+            name=f"{names[column]} held",
+            sample_time_s=step_s,
+            input_names=names,
+            inputs=np.tile(np.where(laid, bounds, inputs[row]), (min(round(count), MOST_HELD), 1)),
+            velocity=np.tile(velocity[row], (min(round(count), MOST_HELD), 1)),
+        )
+
+    rows = ((inputs.argmin(axis=0), "low"), (inputs.argmax(axis=0), "high"))
+    return tuple(held(column, int(row), side) for at, side in rows for column, row in enumerate(at))
+
+
+def stay_bounded(
+    models: Sequence[VesselModel], ship: Vessel, batches: Sequence[Batch], integration: Integration
+) -> list[bool]:
+    """Whether no point of the hull gets many times as fast as in the data, by model; all have one structure."""
+    held = hardest(ship, batches)
+    if not held:
+        return [True] * len(models)
+    structure = model_for(models[0], Record(batches=held))
+    replay = build_replay(structure, Record(batches=held[:1]), integration)
+    fastest = RUNS_AWAY * _fastest(np.concatenate([batch.velocity for batch in batches]), ship.length_m)
+
+    def bounded(model: VesselModel) -> bool:
+        try:
+            return all(
+                _fastest(replay.states(batch, model.parameters)[:, 3:], ship.length_m) < fastest for batch in held
+            )
+        except Diverged:
+            return False
+
+    return [bounded(model) for model in models]
+
+
+def _fastest(velocity: Array, length_m: float) -> float:
+    """The largest speed of bow or stern [m/s] of velocities (k, 3)."""
+    u, v, r = velocity.T
+    return float(np.nanmax(np.hypot(u, np.abs(v) + np.abs(r) * length_m / 2), initial=0.0))
 
 
 class Ahead:

@@ -90,12 +90,15 @@ def tried(
 
 
 def horizons_of(work: Work) -> tuple[float | None, ...]:
-    """The stated one; else that of the predictions which decide, and whole runs where these are longer."""
+    """The stated one; else that of the predictions which decide, a third of it, and whole runs where these are longer.
+
+    The longer a simulation, the less noise is left in the estimate, and the further it trusts the model.
+    """
     options = work.options
     longest_s = max(len(batch) * batch.sample_time_s for batch in work.record.batches)
     if options.horizon_s is not None or options.choice != HELD_OUT or longest_s < WORTH_WHOLE * TUNING.ahead_s:
         return (options.horizon_s,)
-    return (TUNING.ahead_s, None)
+    return (TUNING.ahead_s / 3, TUNING.ahead_s, None)
 
 
 def _begun(trial: Trial) -> Begun:
@@ -159,6 +162,7 @@ def predictions_of(work: Work, trials: Sequence[Trial]) -> tuple[HeldOut, ...]:
     return held_out(
         work.record,
         [candidate(trial) for trial in trials],
+        ship=work.vessel,
         seen_as=work.seen,
         integration=work.options.integration,
     )

@@ -259,7 +259,8 @@ def diagnose(
     unit = unit_name(windows, in_stretches=chosen.held[0].in_stretches)
     signs = _signs(chosen, after, windows, seed)
     refused = [step.chosen.candidate.cause for step in chosen.refused]
-    instead = [words for words in _in_words(chosen.rest.instead) if words not in _in_words(chosen.rest.kinds)]
+    kinds = _in_words(chosen.rest.kinds)
+    instead = [words for words in _in_words(chosen.rest.instead) if words not in kinds]
     concluding("measuring the gain on held-out runs", 1.0)
     return Diagnosis(
         vessel=vessel,
@@ -270,7 +271,7 @@ def diagnose(
         before=before,
         after=after,
         findings=ranked,
-        verdict=verdict(ranked, before, unit, unexplained, within, signs, _in_words(chosen.rest.kinds), record.faults),
+        verdict=verdict(ranked, before, unit, unexplained, within, signs, kinds, record.faults),
         unexplained=unexplained,
         simulated_before=motion.predicted,
         simulated_after=simulate_from_measured(final, windows).predicted,
@@ -280,7 +281,7 @@ def diagnose(
         notes=(
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
             *note_on_divergence(before, windows, re_estimated=begun is not ship, uncertain=bool(uncertain_keys(ship))),
-            *remarks(unit, unexplained, signs, refused, instead),
+            *remarks(unit, unexplained, signs, refused, instead, kinds if ranked else ()),
             *_notes_on_selection(chosen, unit, seed),
             *not_written,
         ),

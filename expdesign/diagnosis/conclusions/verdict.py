@@ -201,7 +201,12 @@ def _advice(findings: Sequence[Finding]) -> str:
 
 
 def remarks(
-    unit: str, unexplained: Unexplained | None, signs: Sequence[Lead], refused: Sequence[str], instead: Sequence[str]
+    unit: str,
+    unexplained: Unexplained | None,
+    signs: Sequence[Lead],
+    refused: Sequence[str],
+    instead: Sequence[str],
+    beside: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """What a verdict has no room for.
 
@@ -211,6 +216,7 @@ def remarks(
         signs: causes that are no findings.
         refused: causes with which the data would be simulated worse than without, and which are no findings so.
         instead: what no cause of the catalogue is, and explains about as much as the findings do.
+        beside: what no cause of the catalogue is, and is left beside the findings.
     """
     found = []
     if refused:
@@ -218,6 +224,9 @@ def remarks(
         found.append(f"With {names} the simulation of these data would diverge or be worse, so {verb} not written.")
     if instead:
         found.append(f"A cause outside the catalogue explains these data about as well: {listed(instead, 'or')}.")
+    if beside:
+        what = "which no cause of the catalogue is: look for that in the ship and her instruments"
+        found.append(f"The error that is left beside the findings looks like {listed(beside)}, {what}.")
     if unexplained is not None:
         shares = [
             f"{_percent(share)} % off the {WORDS[name]} error"

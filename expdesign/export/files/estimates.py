@@ -86,7 +86,11 @@ def fit_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]
 def prediction_table(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows: errors of predictions by method, in per cent of the standard deviation, the best first."""
     rows = [
-        (item.label, *(_error(share) for share in item.shares.tolist()), _error(item.share))
+        (
+            item.label if item.bounded else f"{item.label}, runs away",
+            *(_error(share) for share in item.shares.tolist()),
+            _error(item.share),
+        )
         for item in (found.compared[place] for place in ranked(found.compared))
     ]
     return ("method", *found.best.model.outputs, "together"), rows
