@@ -1,8 +1,8 @@
 """Published ships: their trials predicted from particulars alone, and after one circle and one speed are known.
-
-Cards are in `ships/`, each with its sources. What they are compared with is measured where the card states it (KVLCC2,
-free running; top speeds of two boats), and otherwise simulated with the published model of the ship, each written in
-`published_models.py`; the last column of the first table says which.
+Cards are in `ships/`, each with its sources. The ships are compared with what was measured where the card states it
+(the model of KVLCC2, free running; top speeds of two boats), and otherwise with simulations of the ship's published
+model, each written in `published_models.py`. The scatter of the factors was set with these ships, but for KCS, which
+was added later.
 
     python tests/benchmarks/record.py particulars
 """
