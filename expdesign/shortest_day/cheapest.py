@@ -173,12 +173,12 @@ def fullest_level(accuracy: Accuracy, offer: Offer, most_s: float) -> float:
 
 
 def shares_costs_s(accuracy: Accuracy, offer: Offer, levels: Sequence[float]) -> Array:
-    """(n,) least cost of runs, whole or not, that reach levels; inf where none do [s]."""
+    """(n,) least cost of runs, whole or not, that reach rising levels; inf where none do [s]."""
     costs_s = np.full(len(levels), np.inf)
     for place, level in enumerate(levels):
         with suppress(NoAnswer):
             costs_s[place] = cheapest_shares(accuracy, offer, level=level).bound_s
-    return costs_s
+    return np.asarray(np.maximum.accumulate(costs_s))  # what bounds a level bounds those above it
 
 
 def _refuse(accuracy: Accuracy, information: Array) -> None:
