@@ -241,6 +241,10 @@ def test_stamps_that_repeat_swap_and_begin_anew_are_set_right() -> None:
     assert np.allclose(times, even)
     assert list(order[10:12]) == [11, 10]
     assert "2 stamps go back" in notes[0]
+    order, times, notes = set_right(even[::-1], what="x")
+    assert np.allclose(times, even)
+    assert order[0] == len(even) - 1
+    assert "last row comes first" in notes[0]
     reset = np.concatenate([even, even])
     order, times, notes = set_right(reset, what="x")
     assert (np.diff(times) > 0).all()
@@ -431,6 +435,35 @@ def test_a_hostile_file_gets_one_line(tmp_path: Path, trip: Voyage, capsys: pyte
         if status == 2:
             assert path.name in lines[0], name
             assert not (tmp_path / "out" / "import.json").exists()
+
+
+def test_any_choice_of_channels_is_imported_or_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trip = voyage(parts=(("steady", 40.0), ("zigzag", 80.0), ("circle", 100.0))).every(10)
+    names = ("lat", "lon", "sog", "cog", "hdg", "rot", "rpm", "rudder order", "rudder angle")
+    table = {
+        **dict(zip(names, logger_rows(trip).T, strict=True)), "rpm port": 60 * trip.n_rps, "rpm stbd": 60 * trip.n_rps,
+        "azimuth port deg": np.degrees(trip.rudder_rad), "bow thruster rpm": 0 * trip.n_rps, "depth": trip.n_rps - 8,
+        "wind speed": 3 + np.sin(trip.time_s), "wind angle": 90 + np.sin(trip.time_s), "u": trip.u_mps, "v": trip.v_mps,
+        "heading (magnetic)": np.degrees(trip.heading_rad), "throttle %": 0 * trip.n_rps + 60,
+        "rudder %": np.degrees(trip.order_rad) / 0.35, "north_m": trip.north_m, "east_m": trip.east_m,
+    }  # fmt: skip
+    done = []
+    for seed in range(7):
+        rng = np.random.default_rng(seed)
+        chosen = [name for name in table if rng.random() < 0.5]
+        values = np.column_stack([trip.time_s, *(table[name] for name in chosen)])
+        values[rng.random(values.shape) < 0.02 * (seed % 2)] = np.nan
+        values = values[:: -1 if seed % 5 == 4 else 1][: 30 if seed % 7 == 6 else None]
+        head = ",".join(["time", *chosen])
+        np.savetxt(tmp_path / "a.csv", values, delimiter=",", header=head, comments="", fmt="%.6f")
+        capsys.readouterr()
+        done.append(run_import(tmp_path / "a.csv")[0])
+        lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("expdesign: note")]
+        assert done[-1] in (0, 3), (chosen, lines)
+        assert len(lines) == (done[-1] == 3), (chosen, lines)
+    assert done.count(0) >= 3
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -111,6 +111,10 @@ def set_right(time_s: Array, *, what: str) -> tuple[Places, Array, list[str]]:
     if len(times) < 3:
         return order, times, notes
     steps = np.diff(times)
+    if (steps < 0).sum() > (steps > 0).sum():
+        notes.append(f"{what}: the last row comes first; the rows are turned round")
+        order, times = order[::-1], times[::-1]
+        steps = np.diff(times)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     resets = np.flatnonzero(steps < -max(RESET_S, RESET_STEPS * usual)) + 1
     for place in resets:

@@ -265,9 +265,10 @@ def _best(channels: Sequence[Channel], marks: Sequence[_Mark]) -> dict[tuple[str
             if mark.column == second and _family(channel) == _family(one):
                 found[mark.key] = channel
                 break
-    for better, worse in (("heading_rad", MAGNETIC), ("lat_deg", "north_m"), ("lat_deg", "east_m")):
-        if (better, "", "", "", "") in found:
-            found.pop((worse, "", "", "", ""), None)
+    there = {key[0] for key in found}
+    for better, worse in (({"heading_rad"}, (MAGNETIC,)), ({"lat_deg", "lon_deg"}, ("north_m", "east_m"))):
+        for name in worse if better <= there else ():
+            found.pop((name, "", "", "", ""), None)
     return found
 
 
@@ -450,6 +451,12 @@ def _numbered(
 ) -> Iterator[tuple[int, Use]]:
     """Uses of actuators' signals with their columns, by the identity of the use without."""
     own = [(use, mark) for use, mark in used if mark.is_actuator]
+    driven = {mark.machine for _, mark in own if mark.column in ("n", "throttle")}
+    # an angle without revolutions beside it steers as a rudder does
+    own = [
+        (use, replace(mark, column="rudder") if mark.column == "a" and mark.machine not in driven else mark)
+        for use, mark in own
+    ]
     table = {(c.source, c.name): c for c in channels}
     shares = any(use.unit in SHARES for use, _ in own)
     forces = not actuators or any(one.kind == "force" for one in actuators)

@@ -62,7 +62,7 @@ def typical_length_m(stretches: Sequence[Stretch]) -> float:
 
 
 def cut(found: Sampled, *, length_m: float) -> list[Run]:
-    """Runs in all stretches, in order."""
+    """Runs in all stretches, in order; whole stretches where no order acts in any."""
     runs: list[Run] = []
     for stretch in found.stretches:
         inputs = inputs_of(stretch.columns)
@@ -89,7 +89,8 @@ def cut(found: Sampled, *, length_m: float) -> list[Run]:
                 )
             )
             begin = end
-    return runs
+    whole = (Run(name="", family="", stretch=stretch, approach_s=0.0) for stretch in found.stretches)
+    return runs or list(whole)
 
 
 def _pause_s(stretch: Stretch, length_m: float) -> float:

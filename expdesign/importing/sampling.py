@@ -21,6 +21,12 @@ from expdesign.values import Array
 
 FORCES = ("tau_x", "tau_y", "tau_psi")
 MAIN = ("lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", NORTHWARD, EASTWARD, "r_radps")
+PAIRS = (
+    ("lat_deg", "lon_deg"),
+    ("north_m", "east_m"),
+    ("wind_speed_mps", "wind_angle_rad"),
+    ("wind_u_mps", "wind_v_mps"),
+)
 PLACES = {"lat_deg", "lon_deg", "north_m", "east_m"}
 LONGEST_STEP_S, SHORTEST_STEP_S = 1.0, 0.01
 SAME = 1.5  # ratio of intervals within which two rates are the same
@@ -82,6 +88,10 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
     notes += more
     table, more = _ground_velocity(table)
     notes += more
+    for pair in PAIRS:
+        if len(lone := set(pair) & set(table)) == 1:
+            notes.append(f"{next(iter(lone))} is left out, as {next(iter(set(pair) - lone))} is missing")
+            del table[lone.pop()]
     main = [name for name in table if name in MAIN or _is_input(name)]
     if not set(main) & (PLACES | {"u_mps", NORTHWARD}):
         raise NothingToWrite("the logs give neither positions nor velocities, expected one of them")

@@ -367,7 +367,8 @@ def _changes(values: Array, window: int) -> Array:
 
 def _window(batch: Batch, length_m: float) -> int:
     """Samples in which the ship sails about her length."""
-    speed = float(np.nanmedian(np.hypot(*batch.velocity[:, :2].T))) if np.isfinite(batch.velocity[:, :2]).any() else 0.0
+    speeds = np.hypot(*batch.velocity[:, :2].T)
+    speed = float(np.nanmedian(speeds)) if np.isfinite(speeds).any() else 0.0
     seconds = min(LONGEST_WINDOW_S, LENGTHS * length_m / max(speed, 1e-9))
     return max(WINDOW_SAMPLES, round(seconds / batch.sample_time_s))
 

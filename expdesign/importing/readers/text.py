@@ -367,7 +367,7 @@ class _Table:
         for k in numbers:
             values = self.blocks.joined(f"{k}")
             known = values[np.isfinite(values)]
-            if len(known) < 2 or (np.diff(known) > 0).mean() < 0.05 or np.ptp(known) == 0:
+            if len(known) < 2 or (np.diff(known) != 0).mean() < 0.05 or np.ptp(known) == 0:
                 continue
             unit = self.dialect.units[k] or split_unit(self.dialect.names[k])[1]
             times, clock, how = read_numbers(values, names[k], unit=unit)
