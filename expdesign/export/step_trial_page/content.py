@@ -155,9 +155,10 @@ def _currents(content: StepTrialContent) -> Iterator[str]:
                 float(np.hypot(*one.to_mps)),
                 math.sqrt(float(np.trace(one.covariance)) / 2),
             )
-            to = math.degrees(math.atan2(one.to_mps[1], one.to_mps[0]))
+            to = round(math.degrees(math.atan2(one.to_mps[1], one.to_mps[0]))) % 360
+            about = f"{size:.2f} {apart} {max(std, 0.001):.1g} m/s"
             yield (
-                f"{batch.name}: turns show a current of {size:.2f} {apart} {max(std, 0.001):.1g} m/s to {round(to) % 360} degrees, "
+                f"{batch.name}: turns show a current of {about} to {to} degrees, "
                 "which is taken off: U is the speed through the water."
             )
 
