@@ -34,7 +34,7 @@ FLOORS = {
     "step_trials": (
         ("tuning",),
         ("holds", "regression", "responses"),
-        ("steady_state",),
+        ("steady_state", "noise"),
         ("samples",),
         ("surfaces",),
         ("dead_times", "model", "nominal", "live"),

@@ -101,7 +101,7 @@ def _sentences(content: StepTrialContent) -> Iterator[str]:
     )
     if len(ahead) < len(trial.samples):
         numbers = ", ".join(str(one.hold.number) for one in trial.samples if one.hold.astern)
-        yield f"Left out: {numbers}, which go astern or begin from astern. The model is of a vessel that goes ahead."
+        yield f"Holds {numbers} go astern or begin from astern, left out: the model is of a vessel that goes ahead."
     delays = [
         f"{name} {value:.2f} \N{PLUS-MINUS SIGN} {std:.2f} s"
         for name, (value, std) in zip(CHANNELS, trial.delays, strict=True)
@@ -155,9 +155,10 @@ def _currents(content: StepTrialContent) -> Iterator[str]:
                 float(np.hypot(*one.to_mps)),
                 math.sqrt(float(np.trace(one.covariance)) / 2),
             )
-            to = math.degrees(math.atan2(one.to_mps[1], one.to_mps[0])) % 360
+            to = round(math.degrees(math.atan2(one.to_mps[1], one.to_mps[0]))) % 360
+            about = f"{size:.2f} {apart} {max(std, 0.001):.1g} m/s"
             yield (
-                f"{batch.name}: turns show a current of {size:.2f} {apart} {std:.2f} m/s to {to:.0f} degrees, "
+                f"{batch.name}: turns show a current of {about} to {to} degrees, "
                 "which is taken off: U is the speed through the water."
             )
 
@@ -165,7 +166,8 @@ def _currents(content: StepTrialContent) -> Iterator[str]:
 def _compared(content: StepTrialContent) -> Iterator[str]:
     significant = [one for one in content.trial.found if one.p_value < SIGNIFICANT]
     for one in significant:
-        size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} of the {one.command}"
+        own = command_units(content)[CHANNELS.index(one.command)] or f"of the {one.command}"
+        size = f"{abs(one.difference):.3g} \N{PLUS-MINUS SIGN} {one.std:.1g} {own}"
         what = "port and starboard differ" if one.kind == "asymmetry" else "steps up and down end in different states"
         if one.kind == "hysteresis":
             unit = STATE_UNITS[CHANNELS.index(one.command)]
@@ -175,7 +177,7 @@ def _compared(content: StepTrialContent) -> Iterator[str]:
             where = (
                 "on average" if one.at is None else f"at throttle {_order(one.at[0])}, rudder {_order(one.at[1])}, most"
             )
-            what += f" down {where} of {counted(one.samples // 2, 'pair')} of holds, as if the {one.command} differed"
+            what += f" down {where} of {counted(one.samples // 2, 'pair')} of holds, as if the {one.command} stood off"
         yield f"{one.kind.capitalize()}: {what} by {size} to either side of the mean (p = {one.p_value:.1g})."
     if content.trial.found and not significant:
         kinds = sorted({one.kind for one in content.trial.found})
