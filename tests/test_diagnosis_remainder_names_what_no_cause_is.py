@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from beyond_catalogue import CASES, slower_at_low_speed, trial, ventilated
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.fit import CrossValidation, Fit, continuing, fit, linear_model
 from expdesign.diagnosis.motion import initial_states, stable_windows
-from expdesign.diagnosis.remainder import missing_effects, with_unlisted_terms
+from expdesign.diagnosis.remainder import missing_effects, search, with_unlisted_terms
 from expdesign.diagnosis.remainder.search import UNLISTED
 from expdesign.diagnosis.remainder.stability_selection import UnitInformation, greedy, stable_selection, term_dictionary
 from expdesign.diagnosis.select import Selection, fit_nuisance, open_candidates, score_tests
@@ -152,6 +153,20 @@ def test_a_term_that_no_cause_is_gets_into_the_vessel_file():
     assert extended.model.terms[-1] == added
     assert added.equation == "r"
     assert "r" in added.expression
+
+
+@pytest.mark.parametrize("remains", [True, False])
+def test_what_an_uncertain_cause_explains_as_well_is_not_named_instead_of_it(
+    remains: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """Time stamps that drift, beside a late sensor: named only where they show with that too."""
+    drift = SimpleNamespace(words="drift", term=None, share=0.2, chosen=SimpleNamespace(statistic=100.0))
+    last, late = object(), object()
+    found = {id(last): (drift,), id(late): (drift,) * remains}
+    monkeypatch.setattr(search, "missing_effects", lambda base, *_: found[id(base)])
+    kept = SimpleNamespace(steps=(), first=last, last=last)
+    rest = with_unlisted_terms(kept, [None], None, None, 0, rejected=[late])  # type: ignore[arg-type,list-item]
+    assert [item.words for item in rest.kinds] == ["drift"] * remains
 
 
 @pytest.mark.slow

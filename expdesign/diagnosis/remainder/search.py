@@ -288,7 +288,8 @@ def with_unlisted_terms(
         validation: of fits.
         seed: of draws and intervals.
         rejected: fits of causes that are significant and improve nothing on held-out data, first ones first: what is
-            missing may show beside the cause that imitates it.
+            missing may show beside the cause that imitates it. What shows only without that cause may imitate it, and
+            is as uncertain.
     """
     rng = np.random.default_rng(seed)
     instead = as_good_as_causes(kept.first, kept.last, windows, rng) if kept.steps else ()
@@ -297,7 +298,8 @@ def with_unlisted_terms(
     for _ in range(MOST_TERMS):
         found = missing_effects(result.kept.last, windows, rng)
         if rejected and not result.kept.steps:
-            found = _surer(found, missing_effects(rejected[0], windows, rng))
+            beside = missing_effects(rejected[0], windows, rng)
+            found = _surer(found, beside) if beside else tuple(item for item in found[:1] if item.term is not None)
         if not found:
             break
         if found[0].term is None:
