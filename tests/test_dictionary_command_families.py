@@ -8,7 +8,7 @@ import pytest
 from design_case import SCENARIOS, one_line, spec, vessel
 from expdesign.dictionary import FAMILIES, PrimitiveSpec, build_primitive, complete_settings, family
 from expdesign.dictionary.trim import STEADY_CHANGE, lost
-from expdesign.errors import InputError
+from expdesign.errors import InputError, Unreachable
 from expdesign.export.files.design_files import dictionary_files
 from expdesign.information import score_primitives
 from expdesign.scenario import load_dictionary
@@ -101,7 +101,7 @@ def test_motions_out_of_reach_of_direct_models_are_refused_with_file_and_key(kin
     path.write_text(f'[dictionary]\nname = "d"\n[[primitives]]\nfamily = "{kind.name}"\n{lines}\n', encoding="utf-8")
     (request_,) = load_dictionary(path)
     with pytest.raises(
-        InputError,
+        Unreachable,
         match=r"requests.toml: primitives\[1\]: primitive .*the actuators cannot hold its entry state u = 50",
     ):
         build_primitive(rudder_ship(), request_)

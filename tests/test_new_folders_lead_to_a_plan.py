@@ -60,6 +60,29 @@ def test_the_trial_of_each_kind_is_verified(kind: str, tmp_path: Path, monkeypat
     assert plan["verified"] is True
 
 
+@pytest.mark.slow
+def test_what_follows_a_trial_works_with_terms_that_read_actuators(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Simulated with the file's own ship, whose parameters are found within five standard errors."""
+    monkeypatch.chdir(tmp_path)
+    vessel, plan, data = "mytrial/vessel.toml", "runs/mytrial/plan.json", "runs/sailed/measured.csv"
+    for command in (
+        "new mytrial --kind propeller-rudder",
+        "run mytrial/scenario.toml",
+        f"simulate {plan} --truth {vessel} --out runs/sailed",
+        f"estimate {data} --vessel {vessel} --method ls iv oe --out runs/estimate",
+        f"diagnose {data} --vessel {vessel} --out runs/diagnosis",
+        f"indices {data} --vessel {vessel} --out runs/indices",
+        f"foresee mytrial/scenario.toml --plan {plan} --out runs/foresight",
+    ):
+        assert main([*command.split(), "--quiet"]) == 0, command
+    true, found = load_vessel(vessel).model, load_vessel("runs/estimate/vessel-estimated.toml").model
+    assert (np.abs(found.parameters - true.parameters) < 5 * found.parameter_std).all()
+    assert found.speeds_mps is not None
+    assert found.speeds_mps[1] > found.speeds_mps[0]
+
+
 def test_ships_differ_in_what_nobody_stated_and_the_file_can_say_that_they_do_not(tmp_path: Path) -> None:
     new(tmp_path / "trial", kind="asv")
     path = tmp_path / "trial" / "vessel.toml"

@@ -76,7 +76,7 @@ class Family:
     summary: str  # one line for the user
     settings: tuple[Setting, ...]  # its parameters; each family also has `duration_s`
     reference: Reference | None = None  # desired velocities; the builder computes commands within the actuators' limits
-    # commands, also for vessels with propeller and rudder, whose models have no generalised forces
+    # commands, which suit vessels with propeller and rudder, too
     orders: Orders | None = None
     # whether its commands depend on the simulated motion; its candidates are simulated one by one
     closed_loop: bool = False

@@ -114,12 +114,11 @@ class VesselModel:
     # least and most value of parameters by name, on which the prior is conditioned: the signs of damping and thrust of
     # a vessel that is known to be stable, for example
     parameter_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    speeds_mps: tuple[float, float] | None = None  # least and most surge speed of the data behind it, where known
+    # standard deviation of drawn ships in parameters, by name, where the file states none. It is no prior: estimates
     # and designs take nothing from it. Names that have a standard deviation, or are no parameters, are ignored
     unstated_std: Mapping[str, float] = field(default_factory=dict)
-    speeds_mps: tuple[float, float] | None = (
-        None  # least and most surge speed of the data that determined the parameters
-    )
+    # least and most surge speed of the data that determined the parameters, where known
+    speeds_mps: tuple[float, float] | None = None
     expressions: tuple[Expression, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
