@@ -1,4 +1,4 @@
-"""Monitoring on autopilot in a slight sea: nothing false of an unchanged ship, and surge is watched whatever yaw does."""
+"""Monitoring on autopilot in a slight sea: nothing false of an unchanged ship; surge is watched whatever yaw does."""
 
 from __future__ import annotations
 
