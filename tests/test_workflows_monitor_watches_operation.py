@@ -406,3 +406,18 @@ def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[s
     assert surge["value"] == pytest.approx(0.15, abs=3 * surge["std"])
     assert any("another load" in sentence for sentence in told["verdict"])
     assert monitored(tmp_path / "none", *both, "--port-h", "inf")["alarms"]
+
+
+@pytest.mark.usefixtures("no_page")
+@pytest.mark.parametrize("correction_s", [-2.0, -0.4, 0.4])
+def test_a_small_correction_of_the_clock_is_survived(
+    voyages: dict[str, Path], watched: Path, tmp_path: Path, correction_s: float
+) -> None:
+    header, *rows = voyages["same"].read_text().splitlines(keepends=True)
+    column, path = header.strip().split(",").index("time_s"), tmp_path / "corrected.csv"
+    path.write_text(header + "".join([*rows[:1800], *(shifted(row, column, correction_s) for row in rows[1800:])]))
+    told = monitored(tmp_path / "out", path, "--reference", voyages["reference"])
+    assert told["judged_h"] == pytest.approx(told_in(watched)["judged_h"])
+    assert told["alarms"] == []
+    assert told["port_calls"] == []
+    assert told["history"][-1]["time_s"] == pytest.approx(HOUR, abs=5.0)

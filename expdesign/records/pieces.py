@@ -21,8 +21,7 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
-from expdesign.records.file import FIRST_ROW, MISSING, Inputs, Sources, choose_columns
-from expdesign.records.file.clock import JITTER_SHARE
+from expdesign.records.file import FIRST_ROW, JITTER_SHARE, MISSING, Inputs, Sources, choose_columns
 from expdesign.records.tuning import TUNING
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array

@@ -167,7 +167,8 @@ def estimate_figure(content: MonitorContent) -> str:
     begin_s, label = _axis(content)
     time = _hours([moment.time_s for moment in content.moments], begin_s)
     for number, colour in zip(_shown(content), LINES, strict=False):
-        value = np.array([moment.value[number] for moment in content.moments])
+        sign = np.sign(content.changes[number].unit[0])  # of a negative parameter, more is less in its unit
+        value = sign * np.array([moment.value[number] for moment in content.moments])
         half = 1.96 * np.array([moment.std[number] for moment in content.moments])
         axes.plot(time, value, color=colour, label=plain(content.changes[number].words))
         axes.fill_between(time, value - half, value + half, color=colour, alpha=0.15, linewidth=0)

@@ -2,7 +2,7 @@
 
 from expdesign.records.file.cells import FIRST_ROW, read_cells
 from expdesign.records.file.choice import Inputs, Sources, choose_columns, mistyped
-from expdesign.records.file.clock import Clock, read_clock
+from expdesign.records.file.clock import JITTER_SHARE, Clock, read_clock
 from expdesign.records.file.names import (
     ANGLE,
     COLUMNS,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from expdesign import __version__
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
-from expdesign.errors import InputError, NotInformative
+from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
 from expdesign.export import Content, write_files
 from expdesign.export.diagnosis_page import (
@@ -38,6 +41,8 @@ from expdesign.workflows.outcome import Outcome, TextTable, command_text
 from expdesign.workflows.steps.measured import doubted, measured
 from expdesign.workflows.steps.workers import workers
 
+SINCE_CHANGE = "since-change.csv"
+"""File that a watch leaves for a diagnosis."""
 MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
@@ -68,7 +73,7 @@ def diagnose(
     if not data:
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.0)
-    ship = load_vessel(vessel)
+    ship, handed_over = with_alarms(load_vessel(vessel), data)
     record = in_stated_time(measured(data, ship, velocity=velocity), ship.sensors)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
@@ -94,7 +99,31 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(files=written, summary=summary, tables=_tables(found), notes=diagnosis_notes(found))
+    return Outcome(files=written, summary=summary, tables=_tables(found), notes=(*handed_over, *diagnosis_notes(found)))
+
+
+def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
+    """The ship with parameters that a watch named as unsure as its alarm says, and notes; for files that it left.
+
+    Their standard deviations, of which the fit starts, are the size of the change together with its standard error.
+    """
+    names, std, notes = ship.model.names, ship.model.parameter_std.copy(), list[str]()
+    for path in data:
+        told = path.with_name("monitor.json")
+        if path.name != SINCE_CHANGE or not told.is_file():
+            continue
+        try:
+            alarm = json.loads(told.read_text(encoding="utf-8"))["alarms"][-1]
+            effect, size, words = str(alarm["effect"]), math.hypot(alarm["value"], alarm["std"]), alarm["in_words"]
+        except (ValueError, KeyError, IndexError, TypeError):
+            raise FileError(told, "alarms", f"is not as expdesign monitor leaves it beside {path.name}") from None
+        notes.append(f"{path.name}: expdesign monitor named {words}")
+        if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)]:
+            std[names.index(name)] = size
+            notes[-1] += f"; the standard deviation of {name} is taken as {size:.3g}"
+    if not notes:
+        return ship, ()
+    return replace(ship, model=replace(ship.model, parameter_std=std)), tuple(notes)
 
 
 def _roll(ship: Vessel, record: Record) -> RollVerdict | None:
