@@ -1,5 +1,6 @@
 """The command line hands over what was typed, and keeps results on stdout apart from progress on stderr."""
 
+import inspect
 import json
 import re
 import subprocess
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 
 import expdesign
+from expdesign import workflows as real_workflows
 from expdesign.cli import main
+from expdesign.cli.app import WORKFLOWS
 from expdesign.cli.options import repeat_option
 from expdesign.cli.summary import _rows
 from short_examples import copied
@@ -231,7 +234,18 @@ def test_what_was_typed_reaches_the_workflow(
     workflows: Workflows, typed: str, name: str, arguments: tuple[object, ...], options: dict[str, object]
 ) -> None:
     assert main(typed.split()) == 0
-    assert workflows.calls == [(name, arguments, options)]
+    ((called, positional, given),) = workflows.calls
+    assert (called, positional) == (name, ())
+    expected = inspect.signature(getattr(real_workflows, name)).bind(*arguments, **options).arguments
+    assert given == expected
+
+
+def test_every_parameter_of_a_command_is_one_of_its_workflow() -> None:
+    assert len(WORKFLOWS) > 20
+    for name, (workflow, parameters) in WORKFLOWS.items():
+        known = inspect.signature(getattr(real_workflows, workflow)).parameters
+        assert {*parameters} - {"no_cache"} <= {*known}, name
+        assert "no_cache" not in parameters or "cache" in known, name
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """The program and how its commands are carried out.
 
-A command is a function that returns what it asks of which workflow; `command` registers it, adds the options that all
-commands share, loads the workflow only when the command runs, shows progress, and prints the summary.
+A command is the signature of a workflow as the command line has it: parameters of the same names, with option, help
+and default. `command` registers it, adds the options that all commands share, loads the workflow only when the command
+runs, hands it the parameters, shows progress, and prints the summary.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ import warnings
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Annotated
@@ -126,40 +126,47 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress an
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else, on stdout.")]
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A workflow and its arguments."""
-
-    workflow: str  # name in `expdesign.workflows`
-    # arguments, options: of the function, without progress
-    arguments: tuple[object, ...]
-    options: Mapping[str, object]
-    tells: bool = False  # whether the function also takes `tell`, for lines that are printed while it works
+WORKFLOWS: dict[str, tuple[str, tuple[str, ...]]] = {}
+"""Command -> its workflow, and the names of its parameters."""
 
 
-def ask(workflow: str, *arguments: object, tells: bool = False, **options: object) -> Asked:
-    """Arguments of a command; lists become tuples."""
-    fixed = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
-    return Asked(
-        workflow, tuple(tuple(value) if isinstance(value, list) else value for value in arguments), fixed, tells
-    )
+def arguments(options: Mapping[str, object], parameters: Mapping[str, inspect.Parameter]) -> dict[str, object]:
+    """Arguments of a workflow: lists become tuples, empty where an option is not given; --no-cache is no cache."""
+    found: dict[str, object] = {}
+    for name, value in options.items():
+        if name == "no_cache":
+            found["cache"] = not value
+        elif isinstance(value, list):
+            found[name] = tuple(value)
+        else:
+            found[name] = () if value is None and "list[" in str(parameters[name].annotation) else value
+    return found
 
 
-def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]:
-    """Register a function as the command `name`, with its own options, --quiet and --json."""
+def command(
+    name: str, workflow: str = "", *, tells: bool = False
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Register a function as the command `name`, with its own options, --quiet and --json.
 
-    def register(asking: Callable[..., Asked]) -> Callable[..., Asked]:
-        @wraps(asking)
+    Args:
+        name: on the command line.
+        workflow: name in `expdesign.workflows`; that of the command by default.
+        tells: whether the workflow also takes `tell`, for lines that are printed while it works.
+    """
+
+    def register(described: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(described, eval_str=True).parameters
+
+        @wraps(described)
         def carry_out(*, quiet: bool, json: bool, **options: object) -> None:
-            asked = asking(**options)
             with interruptions_wait():  # some solvers do not stand being interrupted while they load
                 from expdesign import workflows
 
-                work = getattr(workflows, asked.workflow)
-            lines = {"tell": _untold if quiet or json else _tell} if asked.tells else {}
+                work = getattr(workflows, WORKFLOWS[name][0])
+            lines = {"tell": _untold if quiet or json else _tell} if tells else {}
             with shown_progress(quiet=quiet) as progress, warnings.catch_warnings():
                 warnings.simplefilter("ignore", NotDrawn)  # told below
-                outcome = work(*asked.arguments, progress=progress, **lines, **asked.options)
+                outcome = work(**arguments(options, own), progress=progress, **lines)
             if json:
                 typer.echo(as_json(name, outcome))
             elif not quiet:
@@ -170,16 +177,16 @@ def command(name: str) -> Callable[[Callable[..., Asked]], Callable[..., Asked]]
                 raise typer.Exit(NO_ANSWER)
 
         kind = inspect.Parameter.KEYWORD_ONLY
-        own = inspect.signature(asking, eval_str=True).parameters.values()
         shared = {"quiet": Quiet, "json": Json}
-        parameters = [part.replace(kind=kind) for part in own]
+        parameters = [part.replace(kind=kind) for part in own.values()]
         parameters += [
             inspect.Parameter(option, kind, default=False, annotation=hint) for option, hint in shared.items()
         ]
         carry_out.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         carry_out.__annotations__ = {part.name: part.annotation for part in parameters}
         app.command(name)(carry_out)
-        return asking
+        WORKFLOWS[name] = workflow or name.replace("-", "_"), tuple(own)
+        return described
 
     return register
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.app import command
 from expdesign.cli.options import Jobs, OutByData, Resume, Rudder, Seed, Throttle, Velocity
 
 
@@ -26,11 +26,11 @@ def monitor(
             help="Records of a time in which the ship was as known, in weather as usual.",
         ),
     ] = None,
-    learn: Annotated[
+    learn_h: Annotated[
         float,
         typer.Option("--learn-h", metavar="H", help="Hours of the data that are the reference, where none is given."),
     ] = 24.0,
-    false_alarms: Annotated[
+    false_alarm_days: Annotated[
         float, typer.Option("--false-alarm-days", metavar="D", help="Days between false alarms, on average.")
     ] = 30.0,
     size: Annotated[
@@ -41,7 +41,7 @@ def monitor(
             help="Relative change of parameters, thrust and inertia that matters; of angles and gyro in proportion.",
         ),
     ] = 0.1,
-    every: Annotated[
+    every_s: Annotated[
         float, typer.Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")
     ] = 3600.0,
     model: Annotated[
@@ -52,7 +52,7 @@ def monitor(
             "reference, with measured surge, sway, roll, side acceleration and moment of the drives as inputs.",
         ),
     ] = "vessel",
-    port: Annotated[
+    port_h: Annotated[
         float,
         typer.Option(
             "--port-h",
@@ -65,32 +65,16 @@ def monitor(
     velocity: Velocity = "auto",
     out: OutByData = None,
     jobs: Jobs = 0,
-) -> Asked:
+) -> None:
     """Watch a ship in operation: whether it still is the ship of its model, what changed, since when, by how much.
 
     Writes monitor.json, monitor.html, monitor-state.json and, after an alarm, since-change.csv for diagnose.
 
     Example: expdesign monitor voyage.csv --vessel ship.toml --learn-h 6
     """
-    return ask(
-        "monitor",
-        data,
-        out,
-        vessel=vessel,
-        reference=reference or (),
-        learn_h=learn,
-        false_alarm_days=false_alarms,
-        size=size,
-        every_s=every,
-        port_h=port,
-        velocity=velocity,
-        model=model,
-        resume=resume,
-        jobs=jobs,
-    )
 
 
-@command("watch-steps")
+@command("watch-steps", tells=True)
 def watch_steps(
     data: Annotated[
         Path, typer.Argument(metavar="DATA.csv", help="Record of a step trial; - reads a stream, row by row.")
@@ -112,7 +96,7 @@ def watch_steps(
     ],
     throttle: Throttle = None,
     rudder: Rudder = None,
-    learn: Annotated[
+    learn_s: Annotated[
         float | None,
         typer.Option(
             "--learn-s",
@@ -124,7 +108,7 @@ def watch_steps(
     resume: Resume = False,
     out: OutByData = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Tell during a step trial when the vessel is steady and which step is next; list what is left to sail.
 
     One line for each event, at once. Bad steps are named and put to the end. Writes steps-to-do.csv, a list of steps
@@ -132,16 +116,3 @@ def watch_steps(
 
     Example: expdesign watch-steps - --steps steps.csv --vessel fast-8m.toml
     """
-    return ask(
-        "watch_steps",
-        data,
-        out,
-        tells=True,
-        steps=steps,
-        vessel=vessel,
-        throttle=throttle or (),
-        rudder=rudder or (),
-        learn_s=learn,
-        resume=resume,
-        seed=seed,
-    )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.app import command
 from expdesign.cli.options import (
     MOST_TRIALS,
     Jobs,
@@ -33,12 +33,11 @@ def new(
             "--kind", metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw, asv or model-ship."
         ),
     ] = "azimuth",
-) -> Asked:
+) -> None:
     """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship.
 
     Example: expdesign new mytrial --kind twin-screw
     """
-    return ask("new", folder, kind=kind)
 
 
 @command("run")
@@ -59,22 +58,11 @@ def run(
     scheduler: Scheduler = None,
     no_cache: NoCache = False,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run mytrial/scenario.toml
     """
-    return ask(
-        "run",
-        scenario,
-        out,
-        vessel=vessel,
-        draft=draft,
-        jobs=jobs,
-        scheduler=scheduler,
-        cache=not no_cache,
-        seed=seed,
-    )
 
 
 @command("nominal")
@@ -85,7 +73,7 @@ def nominal(
     ],
     out: OutByCard = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Make a vessel file from a ship's particulars and what her pilot card states of trials.
 
     Writes vessel.toml, with standard deviations and correlations; nominal.json and nominal.html: her trials predicted
@@ -93,16 +81,14 @@ def nominal(
 
     Example: expdesign nominal scenarios/cards/offshore-45m.toml
     """
-    return ask("nominal", card, out, seed=seed)
 
 
 @command("score")
-def score(scenario: ScenarioFile, vessel: OtherVessel = None, out: Out = None, seed: Seed = 0) -> Asked:
+def score(scenario: ScenarioFile, vessel: OtherVessel = None, out: Out = None, seed: Seed = 0) -> None:
     """Simulate the manoeuvres of the dictionary, and rank them by the information that each adds beside all others.
 
     Writes dictionary.json.
     """
-    return ask("score", scenario, out, vessel=vessel, seed=seed)
 
 
 @command("durations")
@@ -127,13 +113,12 @@ def durations(
     ] = 0,
     jobs: Jobs = 0,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Choose how long to run each manoeuvre, with a certificate of how close to the optimum that is.
 
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name;
     with --monte-carlo also covariances.json.
     """
-    return ask("durations", scenario, out, vessel=vessel, grow=grow, monte_carlo=monte_carlo, jobs=jobs, seed=seed)
 
 
 @command("plan")
@@ -149,22 +134,11 @@ def plan(
     scheduler: Scheduler = None,
     no_cache: NoCache = False,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
     """
-    return ask(
-        "plan",
-        scenario,
-        out,
-        vessel=vessel,
-        durations=durations,
-        jobs=jobs,
-        scheduler=scheduler,
-        cache=not no_cache,
-        seed=seed,
-    )
 
 
 @command("export")
@@ -184,7 +158,7 @@ def export(
         str | None,
         typer.Option("--departure", metavar="TIME", help="Time of the first waypoint, e.g. 2026-05-01T08:00:00Z."),
     ] = None,
-    tolerance: Annotated[
+    tolerance_m: Annotated[
         float | None,
         typer.Option(
             "--tolerance-m",
@@ -201,20 +175,18 @@ def export(
         bool, typer.Option("--fine", help="Follow the track in every turn, instead of one leg for each run.")
     ] = False,
     out: OutBesidePlan = None,
-) -> Asked:
+) -> None:
     """Write a plan as route files for chart systems and autopilots: one leg for each run, and those between them.
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
     """
-    return ask("export", plan, out, formats=formats, departure=departure, tolerance_m=tolerance, fine=fine, name=name)
 
 
-@command("check-route")
+@command("check-route", "check_routes")
 def check_route(
     files: Annotated[list[Path], typer.Argument(metavar="ROUTE.rtz ...", help="RTZ or GPX files of any origin.")],
-) -> Asked:
+) -> None:
     """Check RTZ and GPX files beyond their schemas: ids, names, order of schedules, ranges, size."""
-    return ask("check_routes", files)
 
 
 @command("whatif")
@@ -224,7 +196,7 @@ def whatif(
         list[Path],
         typer.Argument(metavar="VARIANT.toml ...", help="Scenario files, complete or with only the keys that differ."),
     ],
-    plan: Annotated[
+    with_plan: Annotated[
         bool, typer.Option("--plan", help="Also plan the trials, to compare repositioning; takes minutes each.")
     ] = False,
     jobs: Jobs = 0,
@@ -232,24 +204,13 @@ def whatif(
     no_cache: NoCache = False,
     out: OutWhatIf = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Compare variants of a scenario side by side: time, accuracy and cost.
 
     Writes whatif.json and whatif.html.
 
     Example: expdesign whatif scenarios/helsinki.toml scenarios/variants/half-an-hour.toml
     """
-    return ask(
-        "whatif",
-        scenario,
-        variants,
-        out,
-        with_plan=plan,
-        jobs=jobs,
-        scheduler=scheduler,
-        cache=not no_cache,
-        seed=seed,
-    )
 
 
 @command("roll-plan")
@@ -283,7 +244,7 @@ def roll_plan(
     jobs: Jobs = 0,
     no_cache: NoCache = False,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Choose known loads, and manoeuvres at each, that tell most about roll and an unknown load.
 
     The vessel file has a table of roll, whose uncertain parameters are sought. Writes roll-plan.html and
@@ -292,16 +253,3 @@ def roll_plan(
 
     Example: expdesign roll-plan scenarios/roll-trial.toml --loads scenarios/loads/roll-trial.toml
     """
-    return ask(
-        "roll_plan",
-        scenario,
-        out,
-        loads=loads,
-        most_loads=most_loads,
-        interest=interest or (),
-        place=place,
-        minutes=minutes,
-        jobs=jobs,
-        cache=not no_cache,
-        seed=seed,
-    )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.app import command
 from expdesign.cli.options import (
     DataFiles,
     Fixed,
@@ -23,7 +23,7 @@ from expdesign.cli.options import (
 )
 
 
-@command("import")
+@command("import", "import_logs")
 def import_(
     logs: Annotated[
         list[Path],
@@ -51,7 +51,7 @@ def import_(
             help="The mapping of an earlier import, edited; see expdesign explain mapping. Default: guessed.",
         ),
     ] = None,
-    sample_time: Annotated[
+    sample_time_s: Annotated[
         float | None,
         typer.Option(
             "--sample-time",
@@ -59,14 +59,14 @@ def import_(
             help="Time between rows that are written [s]. Default: that of the slowest main sensor, at most 1.",
         ),
     ] = None,
-    length: Annotated[
+    length_m: Annotated[
         float | None,
         typer.Option(
             "--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."
         ),
     ] = None,
     out: OutByLog = None,
-) -> Asked:
+) -> None:
     """Turn logs, as ships and craft record them, into runs that the other commands read.
 
     Writes a CSV file for each run, mapping.toml with all decisions, vessel-lines.toml with what the logs tell of
@@ -74,16 +74,6 @@ def import_(
 
     Example: expdesign import bridge.nmea rudder.csv --vessel ship.toml
     """
-    return ask(
-        "import_logs",
-        logs,
-        out,
-        vessel=vessel,
-        plan=plan,
-        map_file=map_file,
-        sample_time_s=sample_time,
-        length_m=length,
-    )
 
 
 @command("estimate")
@@ -135,9 +125,10 @@ def estimate(
             "Euler's map at the sample time.",
         ),
     ] = "continuous",
-    horizon: Annotated[
+    horizon_s: Annotated[
         float | None,
         typer.Option(
+            "--horizon",
             metavar="SECONDS",
             help="Output error restarts its simulations from the data after this time, for ships unstable on their "
             "course and for weather that is not measured. Default: 30, or never, whichever predicts better.",
@@ -162,7 +153,7 @@ def estimate(
             "clear of zero in the simulated instruments, so that noise and disturbances leave no bias.",
         ),
     ] = "all",
-    offset: Annotated[
+    offset_mps: Annotated[
         float,
         typer.Option(
             "--offset",
@@ -180,33 +171,13 @@ def estimate(
         ),
     ] = "none",
     out: OutByData = None,
-) -> Asked:
+) -> None:
     """Estimate the model's parameters from measured data, with standard errors.
 
     Writes estimate.json, vessel-estimated.toml and estimate.html.
 
     Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
     """
-    return ask(
-        "estimate",
-        data,
-        out,
-        vessel=vessel,
-        methods=methods or (),
-        fixed=fixed or (),
-        velocity=velocity,
-        mean=mean,
-        blocks=blocks,
-        start=start,
-        motion=motion,
-        horizon_s=horizon,
-        constant=constant,
-        steered=steered,
-        samples=samples,
-        offset_mps=offset,
-        prior=prior,
-        tests=tests or (),
-    )
 
 
 @command("diagnose")
@@ -233,14 +204,13 @@ def diagnose(
     out: OutByData = None,
     jobs: Jobs = 0,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Find the causes of the simulation error and extend the model by them.
 
     Writes diagnosis.json, diagnosis.html and vessel-extended.toml. The causes: expdesign explain causes
 
     Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
     """
-    return ask("diagnose", data, out, vessel=vessel, scenario=scenario, velocity=velocity, jobs=jobs, seed=seed)
 
 
 @command("indices")
@@ -251,46 +221,34 @@ def indices(
     data: Annotated[
         list[Path] | None, typer.Argument(metavar="DATA.csv ...", help="Measured zig-zags, turning circles, stops.")
     ] = None,
-    speed: Annotated[
+    speed_mps: Annotated[
         float | None,
         typer.Option("--speed-mps", metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
     ] = None,
     scale: Annotated[
         float, typer.Option("--scale", metavar="S", help="Ship length by model length, for trials of a model.")
     ] = 1.0,
-    antenna: Annotated[
+    antenna_forward_m: Annotated[
         float,
         typer.Option("--antenna-forward-m", metavar="X", help="Distance of the antenna forward of amidships [m]."),
     ] = 0.0,
-    depth: Annotated[
+    depth_m: Annotated[
         float | None, typer.Option("--depth-m", metavar="D", help="Depth of the water in the measured trials [m].")
     ] = None,
-    wind: Annotated[
+    wind_mps: Annotated[
         float | None, typer.Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials [m/s].")
     ] = None,
-    sea: Annotated[
+    sea_state: Annotated[
         int | None, typer.Option("--sea-state", metavar="N", help="Sea state in the measured trials, 0 to 9.")
     ] = None,
     out: OutByVessel = None,
-) -> Asked:
+) -> None:
     """Compute turning, zig-zag and stopping indices, simulated and measured, beside their IMO limits.
 
     Writes indices.json and indices.html.
 
     Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
     """
-    return ask(
-        "indices",
-        data or (),
-        out,
-        vessel=vessel,
-        speed_mps=speed,
-        scale=scale,
-        antenna_forward_m=antenna,
-        depth_m=depth,
-        wind_mps=wind,
-        sea_state=sea,
-    )
 
 
 @command("identify-steps")
@@ -321,7 +279,7 @@ def identify_steps(
     velocity: Velocity = "auto",
     out: OutByData = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Identify a model of speed and yaw rate from steps of throttle and rudder, each held until the vessel is steady.
 
     Writes step-model.json, step-trial.html and, with --vessel, vessel-steps.toml: that vessel with the parameters,
@@ -329,18 +287,6 @@ def identify_steps(
 
     Example: expdesign identify-steps steps.csv --vessel fast-8m.toml
     """
-    return ask(
-        "identify_steps",
-        data,
-        out,
-        vessel=vessel,
-        throttle=throttle or (),
-        rudder=rudder or (),
-        tests=tests or (),
-        steps=steps,
-        velocity=velocity,
-        seed=seed,
-    )
 
 
 @command("mine")
@@ -350,7 +296,7 @@ def mine(
         Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
     ],
     keep: Annotated[int, typer.Option("--keep", metavar="K", help="How many batches, or pieces, to choose.")],
-    piece: Annotated[
+    piece_s: Annotated[
         float | None,
         typer.Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
     ] = None,
@@ -372,7 +318,7 @@ def mine(
     ] = 500,
     out: OutByData = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Rank recorded runs by their information, and choose the few to estimate from.
 
     Writes mining.json and chosen.csv, which `estimate` reads. With --labels: dictionary.json, durations.json, and
@@ -381,17 +327,3 @@ def mine(
     Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
     Example: expdesign mine trials --vessel ship.toml --labels file --piece 100 --keep 6
     """
-    return ask(
-        "mine",
-        data,
-        out,
-        vessel=vessel,
-        keep=keep,
-        piece_s=piece,
-        fixed=fixed or (),
-        mean=mean,
-        velocity=velocity,
-        labels=labels,
-        draws=draws,
-        seed=seed,
-    )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import Asked, ask, command
+from expdesign.cli.app import command
 from expdesign.cli.options import (
     MOST_TRIALS,
     MOST_VOYAGES,
@@ -51,7 +51,7 @@ def foresee(
     jobs: Jobs = 1,
     no_cache: NoCache = False,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Foresee what a diagnosis of the trial would find: the power of its test of every cause, before sailing.
 
     Writes foresee.json and foresee.html: also causes that it would not tell apart, and runs that would help. With
@@ -61,7 +61,6 @@ def foresee(
     Example: expdesign foresee scenarios/helsinki.toml
     Example: expdesign foresee scenarios/story.toml --operation 10 --jobs 0
     """
-    return ask("foresee", scenario, out, plan=plan, operation=operation, jobs=jobs, cache=not no_cache, seed=seed)
 
 
 @command("simulate")
@@ -70,21 +69,20 @@ def simulate(
     truth: Annotated[
         Path, typer.Option("--truth", metavar="VESSEL.toml", help="The vessel that runs the trial, with its sensors.")
     ],
-    until: Annotated[
+    until_s: Annotated[
         float | None,
         typer.Option("--until", metavar="S", help="End the data after S seconds, as if the trial were aborted."),
     ] = None,
     out: OutBesidePlan = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Rehearse a trial: run its commands on another vessel and measure with noise.
 
     Writes measured.csv.
     """
-    return ask("simulate", plan, out, truth=truth, until_s=until, seed=seed)
 
 
-@command("validate")
+@command("validate", "validate_design")
 def validate(
     scenario: ScenarioFile,
     truth: Annotated[
@@ -115,23 +113,11 @@ def validate(
     scheduler: Scheduler = None,
     out: Out = None,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Test a design in simulated trials: predicted and simulated accuracy, beside equal shares and random runs.
 
     Writes validation.json and validation.html. An interrupted call continues where it stopped.
     """
-    return ask(
-        "validate_design",
-        scenario,
-        out,
-        truth=truth,
-        trials=trials,
-        method=method,
-        integrator=integrator,
-        jobs=jobs,
-        scheduler=scheduler,
-        seed=seed,
-    )
 
 
 @command("replan")
@@ -153,7 +139,7 @@ def replan(
             help="Model to continue with, e.g. vessel-extended.toml. Default: estimated from the data.",
         ),
     ] = None,
-    remaining: Annotated[
+    remaining_s: Annotated[
         float | None,
         typer.Option(
             "--remaining",
@@ -179,7 +165,7 @@ def replan(
     scheduler: Scheduler = None,
     no_cache: NoCache = False,
     seed: Seed = 0,
-) -> Asked:
+) -> None:
     """Plan the rest of a trial, from the present position, with a model updated from the data.
 
     Writes what run writes, for the rest; replan.json with what is known and what the rest will add; and
@@ -188,20 +174,6 @@ def replan(
 
     Example: expdesign replan scenarios/story.toml --data measured.csv --vessel vessel-extended.toml --remaining 480
     """
-    return ask(
-        "replan",
-        scenario,
-        out,
-        data=data,
-        vessel=vessel,
-        remaining_s=remaining,
-        interest=interest or (),
-        stopped=stopped,
-        jobs=jobs,
-        scheduler=scheduler,
-        cache=not no_cache,
-        seed=seed,
-    )
 
 
 @command("roll")
@@ -223,7 +195,7 @@ def roll(
         str,
         typer.Option(metavar="HOW", help="iv, instruments from the rudder; ls, least squares, for comparison only."),
     ] = "iv",
-    lowpass: Annotated[
+    lowpass_hz: Annotated[
         float | None,
         typer.Option("--lowpass-hz", metavar="F", help="Low-pass filter, which must pass roll. Default: as needed."),
     ] = None,
@@ -232,7 +204,7 @@ def roll(
         typer.Option("--scale", metavar="S", help="Ship length by model length, for results of the ship too."),
     ] = None,
     out: OutByData = None,
-) -> Asked:
+) -> None:
     """Estimate roll inertia, damping, stiffness and an unknown load from runs at one or more loads.
 
     Reads roll_rate_radps, imu_lateral_mps2, r_radps and the rudder. Writes roll.json and roll.html: parameters with
@@ -241,42 +213,28 @@ def roll(
 
     Example: expdesign roll nominal.csv calibration.csv loaded.csv --loads loads.toml
     """
-    return ask(
-        "roll", data, out, loads=loads, vessel=vessel, rudder=rudder or (), method=method, lowpass_hz=lowpass,
-        scale=scale,
-    )  # fmt: skip
 
 
 @command("incline")
 def incline(
     vessel: Annotated[Path, typer.Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll].")],
-    mass: Annotated[
+    mass_kg: Annotated[
         list[float], typer.Option("--mass-kg", metavar="M ...", help="Weights on board that may be shifted.")
     ],
-    shift: Annotated[list[float], typer.Option("--shift-m", metavar="Y ...", help="Shifts across the ship.")],
-    heel_std: Annotated[
+    shift_m: Annotated[list[float], typer.Option("--shift-m", metavar="Y ...", help="Shifts across the ship.")],
+    heel_std_deg: Annotated[
         float, typer.Option("--heel-std-deg", metavar="S", help="Standard deviation of one reading of heel.")
     ] = 0.02,
-    period_std: Annotated[
+    period_std_s: Annotated[
         float | None,
         typer.Option("--period-std-s", metavar="S", help="Standard deviation of a decay's period. Default: no decay."),
     ] = None,
     shifts: Annotated[int, typer.Option("--shifts", metavar="N", min=1, help="Shifts that are read.")] = 4,
     out: OutInclined = None,
-) -> Asked:
+) -> None:
     """Say what inclining tests tell: heel, and the accuracy of metacentric height and roll inertia.
 
     Writes incline.json, with a row for every weight and shift.
 
     Example: expdesign incline --vessel scenarios/vessels/roll-model.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1
     """
-    return ask(
-        "incline",
-        vessel,
-        out,
-        mass_kg=mass,
-        shift_m=shift,
-        heel_std_deg=heel_std,
-        period_std_s=period_std,
-        shifts=shifts,
-    )
