@@ -14,7 +14,7 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import best_step, nearest_possible, step_bounds
 from expdesign.diagnosis.fit.output_error import fit_output_error
 from expdesign.diagnosis.judgement import harms, without_harm
-from expdesign.diagnosis.model.extended_model import BOUNDS
+from expdesign.diagnosis.model import EFFECTS
 from expdesign.diagnosis.model.terms import resisting
 from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
@@ -111,7 +111,7 @@ def test_bounds_are_those_of_times_and_of_damping(record):
     ship = extended_model(with_quadratic_yaw_damping(-0.5, 0.1), record)
     low, high = step_bounds(ship.with_effects({"lag:all": 2.0}), ("lag:all", "theta:N_abs_r_r", "theta:N_r"))
     np.testing.assert_allclose(low, [-2.0, -np.inf, -np.inf], atol=1e-5)
-    np.testing.assert_allclose(high, [BOUNDS["lag"][1] - 2.0, 0.5, np.inf])
+    np.testing.assert_allclose(high, [EFFECTS["lag"].high - 2.0, 0.5, np.inf])
 
 
 @pytest.mark.parametrize(("period_s", "least"), [(3.0, -1.0), (1.5, 0.0)])

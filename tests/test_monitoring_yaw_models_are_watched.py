@@ -175,8 +175,13 @@ def test_what_a_yaw_model_needs_is_asked_for(folder: Path, tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
     later = tmp_path / "later.csv"
     later.write_text("\n".join([lines[0], *(f"9{line}" for line in lines[2000:])]) + "\n")
+    watched = tmp_path / "watched"
+    reference = [folder / f"reference-{number}.csv" for number in range(REFERENCES)]
+    workflows.monitor(
+        [folder / "same.csv"], watched, vessel=folder / "ship.toml", reference=reference, model="yaw-full"
+    )
     with pytest.raises(InputError, match="is of another model"):
-        workflows.monitor([later], folder / "yaw-full-same", vessel=folder / "ship.toml", resume=True, learn_h=0.4)
+        workflows.monitor([later], watched, vessel=folder / "ship.toml", resume=True, learn_h=0.4)
 
 
 def test_halves_that_disagree_at_equal_fit_raise_the_alarm_of_poor_data() -> None:

@@ -29,9 +29,7 @@ def new(
     folder: Annotated[Path, typer.Argument(metavar="NAME", help="The folder to make; also the scenario's name.")],
     kind: Annotated[
         str,
-        typer.Option(
-            "--kind", metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw, asv or model-ship."
-        ),
+        typer.Option("--kind", metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv."),
     ] = "azimuth",
 ) -> None:
     """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship.

@@ -61,8 +61,9 @@ def heading_rows(zigzag: Primitive, vessel: Vessel, values: Array, step_s: float
 
 
 def _reversals(vessel: Vessel, values: Array) -> list[int]:
-    """Samples at which the helm changes sides."""
-    helms = [column for column, name in enumerate(vessel.model.inputs) if stem(name) in HELM_STEMS]
+    """Samples at which the helm changes sides; without one, the propeller that changes most."""
+    inputs = vessel.model.inputs
+    helms = [column for column, name in enumerate(inputs) if stem(name) in HELM_STEMS] or list(range(len(inputs)))
     widest = values[:, max(helms, key=lambda column: float(np.ptp(values[:, column])))]
     first = widest > (widest.max() + widest.min()) / 2
     return (np.flatnonzero(np.diff(first)) + 1).tolist()

@@ -250,8 +250,8 @@ def suspect_figure(found: Diagnosis, index: int, key: str) -> str:
         _scatter(axes, values, factor * row, signed=has_sign(item))
         axes.set_title(f"{what} {name}")
         axes.ticklabel_format(axis="x", scilimits=(-3, 4))  # else labels of small numbers overlap
-        axes.set_xlabel(short(label))
         light_grid(axes)
+    figure.supxlabel(short(label), fontsize=10)  # one for all: beside each other they are wider than their axes
     return svg(figure, key=key, label=f"Error of the simulation against {label}")
 
 

@@ -19,7 +19,6 @@ KINDS = {
     "propeller-rudder": "a coaster of 80 m with one propeller and one rudder",
     "twin-screw": "a ship of 60 m with two propellers, two rudders and a tunnel thruster",
     "asv": "an unmanned craft of 2 m that steers by the difference of two propellers",
-    "model-ship": "a model ship of 1.2 m with two azimuth thrusters and a tunnel thruster",
 }
 """Kind of ship -> what its template describes."""
 OUTLINE_HULL_M = 20.0  # length of the ship for which the bay has its size; for others it is scaled
