@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from expdesign.errors import InputError, NoAnswer
 from expdesign.importing.sampling import Sampled, Stretch
 from expdesign.indices import NotStandard, measured_trial
 from expdesign.indices.values import Circle, Stop, ZigZag
@@ -288,7 +289,7 @@ def family(ship: Vessel, batch: Batch) -> str:
     """What a run is, in words, as the indices read it; else which inputs change."""
     try:
         found = measured_trial(*_with_helm(ship, batch))
-    except Exception:  # a label is no reason to stop
+    except (InputError, NoAnswer):  # a run that no index describes is named by its inputs
         found = NotStandard(name=batch.name, reason="")
     match found:
         case ZigZag():

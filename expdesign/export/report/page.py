@@ -308,8 +308,8 @@ def risks(content: ReportContent) -> list[Fact]:
         ]
     else:
         chances = [
-            Fact(name="Leaving allowed water", value=left_words(risk), remark=""),
-            Fact(name="Trial aborted", value=aborted_words(risk), remark=""),
+            _chance("Leaving allowed water", left_words(risk), "; "),
+            _chance("Trial aborted", aborted_words(risk), ": "),
         ]
     water = (
         Fact(name="Nearest forbidden water", value=clearance, remark=nearest)
@@ -321,6 +321,12 @@ def risks(content: ReportContent) -> list[Fact]:
         )
     )
     return [*chances, water]
+
+
+def _chance(name: str, text: str, end: str) -> Fact:
+    """A share of the simulated trials, and after the sign that ends it what else is known."""
+    share, _, rest = text.partition(end)
+    return Fact(name=name, value=f"{share};" if rest else share, remark=rest)
 
 
 def _proof(content: ReportContent) -> Fact:
