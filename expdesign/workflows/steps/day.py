@@ -101,15 +101,15 @@ def _first_day(
     seed: int,
     progress: Progress,
 ) -> Day:
-    """The trial of a ship with a wide prior: as asked for, or else a first one of shorter runs.
+    """The trial of a ship with a wide prior: as asked for where that is verified, or else a first one of shorter runs.
 
     Raises:
         NoAnswer: neither has a plan; what the one that is asked for says.
     """
     trying, cutting, again = in_phases(progress, 0.4, 0.1, 0.5)
-    plan = whole_trial(plan_problem(case, information, design, seed=seed), trying)
-    if plan is not None:
-        return Day(information=information, design=design, plan=plan)
+    whole = whole_trial(plan_problem(case, information, design, seed=seed), trying)
+    if whole is not None and (whole.verified or whole.draft):
+        return Day(information=information, design=design, plan=whole)
     try:
         cutting("cutting runs to what is safe for all ships of the prior", 0.0)
         first = calibration(case, seed=seed)
@@ -117,8 +117,10 @@ def _first_day(
         shared = designed(first, told, stated=stated, seed=seed)
         plan = planned(first, told, shared, seed=seed, progress=again)
     except NoAnswer:
-        plan = planned(case, information, design, seed=seed, progress=again)
+        plan = planned(case, information, design, seed=seed, progress=again) if whole is None else whole
         return Day(information=information, design=design, plan=plan)
+    if whole is not None and not plan.verified:  # shorter runs do not help; the refusal is that of what was asked for
+        return Day(information=information, design=design, plan=whole)
     note = first_note([item.primitive for item in told], case.dictionary)
     return Day(information=told, design=shared, plan=plan, note=note)
 
