@@ -1,0 +1,182 @@
+"""The folder of a page: its files are the truth, nothing outside is read or written, every version is kept.
+
+A version is the whole text of a file before a change, in `.expdesign/NAME/NUMBER`. Undo takes the newest one back.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import tomllib
+from collections.abc import Callable, Iterator, MutableMapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from expdesign.errors import FileError, InputError
+
+VERSIONS = ".expdesign"
+"""Folder of earlier versions."""
+MOST_VERSIONS = 100
+"""Kept of each file."""
+MOST_UPLOAD_BYTES = 200 * 2**20
+"""Size of a file that is taken in."""
+MOST_FILES = 5000
+"""Looked through for files of a kind."""
+NAME = re.compile(r"[A-Za-z0-9][\w. -]{0,80}")
+"""Names of files that are taken in."""
+KINDS = {
+    "scenario": ("scenario", "design"),
+    "vessel": ("vessel", "model"),
+    "area": ("area", "chart"),
+    "card": ("ship", "thrusters"),
+}
+"""Kind of a TOML file -> tables that it has."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder that is worked on, and all that may be read or written."""
+
+    root: Path  # resolved
+
+    def path(self, name: str | Path) -> Path:
+        """A path inside the folder.
+
+        Raises:
+            InputError: it leads out of the folder, or into the earlier versions.
+        """
+        found = (self.root / name).resolve()
+        if not found.is_relative_to(self.root) or VERSIONS in found.relative_to(self.root).parts:
+            raise InputError(f"{name} is not in the folder {self.root}, expected a file in it")
+        return found
+
+    def name(self, path: Path) -> str:
+        """A path as it is called in the folder."""
+        return path.resolve().relative_to(self.root).as_posix()
+
+    def named_in(self, file: Path, named: str) -> Path:
+        """The file of the folder that another file names, relative to itself; raises as `path` does."""
+        return self.path(os.path.relpath(file.parent / named, self.root))
+
+    def files(self) -> Iterator[Path]:
+        """Files of the folder and its folders, by name; hidden ones are left out."""
+        count = 0
+        for base, folders, names in os.walk(self.root):
+            folders[:] = sorted(name for name in folders if not name.startswith("."))
+            for name in sorted(names):
+                count += 1
+                if count > MOST_FILES:
+                    return
+                if not name.startswith("."):
+                    yield Path(base) / name
+
+    def of_kind(self, kind: str) -> tuple[str, ...]:
+        """Names of the TOML files of a kind of `KINDS`."""
+        found = []
+        for path in self.files():
+            if path.suffix == ".toml" and path.stat().st_size < 2**20:
+                try:
+                    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+                except (OSError, ValueError):
+                    continue
+                if all(table in tables for table in KINDS[kind]):
+                    found.append(self.name(path))
+        return tuple(found)
+
+    def named(self, pattern: str) -> tuple[str, ...]:
+        """Names of the files that match a pattern such as `plan.json`."""
+        return tuple(self.name(path) for path in self.files() if path.match(pattern))
+
+    def digest(self, name: str) -> str:
+        """What tells two contents of a file apart; "" where there is none."""
+        try:
+            return hashlib.sha256(self.path(name).read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file as a whole and keep what stood there as a version."""
+        path = self.path(name)
+        if path.exists():
+            before = path.read_bytes()
+            if before == text.encode():
+                return
+            kept = self._versions(path)
+            number = int(kept[-1].name) + 1 if kept else 1
+            folder = self._of_versions(path)
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f"{number:06d}").write_bytes(before)
+            for old in kept[: max(0, len(kept) + 1 - MOST_VERSIONS)]:
+                old.unlink()
+        _replace(path, text.encode())
+
+    def versions(self, name: str) -> int:
+        """How often a file can be undone."""
+        return len(self._versions(self.path(name)))
+
+    def undo(self, name: str) -> None:
+        """Take the newest version of a file back.
+
+        Raises:
+            InputError: there is none.
+        """
+        path = self.path(name)
+        kept = self._versions(path)
+        if not kept:
+            raise InputError(f"{name} has no earlier version")
+        _replace(path, kept[-1].read_bytes())
+        kept[-1].unlink()
+
+    def change(self, name: str, edit: Callable[[MutableMapping[str, Any]], None]) -> None:
+        """Change a TOML file; its comments and order stay.
+
+        Args:
+            name: of the file.
+            edit: changes the tables in place.
+
+        Raises:
+            FileError: it is not TOML.
+        """
+        path = self.path(name)
+        try:
+            content = tomlkit.parse(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise FileError(path, "", f"cannot be changed: {error}") from None
+        edit(content)
+        self.write(name, tomlkit.dumps(content))
+
+    def take_in(self, name: str, content: bytes, *, beside: Path = Path()) -> str:
+        """Write a file that was handed over into a folder; its name, with a number where the name is taken.
+
+        Raises:
+            InputError: its name is no plain file name, or it is too large.
+        """
+        if not NAME.fullmatch(name):
+            raise InputError(f"the file name {name[:80]!r} is not taken, expected letters, digits, '-', '_' and '.'")
+        if len(content) > MOST_UPLOAD_BYTES:
+            raise InputError(f"{name} has {len(content) / 2**20:.0f} MiB, expected at most {MOST_UPLOAD_BYTES // 2**20}")
+        path, number = self.path(beside / name), 1
+        while path.exists() and path.read_bytes() != content:
+            number += 1
+            path = self.path(beside / f"{Path(name).stem}-{number}{Path(name).suffix}")
+        _replace(path, content)
+        return self.name(path)
+
+    def _of_versions(self, path: Path) -> Path:
+        return self.root / VERSIONS / path.relative_to(self.root)
+
+    def _versions(self, path: Path) -> list[Path]:
+        folder = self._of_versions(path)
+        return sorted(item for item in folder.iterdir() if item.name.isdigit()) if folder.is_dir() else []
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a whole file or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.new")
+    beside.write_bytes(content)
+    beside.replace(path)

@@ -1,0 +1,121 @@
+"""Commands of the command line in processes of their own, with progress, output, and a way to stop them.
+
+The page has no work of its own: what it runs is the command that it shows.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+PROGRESS = re.compile(r"\[\s*(\d+)%\] (.*)")
+"""A line of progress: share and activity."""
+MOST_LINES = 2000
+"""Kept of an output."""
+MOST_JOBS = 2
+"""At work at once; later ones wait."""
+INTERRUPTED = 130
+
+
+@dataclass(eq=False)
+class Job:
+    """A command that waits, runs or has ended."""
+
+    words: tuple[str, ...]  # after `expdesign`
+    folder: Path  # in which it runs
+    out: str = ""  # folder of its results, in `folder`
+    share: float = 0.0  # of its work that is done
+    activity: str = "waiting for its turn"
+    lines: list[str] = field(default_factory=list)  # printed
+    errors: list[str] = field(default_factory=list)  # lines on what is wrong or stands in the way
+    status: int | None = None  # exit status; None before the end
+    began_s: float = field(default_factory=time.monotonic)
+    process: asyncio.subprocess.Process | None = None
+    stopped: bool = False  # by the user
+
+    @property
+    def command(self) -> str:
+        """As one types it in the folder."""
+        return shlex.join(("expdesign", *self.words))
+
+    @property
+    def state(self) -> str:
+        """In words."""
+        if self.status is None:
+            return "running" if self.process else "waiting"
+        if self.stopped:
+            return "stopped, nothing half-written"
+        return {0: "done", 2: "the input is wrong", 3: "no answer", INTERRUPTED: "interrupted"}.get(
+            self.status, f"failed with status {self.status}"
+        )
+
+
+class Jobs:
+    """The commands of a page, the newest first; they go on when a page is closed or loaded again."""
+
+    def __init__(self, folder: Path) -> None:
+        """None yet."""
+        self.folder, self.all = folder, list[Job]()
+        self._turns = asyncio.Semaphore(MOST_JOBS)
+        self._tasks = set[asyncio.Task[None]]()
+
+    def start(self, words: Sequence[str], *, out: str = "") -> Job:
+        """Run `expdesign WORDS` in the folder."""
+        job = Job(tuple(words), self.folder, out)
+        self.all.insert(0, job)
+        task = asyncio.get_running_loop().create_task(self._run(job))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return job
+
+    def stop(self, job: Job) -> None:
+        """Interrupt a command as Ctrl-C does."""
+        if job.status is None:
+            job.stopped = True
+            if job.process is None:
+                job.status, job.activity = INTERRUPTED, "stopped"
+            else:
+                job.process.send_signal(signal.SIGINT)
+
+    async def end(self) -> None:
+        """Stop all commands, when the page is closed for good."""
+        for job in self.all:
+            self.stop(job)
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _run(self, job: Job) -> None:
+        async with self._turns:
+            if job.status is not None:
+                return
+            job.began_s, job.activity = time.monotonic(), "starting"
+            job.process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "expdesign", *job.words),
+                cwd=self.folder,
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+            )
+            await asyncio.gather(_read(job.process.stdout, job, False), _read(job.process.stderr, job, True))
+            job.status = await job.process.wait()
+            job.stopped = job.stopped and job.status != 0
+            job.activity = job.state
+            job.share = 1.0 if job.status == 0 else job.share
+
+
+async def _read(stream: asyncio.StreamReader | None, job: Job, progress: bool) -> None:
+    """Take lines in as they come; progress and errors come on another stream than results."""
+    while stream is not None and (line := await stream.readline()):
+        text = line.decode(errors="replace").rstrip()
+        if progress and (told := PROGRESS.match(text)):
+            job.share, job.activity = int(told[1]) / 100.0, told[2]
+        elif progress and text.startswith("expdesign: "):
+            job.errors.append(text.removeprefix("expdesign: "))
+        elif len(job.lines) < MOST_LINES:
+            job.lines.append(text)

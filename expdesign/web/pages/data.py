@@ -1,0 +1,128 @@
+"""Measured data: logs dropped in, runs cut from them, and what the commands on data find."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from nicegui import events, ui
+
+from expdesign.errors import InputError
+from expdesign.web.jobs import Job
+from expdesign.web.site import Site, framed, page_of, shown_job, wrong
+
+LOGS = "logs"
+"""Folder of logs that were dropped in."""
+PAGES = {
+    "import": "import.html",
+    "estimate": "estimate.html",
+    "diagnose": "diagnosis.html",
+    "monitor": "monitor.html",
+    "indices": "indices.html",
+    "replan": "report.html",
+}
+"""Command -> its page."""
+COMMANDS = ("import", *(name for name in PAGES if name != "import"))
+
+
+def register(site: Site) -> None:
+    """Give the page its address."""
+
+    @ui.page("/data")
+    def data(scenario: str = "") -> None:
+        scenario = site.scenario(scenario)
+        with framed(site, "/data", scenario), ui.column().classes("sheet"):
+            _Data(site, scenario).draw()
+
+
+class _Data:
+    """The page of one scenario."""
+
+    def __init__(self, site: Site, scenario: str) -> None:
+        self.site, self.scenario = site, scenario
+        self.vessel = site.file_of(scenario, "vessel") if scenario else ""
+
+    def draw(self) -> None:
+        """Logs, runs, commands, results."""
+        ui.label("1. Logs").classes("head2")
+        ui.label("Drop logs of any format here; together they are one trial.").classes("quiet")
+        ui.upload(label="Drop logs", multiple=True, auto_upload=True, on_upload=self._take).classes("upload")
+        self.logs = ui.select(list(self._logs()), multiple=True, label="Logs to import", value=[]).classes("field")
+        ui.button("Import", on_click=self._import)
+        ui.label("2. Runs").classes("head2")
+        self.runs = ui.select(list(self._runs()), multiple=True, label="Runs, or folders of runs", value=[]).classes("field")
+        vessels = list(self.site.folder.of_kind("vessel"))
+        self.ship = ui.select(vessels, value=self.vessel if self.vessel in vessels else None, label="Vessel file").classes("field")
+        ui.label("3. What they tell").classes("head2")
+        with ui.row().classes("line"):
+            ui.button("Estimate", on_click=lambda: self._on_runs("estimate"))
+            ui.button("Diagnose", on_click=lambda: self._on_runs("diagnose"))
+            ui.button("Indices", on_click=lambda: self._on_runs("indices")).props("outline")
+            ui.button("Monitor", on_click=lambda: self._on_runs("monitor")).props("outline")
+            if self.scenario:
+                ui.button("Plan the rest of the trial", on_click=self._replan).props("outline")
+        self.place = ui.column().classes("work").props('aria-live="polite"')
+        with self.place:
+            for job in self.site.jobs.all:
+                if job.words[0] in COMMANDS:
+                    shown_job(self.site, job, ended=self._ended)
+                    break
+
+    def _logs(self) -> tuple[str, ...]:
+        folder = self.site.folder
+        return tuple(name for path in folder.files() if (name := folder.name(path)).startswith(f"{LOGS}/"))
+
+    def _runs(self) -> tuple[str, ...]:
+        """Folders of imported runs, and single CSV files."""
+        folder = self.site.folder
+        imported = tuple(str(Path(name).parent) for name in folder.named("import.json"))
+        single = tuple(name for name in folder.named("*.csv") if str(Path(name).parent) not in imported)
+        return (*imported, *single)
+
+    async def _take(self, event: events.UploadEventArguments) -> None:
+        try:
+            name = self.site.folder.take_in(event.file.name, await event.file.read(), beside=Path(LOGS))
+        except InputError as error:
+            ui.notify(str(error), type="negative")
+            return
+        self.logs.set_options(list(self._logs()), value=sorted({*self.logs.value, name}))
+
+    def _import(self) -> None:
+        if not self.logs.value:
+            self._refuse("drop or choose a log first")
+            return
+        out = f"runs/{Path(self.logs.value[0]).stem}-runs"
+        ship = ("--vessel", self.ship.value) if self.ship.value else ()
+        self._start(("import", *self.logs.value, *ship, "--out", out), out)
+
+    def _on_runs(self, command: str) -> None:
+        if not self.runs.value or not self.ship.value:
+            self._refuse("choose runs and a vessel file first")
+            return
+        out = f"runs/{Path(self.runs.value[0]).stem}-{command}"
+        self._start((command, *self.runs.value, "--vessel", self.ship.value, "--out", out), out)
+
+    def _replan(self) -> None:
+        if not self.runs.value:
+            self._refuse("choose the runs that were measured so far")
+            return
+        out = f"{self.site.out_of(self.scenario)}-replanned"
+        self._start(("replan", self.scenario, "--data", *self.runs.value, "--out", out), out)
+
+    def _refuse(self, text: str) -> None:
+        self.place.clear()
+        with self.place:
+            wrong(text)
+
+    def _start(self, words: Sequence[str], out: str) -> None:
+        self.place.clear()
+        with self.place:
+            shown_job(self.site, self.site.jobs.start(words, out=out), ended=self._ended)
+
+    def _ended(self, job: Job) -> None:
+        page = f"{job.out}/{PAGES[job.words[0]]}"
+        if self.site.folder.path(page).is_file():
+            with self.place:
+                page_of(page)
+        if job.words[0] == "import" and job.status == 0:
+            self.runs.set_options(list(self._runs()), value=[job.out])

@@ -1,0 +1,185 @@
+"""The plan: a draft in seconds, the whole trial with progress, played on the chart; refusals where they happen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlencode
+
+from nicegui import ui
+
+from expdesign.export import words
+from expdesign.web import answers
+from expdesign.web.jobs import Job
+from expdesign.web.pages.sea import chart_element
+from expdesign.web.site import Site, framed, shown_job, wrong
+
+SPEEDS = (1, 2, 5, 10, 20, 50, 100)
+ROUTES = ("route.rtz", "route.gpx", "route.kml", "route.geojson", "route.plan", "route.waypoints", "route.csv")
+
+
+def register(site: Site) -> None:
+    """Give the page its address."""
+
+    @ui.page("/plan")
+    async def plan(scenario: str = "", plan: str = "") -> None:
+        scenario = site.scenario(scenario)
+        with framed(site, "/plan", scenario) as watched:
+            if not scenario:
+                ui.label("Make a trial first, on the page Trial.")
+                return
+            page = _Plan(site, scenario, plan)
+            await page.draw()
+            watched.show(scenario)
+
+
+class _Plan:
+    """The page of one scenario."""
+
+    def __init__(self, site: Site, scenario: str, asked: str) -> None:
+        self.site, self.scenario = site, scenario
+        self.out = site.out_of(scenario)
+        self.shown = asked or self._newest()
+        self.area = site.file_of(scenario, "area")
+
+    def _newest(self) -> str:
+        """The newest plan or refusal of this scenario."""
+        found = [
+            f"{out}/{name}" for out in (self.out, f"{self.out}-draft") for name in ("plan.json", "refused.json")
+            if self.site.folder.path(f"{out}/{name}").is_file()
+        ]  # fmt: skip
+        return max(found, key=lambda name: self.site.folder.path(name).stat().st_mtime, default="")
+
+    async def draw(self) -> None:
+        """Buttons, commands at work, the chart with the player, and the results."""
+        with ui.row().classes("line"):
+            ui.button("Draft", on_click=lambda: self._start("run", self.scenario, "--draft", "--out", f"{self.out}-draft")).tooltip(
+                "A quick look: nominal ship, no drawn trials, no route files"
+            )
+            ui.button("Plan the trial", on_click=lambda: self._start("run", self.scenario, "--out", self.out))
+        self.work = ui.column().classes("work")
+        with self.work:
+            for job in self.site.jobs.all:
+                if job.words[0] == "run" and self.scenario in job.words:
+                    shown_job(self.site, job, ended=self._ended if job.status is None else None)
+                    break
+        with ui.row().classes("two"):
+            with ui.column().classes("wide"):
+                self.map = chart_element()
+                self._player()
+            self.side = ui.column().classes("narrow")
+        ui.on("played", self._at)
+        await self.map.initialized()
+        await self._fill()
+
+    def _player(self) -> None:
+        with ui.row().classes("line player") as self.player:
+            self.button = ui.button("Play", on_click=lambda: self._script("toggle()"))
+            ui.select(list(SPEEDS), value=10, label="Speed", on_change=lambda event: self._script(f"speed({event.value})")).classes("speed")
+            ui.html(
+                f'<input type="range" min="0" max="1" step="any" value="0" id="when{self.map.id}" aria-label="Time of the plan">',
+                sanitize=False,
+            ).classes("slider")
+        self.now = ui.html("", sanitize=False).classes("now")
+        self.now.props(f'id="now{self.map.id}"')
+
+    def _script(self, call: str) -> None:
+        ui.run_javascript(f"expd.player({self.map.id}).{call}")
+
+    def _at(self, event: Any) -> None:
+        self.button.text = "Pause" if event.args["playing"] else "Play"
+
+    def _start(self, *words: str) -> None:
+        out = words[-1]
+        self.work.clear()
+        with self.work:
+            shown_job(self.site, self.site.jobs.start(words, out=out), ended=self._ended)
+
+    def _ended(self, job: Job) -> None:
+        ui.timer(0.0, self._show_newest, once=True)
+
+    async def _show_newest(self) -> None:
+        self.shown = self._newest()
+        await self._fill()
+
+    async def _fill(self) -> None:
+        ends = await self.site.answer(answers.ends_of, str(self.site.folder.path(self.scenario)))
+        query = urlencode({"area": self.area, "draught_m": ends.get("draught_m", 0.0)})
+        refused = self.shown.endswith("refused.json")
+        track = f"/track?{urlencode({'plan': self.shown})}" if self.shown and not refused else ""
+        refusal = json.loads(self.site.folder.path(self.shown).read_text(encoding="utf-8")) if refused else None
+        ui.run_javascript(
+            f"expd.chart({self.map.id}, '/chart?{query}', {json.dumps(ends)}, false)"
+            f".then(() => expd.trial({self.map.id}, {json.dumps(track)}, {json.dumps(_place_of(refusal))}))"
+        )
+        self.side.clear()
+        with self.side:
+            if not self.shown:
+                ui.label("Nothing is planned yet.").classes("quiet")
+            elif refusal:
+                self._refused(refusal)
+            else:
+                self._planned()
+
+    def _planned(self) -> None:
+        folder = self.site.folder
+        content = json.loads(folder.path(self.shown).read_text(encoding="utf-8"))
+        draft, verified = content.get("draft", False), content["verified"]
+        mark = "Draft" if draft else "Verified" if verified else "Not verified"
+        ui.label(mark).classes("mark good" if verified else "mark doubt")
+        if content["verdict"].lower() != mark.lower():
+            ui.label(content["verdict"])
+        day = content["informative_s"] + content["reposition_s"]
+        ui.label(f"{words.duration(day)}: {words.duration(content['informative_s'])} of runs, "
+                 f"{words.duration(content['reposition_s'])} between them.")  # fmt: skip
+        ui.label(f"Least clearance {words.distance(content['clearance_min_m'])}.")
+        beside = Path(self.shown).parent
+        if draft:
+            ui.label("A draft has no track to be played or sailed; its report shows it.").classes("quiet")
+        for name, text in (("report.html", "Report"), ("cards.html", "Run cards")):
+            if folder.path(beside / name).is_file():
+                ui.link(text, f"/folder/{quote(str(beside / name))}", new_tab=True)
+        routes = [name for name in ROUTES if folder.path(beside / name).is_file()]
+        if routes:
+            ui.label("Route files").classes("head2")
+            with ui.row():
+                for name in routes:
+                    ui.link(name, f"/folder/{quote(str(beside / name))}").props(f'download="{name}"')
+        ui.label("Runs").classes("head2")
+        for leg in content["legs"]:
+            if leg["kind"] == "primitive":
+                ui.label(f"{leg['name']}, {words.duration(leg['duration_s'])}").classes("quiet")
+
+    def _refused(self, refusal: dict[str, Any]) -> None:
+        ui.label("Refused").classes("mark bad")
+        wrong(refusal["obstacle"])
+        if refusal["place"] is not None:
+            ui.label("The red ring on the chart is where.").classes("quiet")
+        ui.label("What helps").classes("head2")
+        for remedy in refusal["remedies"]:
+            self._remedy(remedy)
+        if refusal["tried"]:
+            ui.label("Tried before").classes("head2")
+            for line in refusal["tried"]:
+                ui.label(line).classes("quiet")
+
+    def _remedy(self, remedy: str) -> None:
+        """A remedy in words, and a button where it is a change of one key of the scenario."""
+        with ui.row().classes("line"):
+            ui.label(remedy)
+            change = answers.change_in(remedy)
+            if change is not None:
+                (table, key), value = change
+                ui.button(f"Set {table}.{key} = {value}", on_click=lambda: self._apply(table, key, value)).props("dense")
+
+    def _apply(self, table: str, key: str, value: Any) -> None:
+        def change(content: Any) -> None:
+            content.setdefault(table, {})[key] = value
+
+        self.site.folder.change(self.scenario, change)
+        ui.notify(f"{self.scenario}: {table}.{key} = {value}; plan again")
+
+
+def _place_of(refusal: dict[str, Any] | None) -> dict[str, Any] | None:
+    return refusal and refusal["place"] and {key: refusal["place"][key] for key in ("lat_deg", "lon_deg")}

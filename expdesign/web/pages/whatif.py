@@ -1,0 +1,134 @@
+"""Variants of the scenario side by side."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import Any
+
+from nicegui import ui
+
+from expdesign.scenario.tables import read_toml
+from expdesign.web.jobs import Job
+from expdesign.web.site import Site, framed, page_of, shown_job, wrong
+
+FIRST = "[design]\ntotal_s = 1800.0\n"
+
+
+def register(site: Site) -> None:
+    """Give the page its address."""
+
+    @ui.page("/whatif")
+    def whatif(scenario: str = "") -> None:
+        scenario = site.scenario(scenario)
+        with framed(site, "/whatif", scenario) as watched, ui.column().classes("sheet"):
+            if not scenario:
+                ui.label("Make a trial first, on the page Trial.")
+                return
+            watched.show(scenario)
+            _Variants(site, scenario).draw()
+
+
+class _Variants:
+    """The page of one scenario."""
+
+    def __init__(self, site: Site, scenario: str) -> None:
+        self.site, self.scenario = site, scenario
+        self.out = f"{site.out_of(scenario)}-whatif"
+        self.chosen: set[str] = set()
+
+    def draw(self) -> None:
+        """Variants to choose among, a new one, and the comparison."""
+        ui.label("Variants").classes("head2")
+        ui.label("A variant is a file with only the keys that differ from the scenario, or a whole scenario.").classes("quiet")
+        with ui.element("div").classes("runs"):
+            for name in self._names():
+                with ui.card().classes("run"):
+                    ui.checkbox(name, on_change=lambda event, name=name: self._choose(name, event.value))
+                    for line in self._differences(name):
+                        ui.label(line).classes("quiet")
+        self._new()
+        with ui.row().classes("line"):
+            ui.button("Compare", on_click=lambda: self._start(False))
+            ui.button("Compare with plans", on_click=lambda: self._start(True)).props("outline").tooltip("Takes minutes each")
+        self.place = ui.column().classes("work")
+        with self.place:
+            for job in self.site.jobs.all:
+                if job.words[:2] == ("whatif", self.scenario):
+                    shown_job(self.site, job, ended=self._ended)
+                    return
+            self._results()
+
+    def _names(self) -> list[str]:
+        """TOML files of the folder that have tables of a scenario."""
+        known = {"scenario", "design", "start", "goal", "environment", "plan"}
+        found = []
+        for path in self.site.folder.files():
+            if path.suffix == ".toml" and "runs" not in path.relative_to(self.site.folder.root).parts:
+                try:
+                    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+                except (OSError, ValueError):
+                    continue
+                name = self.site.folder.name(path)
+                if tables and set(tables) <= known and name != self.scenario:
+                    found.append(name)
+        return found
+
+    def _differences(self, name: str) -> list[str]:
+        """What differs, key by key."""
+        own, other = (_flat(read_toml(self.site.folder.path(file))) for file in (self.scenario, name))
+        return [f"{key} = {value!r}, not {own.get(key, 'stated')!r}" for key, value in other.items() if own.get(key) != value]
+
+    def _choose(self, name: str, is_on: bool) -> None:
+        (self.chosen.add if is_on else self.chosen.discard)(name)
+
+    def _new(self) -> None:
+        with ui.expansion("A new variant").classes("table"):
+            name = ui.input(label="Name of the file", value="variant.toml")
+            text = ui.textarea(label="Only the keys that differ, in TOML", value=FIRST).classes("toml").props("autogrow")
+            place = ui.column()
+
+            def write() -> None:
+                place.clear()
+                with place:
+                    try:
+                        tomllib.loads(text.value)
+                        path = self.site.folder.path(name.value)
+                    except ValueError as error:
+                        wrong(str(error))
+                        return
+                    if path.exists() or path.suffix != ".toml":
+                        wrong(f"{name.value} exists, or does not end in .toml")
+                        return
+                    self.site.folder.write(name.value, text.value)
+                    ui.navigate.reload()
+
+            ui.button("Write it", on_click=write)
+
+    def _start(self, with_plan: bool) -> None:
+        self.place.clear()
+        with self.place:
+            if not self.chosen:
+                wrong("no variant is ticked")
+                return
+            words = ("whatif", self.scenario, *sorted(self.chosen), *["--plan"] * with_plan, "--out", self.out)
+            shown_job(self.site, self.site.jobs.start(words, out=self.out), ended=self._ended)
+
+    def _ended(self, job: Job) -> None:
+        if job.status == 0:
+            with self.place:
+                self._results()
+
+    def _results(self) -> None:
+        path = self.site.folder.path(f"{self.out}/whatif.json")
+        if path.is_file():
+            cases = json.loads(path.read_text(encoding="utf-8")).get("cases", [])
+            ui.label(f"{len(cases)} cases compared").classes("head2")
+            page_of(f"{self.out}/whatif.html")
+
+
+def _flat(tables: dict[str, Any], before: str = "") -> dict[str, Any]:
+    found = {}
+    for key, value in tables.items():
+        found |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
+    return found
