@@ -28,6 +28,7 @@ FLOORS = {
         ("shortest_day", "foresight"),
         ("scenario", "export"),
         ("workflows",),
+        ("web",),
         ("cli", "__main__"),
     ),
     "records": (("tuning",), ("file",), ("limits", "pose"), ("load", "levels", "pieces")),
@@ -80,6 +81,7 @@ FLOORS = {
         ("remedies",),
         ("solve",),
     ),
+    "web": (("folder", "jobs", "answers"), ("forms", "site"), ("pages",), ("server",)),
     "workflows": (
         ("outcome",),
         ("steps",),

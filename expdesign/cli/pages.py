@@ -19,11 +19,17 @@ NEEDED = ("nicegui", "tomlkit")
 
 @app.command("web")
 def web(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Scenarios and results; nothing else is touched.")] = Path(),
-    port: Annotated[int, typer.Option("--port", metavar="N", min=0, max=65535, help="Of the address; 0 for any.")] = 8120,
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Scenarios and results; nothing else is touched.")
+    ] = Path(),
+    port: Annotated[
+        int, typer.Option("--port", metavar="N", min=0, max=65535, help="Of the address; 0 for any.")
+    ] = 8120,
     host: Annotated[
         str,
-        typer.Option("--host", metavar="ADDRESS", help="Address to be bound to. Other than this machine needs a token."),
+        typer.Option(
+            "--host", metavar="ADDRESS", help="Address to be bound to. Other than this machine needs a token."
+        ),
     ] = "127.0.0.1",
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> None:

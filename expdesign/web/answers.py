@@ -147,9 +147,7 @@ def durations_of(scenario: str) -> Answer:
                 "gain": None if np.isnan(gain) else float(gain),
                 "track": _sketch(item.primitive.trajectory.pose),
             }
-            for item, seconds, repeats, gain in zip(
-                information, design.durations_s, design.repeats, gains, strict=True
-            )
+            for item, seconds, repeats, gain in zip(information, design.durations_s, design.repeats, gains, strict=True)
         ],
     }
 
@@ -277,7 +275,9 @@ def _sketch(pose: Array) -> list[list[float]]:
     return np.round(points[:, ::-1] * [1.0, -1.0], 2).tolist()  # type: ignore[no-any-return]
 
 
-CHANGE = re.compile(r"(?:with )?(plan|design|start|goal|environment)\.(\w+) = (\[[^\]]*\]|'[^']*'|-?[\d.]+(?:e-?\d+)?)(?=[ ,;]|$)")
+CHANGE = re.compile(
+    r"(?:with )?(plan|design|start|goal|environment)\.(\w+) = (\[[^\]]*\]|'[^']*'|-?[\d.]+(?:e-?\d+)?)(?=[ ,;]|$)"
+)
 """A change of one key at the beginning of a remedy."""
 
 

@@ -158,7 +158,9 @@ class Folder:
         if not NAME.fullmatch(name):
             raise InputError(f"the file name {name[:80]!r} is not taken, expected letters, digits, '-', '_' and '.'")
         if len(content) > MOST_UPLOAD_BYTES:
-            raise InputError(f"{name} has {len(content) / 2**20:.0f} MiB, expected at most {MOST_UPLOAD_BYTES // 2**20}")
+            raise InputError(
+                f"{name} has {len(content) / 2**20:.0f} MiB, expected at most {MOST_UPLOAD_BYTES // 2**20}"
+            )
         path, number = self.path(beside / name), 1
         while path.exists() and path.read_bytes() != content:
             number += 1

@@ -5,6 +5,7 @@ A value that is wrong is said beside its field and not written; one that is take
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, get_args, get_origin
@@ -52,10 +53,11 @@ class Form:
             self._draw_table(path, field, inner)
 
     def _draw_table(self, path: Path, field: FieldInfo, inner: type[Table]) -> None:
-        with ui.expansion(f"[{_dotted(path)}]", caption=field.description, value=len(path) == 1 and self._open).classes("table"):
-            with ui.element("div").classes("entries"):
-                for key, part in inner.fields().items():
-                    self._draw_one((*path, key), part)
+        is_open = len(path) == 1 and self._open
+        shown = ui.expansion(f"[{_dotted(path)}]", caption=field.description, value=is_open).classes("table")
+        with shown, ui.element("div").classes("entries"):
+            for key, part in inner.fields().items():
+                self._draw_one((*path, key), part)
 
     def _draw_list(self, path: Path, field: FieldInfo, inner: type[Table]) -> None:
         for number in range(len(self._value(path) or ())):
@@ -97,6 +99,7 @@ class Form:
         value, choices, label = self._value(path), _choices(field.annotation), str(path[-1])
         help_ = field.description or ""
         common: dict[str, Any] = {"label": label}
+        note: ui.label
         if field.annotation is bool:
             shown: Any = ui.switch(label, value=bool(field.default if value is None else value))
             shown.on_value_change(lambda event: self._told(note, path, event.value))
@@ -149,7 +152,7 @@ class Form:
 
 def put(tables: Any, path: Path, value: Any) -> None:
     """Set a value in nested tables and make the tables around it; None takes it away."""
-    for key, after in zip(path[:-1], path[1:], strict=True):
+    for key, after in itertools.pairwise(path):
         if isinstance(key, str) and key not in tables:
             tables[key] = tomlkit.aot() if isinstance(after, int) else tomlkit.table()
         tables = tables[key]
@@ -191,7 +194,7 @@ def _toml(value: Any) -> str:
         value = value.model_dump(exclude_none=True)
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + "}"
-    return tomlkit.item(value).as_string()
+    return str(tomlkit.item(value).as_string())
 
 
 def _dotted(path: Path) -> str:

@@ -31,11 +31,13 @@ from expdesign.web.site import Site, warmed
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 COOKIE = "expdesign_token"
 OWN = (
-    "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-    "connect-src 'self' ws: wss:; frame-ancestors 'self'"
+    "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
+    "style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; frame-ancestors 'self'"
 )
 """Content policy of the pages: nothing from outside."""
-RESULTS = "sandbox allow-scripts allow-popups allow-downloads; default-src data: 'unsafe-inline'; frame-ancestors 'self'"
+RESULTS = (
+    "sandbox allow-scripts allow-popups allow-downloads; default-src data: 'unsafe-inline'; frame-ancestors 'self'"
+)
 """Content policy of files of the folder: they are shown, and reach nothing."""
 Message = MutableMapping[str, Any]
 
@@ -58,7 +60,9 @@ class Gate:
             if scope["type"] == "websocket":
                 await send({"type": "websocket.close", "code": 1008})
             else:
-                await PlainTextResponse("not allowed: use the address that expdesign web printed\n", 403)(scope, receive, send)
+                await PlainTextResponse("not allowed: use the address that expdesign web printed\n", 403)(
+                    scope, receive, send
+                )
             return
 
         async def policed(message: Message) -> None:

@@ -106,7 +106,9 @@ def framed(site: Site, here: str, scenario: str) -> Iterator[Watched]:
     """The frame of a page: the way to the others, the scenario, and what has changed elsewhere."""
     address, title = next(item for item in PAGES if item[0] == here)
     ui.page_title(f"{title}: {scenario or site.folder.root.name} - expdesign")
-    ui.add_head_html('<link rel="stylesheet" href="/static/page.css"><script src="/static/chart.js"></script>', shared=False)
+    ui.add_head_html(
+        '<link rel="stylesheet" href="/static/page.css"><script src="/static/chart.js"></script>', shared=False
+    )
     ui.colors(primary=PRIMARY, negative=NEGATIVE)
     dark = ui.dark_mode(site.night)
 
@@ -122,7 +124,12 @@ def framed(site: Site, here: str, scenario: str) -> Iterator[Watched]:
     with ui.row().classes("case"):
         names = list(site.folder.of_kind("scenario"))
         if names:
-            ui.select(names, value=scenario, label="Scenario", on_change=lambda event: ui.navigate.to(f"{here}?scenario={quote(event.value)}"))
+            ui.select(
+                names,
+                value=scenario,
+                label="Scenario",
+                on_change=lambda event: ui.navigate.to(f"{here}?scenario={quote(event.value)}"),
+            )
         ui.label(str(site.folder.root)).classes("quiet")
         ui.space()
         ui.button("Night", on_click=switch).props("flat dense").tooltip("Change between bright and dark")

@@ -50,9 +50,13 @@ class _Data:
         self.logs = ui.select(list(self._logs()), multiple=True, label="Logs to import", value=[]).classes("field")
         ui.button("Import", on_click=self._import)
         ui.label("2. Runs").classes("head2")
-        self.runs = ui.select(list(self._runs()), multiple=True, label="Runs, or folders of runs", value=[]).classes("field")
+        self.runs = ui.select(list(self._runs()), multiple=True, label="Runs, or folders of runs", value=[]).classes(
+            "field"
+        )
         vessels = list(self.site.folder.of_kind("vessel"))
-        self.ship = ui.select(vessels, value=self.vessel if self.vessel in vessels else None, label="Vessel file").classes("field")
+        self.ship = ui.select(
+            vessels, value=self.vessel if self.vessel in vessels else None, label="Vessel file"
+        ).classes("field")
         ui.label("3. What they tell").classes("head2")
         with ui.row().classes("line"):
             ui.button("Estimate", on_click=lambda: self._on_runs("estimate"))

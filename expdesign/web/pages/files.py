@@ -9,7 +9,7 @@ from nicegui import ui
 
 from expdesign.errors import InputError
 from expdesign.web import answers
-from expdesign.web.site import Site, framed, page_of, told, wrong
+from expdesign.web.site import Site, Watched, framed, page_of, told, wrong
 
 EDITED = (".toml", ".md", ".csv", ".geojson")
 LARGEST = 2**20
@@ -34,15 +34,17 @@ def register(site: Site) -> None:
             ).classes("field")  # fmt: skip
             if file:
                 watched.show(file)
-                _shown(site, scenario, file)
+                _shown(site, scenario, file, watched)
 
 
-def _shown(site: Site, scenario: str, file: str) -> None:
+def _shown(site: Site, scenario: str, file: str, watched: Watched) -> None:
     path = site.folder.path(file)
     if path.suffix not in EDITED or path.stat().st_size > LARGEST:
         page_of(file)
         return
-    text = ui.codemirror(path.read_text(encoding="utf-8", errors="replace"), language="TOML" if path.suffix == ".toml" else None)
+    text = ui.codemirror(
+        path.read_text(encoding="utf-8", errors="replace"), language="TOML" if path.suffix == ".toml" else None
+    )
     text.props('aria-label="Text of the file"').classes("toml")
     place = ui.column().props('role="status"')
 
@@ -56,6 +58,7 @@ def _shown(site: Site, scenario: str, file: str) -> None:
                     wrong(f"{file}: {error}; not written")
                     return
             site.folder.write(file, text.value)
+            watched.show(file)
             ui.label("Written.").classes("good")
         if scenario:
             found = await site.answer(answers.problem_of, str(site.folder.path(scenario)))

@@ -52,6 +52,7 @@ class _Manoeuvres:
         spelled(f"expdesign durations {self.scenario}", f"writes {out}/durations.json; {self.scenario} has [design]")
 
     def _later(self) -> None:
+        self.watched.show(self.scenario)
         ui.timer(0.0, self.fill, once=True)
 
     def _undo(self) -> None:
@@ -89,7 +90,11 @@ class _Manoeuvres:
         with ui.card().classes("run" if run["repeats"] else "run unused"):
             ui.checkbox(run["words"], value=is_on, on_change=lambda event: self._switch(run["name"], event.value))
             ui.html(_drawn(run["track"], run["words"]), sanitize=False)
-            tells = "adds nothing beside the others" if run["gain"] is None else f"log det {run['gain']:+.2g} beside the others"
+            tells = (
+                "adds nothing beside the others"
+                if run["gain"] is None
+                else f"log det {run['gain']:+.2g} beside the others"
+            )
             ui.label(f"{words.times(run['repeats'])} {words.duration(run['run_s'])}" if run["repeats"] else "not run")
             ui.label(tells).classes("quiet")
 

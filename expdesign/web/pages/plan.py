@@ -13,7 +13,7 @@ from expdesign.export import words
 from expdesign.web import answers
 from expdesign.web.jobs import Job
 from expdesign.web.pages.sea import chart_element
-from expdesign.web.site import Site, framed, shown_job, wrong
+from expdesign.web.site import Site, Watched, framed, shown_job, wrong
 
 SPEEDS = (1, 2, 5, 10, 20, 50, 100)
 ROUTES = ("route.rtz", "route.gpx", "route.kml", "route.geojson", "route.plan", "route.waypoints", "route.csv")
@@ -29,16 +29,15 @@ def register(site: Site) -> None:
             if not scenario:
                 ui.label("Make a trial first, on the page Trial.")
                 return
-            page = _Plan(site, scenario, plan)
-            await page.draw()
             watched.show(scenario)
+            await _Plan(site, scenario, plan, watched).draw()
 
 
 class _Plan:
     """The page of one scenario."""
 
-    def __init__(self, site: Site, scenario: str, asked: str) -> None:
-        self.site, self.scenario = site, scenario
+    def __init__(self, site: Site, scenario: str, asked: str, watched: Watched) -> None:
+        self.site, self.scenario, self.watched = site, scenario, watched
         self.out = site.out_of(scenario)
         self.shown = asked or self._newest()
         self.area = site.file_of(scenario, "area")
@@ -54,9 +53,9 @@ class _Plan:
     async def draw(self) -> None:
         """Buttons, commands at work, the chart with the player, and the results."""
         with ui.row().classes("line"):
-            ui.button("Draft", on_click=lambda: self._start("run", self.scenario, "--draft", "--out", f"{self.out}-draft")).tooltip(
-                "A quick look: nominal ship, no drawn trials, no route files"
-            )
+            ui.button(
+                "Draft", on_click=lambda: self._start("run", self.scenario, "--draft", "--out", f"{self.out}-draft")
+            ).tooltip("A quick look: nominal ship, no drawn trials, no route files")
             ui.button("Plan the trial", on_click=lambda: self._start("run", self.scenario, "--out", self.out))
         self.work = ui.column().classes("work")
         with self.work:
@@ -76,9 +75,12 @@ class _Plan:
     def _player(self) -> None:
         with ui.row().classes("line player") as self.player:
             self.button = ui.button("Play", on_click=lambda: self._script("toggle()"))
-            ui.select(list(SPEEDS), value=10, label="Speed", on_change=lambda event: self._script(f"speed({event.value})")).classes("speed")
+            ui.select(
+                list(SPEEDS), value=10, label="Speed", on_change=lambda event: self._script(f"speed({event.value})")
+            ).classes("speed")
             ui.html(
-                f'<input type="range" min="0" max="1" step="any" value="0" id="when{self.map.id}" aria-label="Time of the plan">',
+                f'<input type="range" min="0" max="1" step="any" value="0" id="when{self.map.id}" '
+                'aria-label="Time of the plan">',
                 sanitize=False,
             ).classes("slider")
         self.now = ui.html("", sanitize=False).classes("now")
@@ -171,13 +173,16 @@ class _Plan:
             change = answers.change_in(remedy)
             if change is not None:
                 (table, key), value = change
-                ui.button(f"Set {table}.{key} = {value}", on_click=lambda: self._apply(table, key, value)).props("dense")
+                ui.button(f"Set {table}.{key} = {value}", on_click=lambda: self._apply(table, key, value)).props(
+                    "dense"
+                )
 
     def _apply(self, table: str, key: str, value: Any) -> None:
         def change(content: Any) -> None:
             content.setdefault(table, {})[key] = value
 
         self.site.folder.change(self.scenario, change)
+        self.watched.show(self.scenario)
         ui.notify(f"{self.scenario}: {table}.{key} = {value}; plan again")
 
 

@@ -51,7 +51,9 @@ class _Sea:
                 self.map = chart_element()
                 with ui.row().classes("line"):
                     ui.button("Draw a no-go zone", on_click=self._pen).tooltip("Click corners; end on the first one")
-                    ui.button("Undo", on_click=self._undo).props("outline").tooltip("Take the last change of the area back")
+                    ui.button("Undo", on_click=self._undo).props("outline").tooltip(
+                        "Take the last change of the area back"
+                    )
                     self.clear = ui.label().classes("clear").props('role="status"')
             self.side = ui.column().classes("narrow")
         ui.on("zone_drawn", self._drawn)
@@ -84,15 +86,22 @@ class _Sea:
         for number, zone in enumerate(zones):
             with ui.row().classes("line"):
                 name = ui.input(value=zone.get("name", ""), label=f"Zone {number + 1}").props("dense")
-                name.on("blur", lambda number=number, name=name: self._edit(lambda rows: rows[number].update(name=name.value)))
-                ui.button("Remove", on_click=lambda number=number: self._edit(lambda rows: rows.pop(number))).props("flat dense")
+                name.on(
+                    "blur",
+                    lambda number=number, name=name: self._edit(lambda rows: rows[number].update(name=name.value)),
+                )
+                ui.button("Remove", on_click=lambda number=number: self._edit(lambda rows: rows.pop(number))).props(
+                    "flat dense"
+                )
         if not zones:
             ui.label("None yet. Draw one on the chart.").classes("quiet")
         ui.label("Another chart").classes("head2")
         ui.label("GeoJSON in longitude and latitude, or an S-57 cell (*.000).").classes("quiet")
         ui.upload(label="Open a chart", auto_upload=True, on_upload=self._open).classes("upload")
         with ui.expansion("Start, goal and plan as numbers").classes("table"):
-            Form(self.site.folder, self.scenario, ScenarioFile, changed=self._fill_later).draw("start", "goal", "plan", "environment")
+            Form(self.site.folder, self.scenario, ScenarioFile, changed=self._fill_later).draw(
+                "start", "goal", "plan", "environment"
+            )
         with ui.expansion("The area file as numbers").classes("table"):
             Form(self.site.folder, self.area, AreaTable, changed=self._fill_later).draw(skip=("no_go",))
         spelled(f"expdesign run {self.scenario}", f"reads {self.scenario} and {self.area}")
@@ -129,6 +138,7 @@ class _Sea:
         self._fill_later()
 
     def _fill_later(self) -> None:
+        self.watched.show(self.scenario, self.area)
         ui.timer(0.0, self._fill, once=True)
 
     def _drawn(self, event: events.GenericEventArguments) -> None:
@@ -158,7 +168,11 @@ class _Sea:
         """Clearance while a place is moved."""
         place = event.args
         found = await self.site.answer(
-            answers.clearance_of, str(self.site.folder.path(self.scenario)), place["lat"], place["lng"], place["heading"]
+            answers.clearance_of,
+            str(self.site.folder.path(self.scenario)),
+            place["lat"],
+            place["lng"],
+            place["heading"],
         )
         if "problem" in found:
             return
@@ -230,5 +244,3 @@ def link_to(page: str, scenario: str) -> str:
 
 def _corners(points: list[dict[str, float]]) -> list[list[float]]:
     return [[round(point["lat"], DEGREES), round(point["lng"], DEGREES)] for point in points]
-
-

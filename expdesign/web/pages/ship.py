@@ -48,7 +48,7 @@ def register(site: Site) -> None:
                 ui.label(
                     "Actuators and terms of the model are lists of tables of several kinds: the page Files edits them."
                 ).classes("quiet")
-                Form(site.folder, vessel, VesselTable).draw(skip=("actuators",))
+                Form(site.folder, vessel, VesselTable, changed=lambda: watched.show(vessel)).draw(skip=("actuators",))
                 spelled(f"expdesign run {scenario}", f"reads {vessel}")
 
 

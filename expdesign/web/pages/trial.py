@@ -7,6 +7,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from expdesign.web import answers
+from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, shown_job, told, wrong
 from expdesign.workflows.planning.new import KINDS
 
@@ -36,7 +37,7 @@ async def _present(site: Site, scenario: str) -> None:
     ui.label(f"Ship: {found['vessel']}. The files can be read; a plan can begin.")
     for line in (*found["remarks"], *found["notes"]):
         ui.label(line).classes("quiet")
-    plans = [name for name in site.folder.named("plan.json")]
+    plans = list(site.folder.named("plan.json"))
     if plans:
         ui.label("Plans in this folder").classes("head2")
         for name in plans:
@@ -57,10 +58,10 @@ def _new(site: Site) -> None:
             if "/" in name.value or name.value.startswith(("-", ".")) or not name.value:
                 wrong(f"{name.value!r} is no name of a folder in this one")
                 return
-            job = site.jobs.start(("new", name.value, "--kind", kind.value))
-            shown_job(
-                site, job,
-                ended=lambda job: ui.navigate.to(f"/sea?scenario={quote(name.value)}/scenario.toml") if job.status == 0 else None,
-            )  # fmt: skip
+            shown_job(site, site.jobs.start(("new", name.value, "--kind", kind.value)), ended=made)
+
+    def made(job: Job) -> None:
+        if job.status == 0:
+            ui.navigate.to(f"/sea?scenario={quote(job.words[1])}/scenario.toml")
 
     start.on_click(make)

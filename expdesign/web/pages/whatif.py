@@ -40,7 +40,9 @@ class _Variants:
     def draw(self) -> None:
         """Variants to choose among, a new one, and the comparison."""
         ui.label("Variants").classes("head2")
-        ui.label("A variant is a file with only the keys that differ from the scenario, or a whole scenario.").classes("quiet")
+        ui.label("A variant is a file with only the keys that differ from the scenario, or a whole scenario.").classes(
+            "quiet"
+        )
         with ui.element("div").classes("runs"):
             for name in self._names():
                 with ui.card().classes("run"):
@@ -50,7 +52,9 @@ class _Variants:
         self._new()
         with ui.row().classes("line"):
             ui.button("Compare", on_click=lambda: self._start(False))
-            ui.button("Compare with plans", on_click=lambda: self._start(True)).props("outline").tooltip("Takes minutes each")
+            ui.button("Compare with plans", on_click=lambda: self._start(True)).props("outline").tooltip(
+                "Takes minutes each"
+            )
         self.place = ui.column().classes("work")
         with self.place:
             for job in self.site.jobs.all:
@@ -77,7 +81,11 @@ class _Variants:
     def _differences(self, name: str) -> list[str]:
         """What differs, key by key."""
         own, other = (_flat(read_toml(self.site.folder.path(file))) for file in (self.scenario, name))
-        return [f"{key} = {value!r}, not {own.get(key, 'stated')!r}" for key, value in other.items() if own.get(key) != value]
+        return [
+            f"{key} = {value!r}, not {own.get(key, 'stated')!r}"
+            for key, value in other.items()
+            if own.get(key) != value
+        ]
 
     def _choose(self, name: str, is_on: bool) -> None:
         (self.chosen.add if is_on else self.chosen.discard)(name)
@@ -85,7 +93,9 @@ class _Variants:
     def _new(self) -> None:
         with ui.expansion("A new variant").classes("table"):
             name = ui.input(label="Name of the file", value="variant.toml")
-            text = ui.textarea(label="Only the keys that differ, in TOML", value=FIRST).classes("toml").props("autogrow")
+            text = (
+                ui.textarea(label="Only the keys that differ, in TOML", value=FIRST).classes("toml").props("autogrow")
+            )
             place = ui.column()
 
             def write() -> None:
@@ -128,7 +138,7 @@ class _Variants:
 
 
 def _flat(tables: dict[str, Any], before: str = "") -> dict[str, Any]:
-    found = {}
+    found: dict[str, Any] = {}
     for key, value in tables.items():
         found |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
     return found

@@ -24,9 +24,8 @@
     const answer = await (await fetch(url)).json();
     const map = mapOf(id);
     const first = !charts[id];
-    const mine = (charts[id] = charts[id] || { group: L.layerGroup().addTo(map), player: null });
+    const mine = (charts[id] = charts[id] || { group: L.layerGroup().addTo(map), places: L.layerGroup().addTo(map), player: null });
     mine.group.clearLayers();
-    mine.ends = ends;
     if (answer.problem) return;
     answer.layers.forEach((layer, index) => {
       layer.rank = index;
@@ -37,7 +36,11 @@
         .bindTooltip(zone.name).addTo(mine.group);
     }
     answer.zones.forEach((zone, number) => drawZone(id, zone, number, editable));
-    if (ends && ends.ends) for (const which of ["start", "goal"]) end(id, which, ends, editable);
+    if (ends && ends.ends && mine.known !== JSON.stringify(ends)) {  // what is just being dragged stays
+      mine.known = JSON.stringify(ends);
+      mine.places.clearLayers();
+      for (const which of ["start", "goal"]) end(id, which, ends, editable);
+    }
     if (first) {
       map.fitBounds(answer.bounds);
       L.control.scale({ imperial: false }).addTo(map);
@@ -68,11 +71,11 @@
     const map = mapOf(id), mine = charts[id], place = ends.ends[which];
     const colour = which === "start" ? "#0a7d4b" : "#7a3ea1";
     const at = { which, lat: place.lat_deg, lng: place.lon_deg, heading: place.heading_deg };
-    const body = L.polygon([], { color: colour, weight: 2, fillOpacity: 0.6, interactive: false, renderer: L.svg() }).addTo(mine.group);
+    const body = L.polygon([], { color: colour, weight: 2, fillOpacity: 0.6, interactive: false, renderer: L.svg() }).addTo(mine.places);
     const icon = (name, text) => L.divIcon({ className: `end ${name}`, html: text, iconSize: [28, 28] });
-    const mark = L.marker([at.lat, at.lng], { draggable: editable, keyboard: true, title: which, alt: which, icon: icon(which, which === "start" ? "S" : "G") }).addTo(mine.group);
+    const mark = L.marker([at.lat, at.lng], { draggable: editable, keyboard: true, title: which, alt: which, icon: icon(which, which === "start" ? "S" : "G") }).addTo(mine.places);
     const turn = L.marker([at.lat, at.lng], { draggable: editable, title: `heading of the ${which}`, alt: `heading of the ${which}`, icon: icon("turn", "") });
-    if (editable) turn.addTo(mine.group);
+    if (editable) turn.addTo(mine.places);
     const reach = () => (60 * 40075016 * Math.cos((at.lat * Math.PI) / 180)) / (256 * 2 ** map.getZoom());
     function draw() {
       const heading = (at.heading * Math.PI) / 180;

@@ -1,0 +1,255 @@
+"""The page in a real browser, off line: draw an area, switch manoeuvres, plan, stop, compare, import, diagnose."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.browser
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+LONG_MS = 180_000
+WIDTHS = (768, 1366)
+SCREENS = ("", "sea", "ship", "manoeuvres", "plan", "whatif", "data", "files")
+
+
+def started(folder: Path, *options: str) -> tuple[subprocess.Popen[str], str]:
+    """The server of a folder and its address."""
+    words = [sys.executable, "-m", "expdesign", "web", str(folder), "--port", "0", "--no-browser", *options]
+    server = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    found = re.search(r"http://\S+", server.stdout.readline())
+    return server, found[0]
+
+
+def ended(server: subprocess.Popen[str]) -> int:
+    with server:  # closes its output
+        server.send_signal(signal.SIGINT)
+        return server.wait(timeout=30)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    from expdesign.cli import main
+
+    root = tmp_path / "work"
+    root.mkdir()
+    before = Path.cwd()
+    os.chdir(root)
+    try:
+        assert main(["new", "craft", "--kind", "asv", "--quiet"]) == 0
+    finally:
+        os.chdir(before)
+    return root
+
+
+@pytest.fixture
+def address(folder: Path) -> Iterator[str]:
+    server, where = started(folder)
+    yield where
+    assert ended(server) == 0
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    assert CHROMIUM, "no Chromium is installed"
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(browser, address: str):
+    """A page that fails on errors of scripts and on requests that leave the machine."""
+    context = browser.new_context(viewport={"width": 1366, "height": 900}, base_url=address)
+    wrong = []
+
+    def own(route, request) -> None:
+        if request.url.startswith((address, "data:", "blob:")):
+            route.continue_()
+        else:
+            wrong.append(f"asks {request.url}")
+            route.abort()
+
+    context.route("**/*", own)
+    found = context.new_page()
+    found.set_default_timeout(LONG_MS)
+    found.on("pageerror", lambda error: wrong.append(str(error)))
+    yield found
+    context.close()
+    assert not wrong
+
+
+def chart(page):
+    page.wait_for_selector("[data-drawn]")
+    return page.locator(".chart").bounding_box()
+
+
+def tables(path: Path) -> dict:
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def eventually(page, claim, what: str) -> None:
+    """Wait for what files or the page must come to."""
+    for _ in range(LONG_MS // 200):
+        if claim():
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError(what)
+
+
+def drag(page, title: str, east_px: float, north_px: float) -> None:
+    mark = page.get_by_title(title, exact=True).bounding_box()
+    x, y = mark["x"] + mark["width"] / 2, mark["y"] + mark["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + east_px, y - north_px, steps=6)
+    page.mouse.up()
+
+
+def test_a_zone_is_drawn_named_and_undone_and_the_start_is_moved_and_turned(page, folder: Path) -> None:
+    area, scenario = folder / "craft/area.toml", folder / "craft/scenario.toml"
+    comments = [line for line in area.read_text().splitlines() if line.startswith("#")]
+    page.goto("/sea")
+    box = chart(page)
+    page.get_by_text("can be planned in").wait_for()
+    page.get_by_role("button", name="Draw a no-go zone").click()
+    corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
+    for right, down in [*corners, corners[0]]:
+        page.mouse.move(box["x"] + right * box["width"], box["y"] + down * box["height"])
+        page.wait_for_timeout(100)
+        page.mouse.down()
+        page.mouse.up()
+        page.wait_for_timeout(100)
+    eventually(page, lambda: "no_go" in tables(area), "the zone is in the area file")
+    polygon = tables(area)["no_go"][0]["polygon"]
+    assert len(polygon) == 4
+    assert all(57 < lat < 59 and 10 < lon < 12 for lat, lon in polygon)
+    assert [line for line in area.read_text().splitlines() if line.startswith("#")] == comments
+    name = page.get_by_label("Zone 1")
+    name.fill("Fish farm")
+    name.blur()
+    eventually(page, lambda: tables(area)["no_go"][0]["name"] == "Fish farm", "the zone has its name")
+
+    before = page.get_by_title("start", exact=True).bounding_box()
+    drag(page, "start", 40.0, 30.0)
+    eventually(page, lambda: "lat_deg" in tables(scenario)["start"], "the start is moved")
+    moved = tables(scenario)["start"]
+    assert "north_m" not in moved
+    assert moved["lat_deg"] > 57.9999
+    assert page.get_by_title("start", exact=True).bounding_box() != before
+    drag(page, "heading of the start", -60.0, -60.0)
+    eventually(page, lambda: tables(scenario)["start"]["heading_deg"] != moved["heading_deg"], "the start is turned")
+    drag(page, "start", -400.0, 0.0)
+    page.locator(".clear.wrong").wait_for()
+    page.locator(".wrong", has_text="start").first.wait_for()
+
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_role("button", name="Undo").click()
+    eventually(page, lambda: "no_go" not in tables(area), "the zone is undone")
+
+
+def test_manoeuvres_answer_within_a_second_and_stay_in_the_file(page, folder: Path) -> None:
+    scenario = folder / "craft/scenario.toml"
+    page.goto("/manoeuvres")
+    page.locator(".run svg").first.wait_for()
+    page.get_by_text("Certificate").wait_for()
+    page.locator(".run").first.get_by_role("checkbox").click()
+    eventually(page, lambda: tables(scenario)["design"].get("excluded"), "a manoeuvre is taken out")
+    page.get_by_text("Certificate").wait_for()
+    page.get_by_text("Criterion, accuracy or time").click()
+    total = page.get_by_label("total_s")
+    total.fill("-5")
+    total.blur()
+    page.locator(".wrong", has_text="more than 0").wait_for()
+    assert tables(scenario)["design"]["total_s"] == 120.0
+    total.fill("90")
+    total.blur()
+    eventually(page, lambda: tables(scenario)["design"]["total_s"] == 90, "the time is written")
+
+
+def test_a_plan_is_made_stopped_reloaded_and_played(page, folder: Path) -> None:
+    page.goto("/plan")
+    chart(page)
+    page.get_by_role("button", name="Plan the trial").click()
+    page.get_by_role("button", name="Stop").wait_for()
+    page.reload()
+    page.get_by_role("button", name="Stop").click()
+    page.get_by_text("stopped, nothing half-written").wait_for()
+    assert not (folder / "runs/craft/plan.json").exists()
+
+    page.get_by_role("button", name="Plan the trial").click()
+    page.get_by_text("Verified", exact=True).wait_for()
+    assert json.loads((folder / "runs/craft/plan.json").read_text())["verified"] is True
+    assert (folder / "runs/craft/route.rtz").exists()
+    page.get_by_text("expdesign run craft/scenario.toml").first.wait_for()
+    page.get_by_role("button", name="Play").click()
+    page.locator(".now dd", has_text=re.compile("0:00:0[1-9]")).first.wait_for()
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_label("Time of the plan").fill("100")
+    page.locator(".now dd", has_text="0:01:40").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="route.rtz").click()
+    assert "<route" in Path(download.value.path()).read_text()
+
+
+def test_variants_are_compared_and_a_page_that_is_older_says_so(page, folder: Path) -> None:
+    (folder / "craft/longer.toml").write_text("[design]\ntotal_s = 240.0\n")
+    page.goto("/whatif")
+    page.get_by_text("design.total_s = 240.0, not 120.0").wait_for()
+    page.get_by_role("checkbox", name="craft/longer.toml").click()
+    page.get_by_role("button", name="Compare", exact=True).click()
+    page.frame_locator("iframe").get_by_text("longer").first.wait_for()
+    other = page.context.new_page()
+    other.goto("/files?file=craft/scenario.toml")
+    (folder / "craft/scenario.toml").write_text(
+        (folder / "craft/scenario.toml").read_text() + "\n# changed elsewhere\n"
+    )
+    for tab in (page, other):
+        tab.get_by_text("craft/scenario.toml changed elsewhere").wait_for()
+    other.get_by_role("button", name="Load again").click()
+    other.get_by_text("# changed elsewhere").wait_for()
+
+
+def test_a_log_is_dropped_imported_and_diagnosed(page, folder: Path) -> None:
+    log = SCENARIOS / "logs/bridge.csv"
+    shutil.copy(SCENARIOS / "vessels/logged-50m.toml", folder / "craft")
+    page.goto("/data")
+    page.get_by_label("Vessel file").click()
+    page.get_by_role("option", name="craft/logged-50m.toml").click()
+    page.locator("input[type=file]").set_input_files(str(log))
+    eventually(page, lambda: (folder / "logs" / log.name).exists(), "the log is in the folder")
+    page.get_by_role("button", name="Import").click()
+    page.frame_locator("iframe").locator("h1").first.wait_for()
+    page.get_by_role("button", name="Diagnose").click()
+    page.get_by_text(re.compile("expdesign diagnose")).first.wait_for()
+    eventually(page, lambda: list(folder.glob("runs/*-diagnose/diagnosis.json")), "the data are diagnosed")
+    page.frame_locator("iframe").last.locator("h1").first.wait_for()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_screen_is_wider_than_its_window(page, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    for screen in SCREENS:
+        page.goto(f"/{screen}")
+        page.locator("nav .here").wait_for()
+        page.wait_for_timeout(500)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, screen
+        unnamed = page.evaluate(
+            "[...document.querySelectorAll('button, input, select, textarea, [role=checkbox], [role=button]')]"
+            ".filter(e =>"
+            " e.checkVisibility() && !(e.innerText || e.ariaLabel || e.title || e.labels?.length || e.type == 'file' ||"
+            " e.closest('label') || e.closest('.q-uploader'))).map(e => e.outerHTML.slice(0, 120))"
+        )
+        assert not unnamed, screen

@@ -1,0 +1,174 @@
+"""The page reads and writes one folder, lets in who may, keeps versions, and makes forms of what reads the files."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from expdesign.errors import InputError
+from expdesign.scenario.scenario_file import ScenarioFile
+from expdesign.web.answers import change_in, clearance_of, durations_of, problem_of
+from expdesign.web.folder import MOST_VERSIONS, Folder
+from expdesign.web.forms import put
+from expdesign.web.jobs import Jobs
+from expdesign.web.server import Gate
+from expdesign.workflows import new
+
+OUTSIDE = ("../secret", "/etc/passwd", "a/../../secret", ".expdesign/a/000001", "link/secret")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    root = tmp_path / "root"
+    root.mkdir()
+    (tmp_path / "secret").write_text("secret")
+    (root / "link").symlink_to(tmp_path)
+    return Folder(root.resolve())
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_nothing_outside_the_folder_is_read_or_written(folder: Folder, name: str) -> None:
+    for act in (folder.path, folder.versions, folder.undo, lambda at: folder.write(at, "x"), folder.digest):
+        with pytest.raises(InputError, match="is not in the folder"):
+            act(name)
+    with pytest.raises(InputError):
+        folder.take_in(name, b"x")
+    assert (folder.root.parent / "secret").read_text() == "secret"
+
+
+def test_every_version_comes_back_in_turn_and_comments_stay(folder: Folder) -> None:
+    texts = [f"# a comment\nn = {number}  # of runs\n" for number in range(4)]
+    for text in texts:
+        folder.write("a.toml", text)
+    folder.write("a.toml", texts[-1])  # no change, no version
+    folder.change("a.toml", lambda tables: tables.__setitem__("n", 9))
+    assert folder.path("a.toml").read_text() == "# a comment\nn = 9  # of runs\n"
+    for text in reversed(texts):
+        folder.undo("a.toml")
+        assert folder.path("a.toml").read_text() == text
+    with pytest.raises(InputError, match="no earlier version"):
+        folder.undo("a.toml")
+    for number in range(MOST_VERSIONS + 5):
+        folder.write("a.toml", str(number))
+    assert folder.versions("a.toml") == MOST_VERSIONS
+
+
+def test_a_file_handed_over_replaces_no_other(folder: Folder) -> None:
+    assert folder.take_in("log.csv", b"one") == "log.csv"
+    assert folder.take_in("log.csv", b"one") == "log.csv"
+    assert folder.take_in("log.csv", b"two") == "log-2.csv"
+    assert folder.path("log.csv").read_bytes() == b"one"
+
+
+def asked(gate: Gate, *, host: str, origin: str = "", token: str = "", cookie: str = "", kind: str = "http") -> int:
+    """Status of a request, 0 where a socket is closed."""
+    headers = [(name.encode(), value.encode()) for name, value in
+               (("host", host), ("origin", origin), ("cookie", cookie)) if value]  # fmt: skip
+    scope = {"type": kind, "method": "GET", "path": "/", "headers": headers, "query_string": f"token={token}".encode()}
+    sent: list[dict[str, object]] = []
+
+    async def send(message: dict[str, object]) -> None:
+        sent.append(message)
+
+    async def receive() -> dict[str, object]:
+        return {"type": "http.request"}
+
+    asyncio.run(gate(scope, receive, send))
+    return int(sent[0].get("status", 0))
+
+
+async def hello(scope, receive, send) -> None:
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b""})
+
+
+def test_only_this_machines_own_pages_may_ask() -> None:
+    gate = Gate(hello, hosts=("127.0.0.1", "localhost"), token=None)
+    assert asked(gate, host="127.0.0.1:8120") == 200
+    assert asked(gate, host="localhost:8120", origin="http://localhost:8120") == 200
+    assert asked(gate, host="evil.example") == 403  # a name that was made to point here
+    for kind, refused in (("http", 403), ("websocket", 0)):
+        assert asked(gate, host="localhost:8120", origin="http://evil.example", kind=kind) == refused
+
+
+def test_others_need_the_token() -> None:
+    gate = Gate(hello, hosts=(), token="right")
+    assert asked(gate, host="10.0.0.2:8120") == 403
+    assert asked(gate, host="10.0.0.2:8120", token="wrong") == 403
+    assert asked(gate, host="10.0.0.2:8120", token="right") == 200
+    assert asked(gate, host="10.0.0.2:8120", cookie="expdesign_token=right") == 200
+    assert asked(gate, host="10.0.0.2:8120", kind="websocket") == 0
+
+
+REMEDIES = {
+    "with plan.clearance_m = 5 there is such a path; the rest of the plan was not tried with it": (
+        ("plan", "clearance_m"),
+        5,
+    ),
+    "with plan.confidence = 0.9 drawn trials accept the plan": (("plan", "confidence"), 0.9),
+    'with design.excluded = ["a", "b-2"] the search finds a place for every run': (
+        ("design", "excluded"),
+        ["a", "b-2"],
+    ),
+    "with plan.planner = 'beam' every run is sailed": (("plan", "planner"), "beam"),
+    "goal.heading_deg = 240 has such a path": (("goal", "heading_deg"), 240),
+    "no single change of those tried helps (plan.confidence = 0.9)": None,
+    "the draft is runs/a/refused.html": None,
+}
+
+
+@pytest.mark.parametrize("remedy", REMEDIES)
+def test_remedies_of_one_key_are_changes_of_the_scenario(remedy: str) -> None:
+    change = change_in(remedy)
+    assert change == REMEDIES[remedy]
+    if change:
+        (table, key), _ = change
+        part = ScenarioFile.fields()[table].annotation
+        assert key in part.fields()
+
+
+def test_values_are_put_where_tables_are_missing_and_taken_away() -> None:
+    tables: dict = {"a": {"x": 1}}
+    put(tables, ("b", "c", "y"), 2)
+    put(tables, ("list", 0), {"n": 1})
+    put(tables, ("list", 1), {"n": 2})
+    put(tables, ("a", "x"), None)
+    assert tables == {"a": {}, "b": {"c": {"y": 2}}, "list": [{"n": 1}, {"n": 2}]}
+
+
+def test_commands_run_report_and_stop(tmp_path: Path) -> None:
+    async def work() -> None:
+        jobs = Jobs(tmp_path)
+        made = jobs.start(("new", "craft", "--kind", "asv"))
+        wrong = jobs.start(("run", "nothing.toml"))
+        waiting = jobs.start(("run", "craft/scenario.toml"))
+        jobs.stop(waiting)
+        while made.status is None or wrong.status is None:
+            await asyncio.sleep(0.05)
+        await jobs.end()
+        assert (made.status, made.state) == (0, "done")
+        assert (tmp_path / "craft/scenario.toml").exists()
+        assert wrong.status == 2
+        assert wrong.errors == ["error: nothing.toml: does not exist, expected a TOML file"]
+        assert waiting.state == "stopped, nothing half-written"
+        assert made.command == "expdesign new craft --kind asv"
+
+    asyncio.run(work())
+
+
+def test_answers_are_those_of_the_commands(tmp_path: Path) -> None:
+    new(tmp_path / "craft", kind="asv")
+    scenario = str(tmp_path / "craft/scenario.toml")
+    assert "problem" not in problem_of(scenario)
+    assert clearance_of(scenario, 58.0, 11.0, 0.0)["clearance_m"] > 10
+    assert not clearance_of(scenario, 58.1, 11.0, 0.0)["inside"]
+    found = durations_of(scenario)
+    shares = [run["duration_s"] for run in found["runs"]]
+    assert sum(shares) == pytest.approx(found["total_s"])
+    assert found["efficiency_at_least"] > 0.999
+    best = max(found["runs"], key=lambda run: run["duration_s"])["name"]
+    folder = Folder((tmp_path / "craft").resolve())
+    folder.change("scenario.toml", lambda tables: tables["design"].__setitem__("excluded", [best]))
+    assert next(run for run in durations_of(scenario)["runs"] if run["name"] == best)["repeats"] == 0
+    folder.change("scenario.toml", lambda tables: tables["design"].__setitem__("total_s", -1.0))
+    assert durations_of(scenario)["key"] == "design.total_s"
