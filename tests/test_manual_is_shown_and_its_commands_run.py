@@ -18,9 +18,10 @@ LONG = ("run", "replan", "diagnose", "simulate", "estimate")  # wait for a whole
 
 
 def tutorial(name: str) -> list[list[str]]:
-    """Commands of a tutorial, in order."""
+    """Commands of a tutorial, in order; but for `web`, which goes on until it is interrupted."""
     text = (PAGES / f"{name}.md").read_text(encoding="utf-8").replace("\\\n", " ")
-    return [shlex.split(line) for line in re.findall(r"^ {7}expdesign (.*)$", text, re.MULTILINE)]
+    commands = (shlex.split(line) for line in re.findall(r"^ {7}expdesign (.*)$", text, re.MULTILINE))
+    return [command for command in commands if command[0] != "web"]
 
 
 def test_the_list_of_pages_is_that_of_the_files() -> None:

@@ -57,6 +57,7 @@ def chart_of(area_file: str, draught_m: float) -> Answer:
         "name": area.name,
         "bounds": [[south, west], [north, east]],
         "layers": [
+            {"kind": "water", "geometry": _degrees(area, area.water)},
             *({"kind": "depth", "depth_m": depth, "geometry": _degrees(area, part)} for depth, part in area.depths),
             {"kind": "forbidden", "geometry": _degrees(area, _forbidden(area))},
             {"kind": "land", "geometry": _degrees(area, area.land)},

@@ -65,7 +65,7 @@ class _Plan:
                     break
         with ui.row().classes("two"):
             with ui.column().classes("wide"):
-                self.map = chart_element()
+                self.map = chart_element(("runs", "#c2410c"), ("legs between them", "#0b5a8a"))
                 self._player()
             self.side = ui.column().classes("narrow")
         ui.on("played", self._at)

@@ -20,6 +20,13 @@ from expdesign.web.site import Site, Watched, framed, spelled, told, wrong
 
 DEGREES = 7
 """Decimals of positions that are written, about a centimetre."""
+LEGEND = (
+    ("water to plan in", "#dcebf5"),
+    ("water too shallow or closed", "#d9a5a0"),
+    ("land", "#e3d7bd"),
+    ("outside the area", "#b9c0c6"),
+)
+"""Words and colours of every chart, as in `static/chart.js`."""
 CHARTS = (".geojson", ".json", ".000")
 
 
@@ -225,8 +232,8 @@ class _Sea:
         self._fill_later()
 
 
-def chart_element() -> ui.leaflet:
-    """A map without any picture from outside."""
+def chart_element(*marks: tuple[str, str]) -> ui.leaflet:
+    """A map without any picture from outside, and what its colours mean; `marks` are words and colours of the page."""
     options = {"preferCanvas": True, "attributionControl": False, "zoomSnap": 0.25, "maxZoom": 22}
     nothing = dict.fromkeys(("polyline", "polygon", "rectangle", "circle", "circlemarker", "marker"), False)
     leaflet = ui.leaflet(
@@ -234,6 +241,9 @@ def chart_element() -> ui.leaflet:
         draw_control={"draw": nothing, "edit": {"edit": False, "remove": False}},
     )  # fmt: skip
     leaflet.clear_layers()
+    with ui.element("div").classes("legend"):
+        for words, colour in (*LEGEND, *marks):
+            ui.html(f'<span style="--mark: {colour}">{words}</span>', sanitize=False)
     return leaflet.classes("chart").props('tabindex="0" aria-label="Chart"')
 
 

@@ -9,6 +9,7 @@
   function styled(layer) {
     if (layer.kind === "land") return { color: "#8a7d5f", weight: 1, fillColor: COLOURS.land, fillOpacity: 1 };
     if (layer.kind === "forbidden") return { stroke: false, fillColor: COLOURS.forbidden, fillOpacity: 0.55 };
+    if (layer.kind === "water") return { stroke: false, fillColor: COLOURS.water, fillOpacity: 1 };
     return { stroke: false, fillColor: DEPTHS[Math.min(layer.rank, DEPTHS.length - 1)], fillOpacity: 1 };
   }
 
@@ -28,7 +29,7 @@
     mine.group.clearLayers();
     if (answer.problem) return;
     answer.layers.forEach((layer, index) => {
-      layer.rank = index;
+      layer.rank = index - 1;
       L.geoJSON(layer.geometry, { style: () => styled(layer), interactive: false }).addTo(mine.group);
     });
     for (const zone of answer.closed) {
