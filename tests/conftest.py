@@ -99,12 +99,14 @@ def labels_are_whole() -> Generator[None]:
     RendererSVG.draw_text = draw
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def undrawn() -> Generator[None]:
     """Figures of pages stay empty, for tests of numbers: other tests draw each kind of page."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     def empty(self, target, **options) -> None:
         target.write('<svg viewBox="0 0 1 1" width="1" height="1"></svg>')
 
-    monkeypatch.setattr(FigureCanvasSVG, "print_svg", empty)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FigureCanvasSVG, "print_svg", empty)
+        yield

@@ -22,6 +22,8 @@ from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import Sensors, Vessel, response_values, with_response_values
 from step_case import GUESS, INPUTS, TRUTH, write_csv
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 NAMES = ("n1_delay_s", "rudder1_delay_s")
 CRAFT = load_vessel(TRUTH)
 OUTPUT_ERROR = EstimateOptions(methods=("oe",), mean="none")

@@ -17,6 +17,8 @@ from expdesign.particulars.fit import Problem, fitted
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 CARDS = Path(__file__).parents[1] / "scenarios" / "cards"
 COASTER = Card(
     name="coaster",

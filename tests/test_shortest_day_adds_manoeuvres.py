@@ -19,6 +19,8 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 FEW = GrowSettings(families=("zigzag",), pool=8, rounds=1, seed=1)
 

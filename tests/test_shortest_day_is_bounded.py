@@ -23,6 +23,8 @@ from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 from rudder_ship import rudder_ship
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 AZIMUTHS = vessel("azimuth-30m")
 FASTEST = np.array([[-1.45, 1.45], [-0.7, 0.7], [-0.1, 0.1]])
 FEW = 4000

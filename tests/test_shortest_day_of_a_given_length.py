@@ -15,6 +15,8 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 DAY_S = 620.0
 

@@ -11,6 +11,8 @@ import pytest
 from expdesign import workflows
 from synthetic_ship import TRUTH, sail, trial, vessel_file, voyage, write
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 HOLDS = {
     "orders": {},
     "positions": {"rudder1_rad": "", "reached": "reached_rudder1_rad"},

@@ -26,6 +26,8 @@ from expdesign.simulation import simulate
 from outside_check import columns
 from short_examples import SCENARIOS, example_run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = SCENARIOS / "story.toml"
 NOMINAL, TRUE = SCENARIOS / "vessels/tender-20m.toml", SCENARIOS / "vessels/tender-20m-true.toml"
 MISSING, CURRENT = "Y_abs_v_v", ("north_mps", "east_mps")

@@ -16,6 +16,8 @@ from expdesign.step_trials import controls_of, identify_steps, nominal, nominal_
 from expdesign.step_trials.samples import standard_error
 from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, noise, write_csv
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 NAMES = ("time_s", "u_mps", "r_radps", "n1_rps", "rudder1_rad")
 CONTROLS = controls_of(INPUTS)
 DESIGNED = GUESS.parents[1] / "fast-boat-designed.toml"

@@ -181,7 +181,7 @@ def shown_job(site: Site, job: Job, *, ended: Callable[[Job], None] | None = Non
             timer.deactivate()
             with errors:
                 for line in job.errors:
-                    wrong(line)
+                    wrong(line.removeprefix("error: "))
             if ended is not None:
                 ended(job)
 
