@@ -301,7 +301,7 @@ def _score_covariance(Z: Array, rows: _Rows) -> Array:
         (_meeting(*(Z @ by for by in rows.by_air[::-1])), np.full(2, rows.air)),
         (Z @ rows.by_current, np.full(2, rows.current)),
     )
-    sums = [np.einsum("kpo,o,kqo->pq", matrix, variance, matrix) for matrix, variance in parts]
+    sums = [np.tensordot(matrix * variance, matrix, axes=((0, 2), (0, 2))) for matrix, variance in parts]
     return np.asarray(np.sum(sums, axis=0))
 
 

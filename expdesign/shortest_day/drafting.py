@@ -18,6 +18,7 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft, draft_trial, redrafted
 from expdesign.plan.values import Placement, SailedTrial
 from expdesign.plan.verify import expected_errors, track_information
+from expdesign.processes import in_order
 from expdesign.progress import Progress
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.prices import DraftedDay, fewest_runs, lost_s, with_legs
@@ -44,17 +45,15 @@ class Drafting:
         draft is all that is asked for, no runs are left out, and no trials are drawn.
         """
         like = days[-1].draft if days else None
-        drafted = [*days, self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))]
+        day = self._judged(repeats, draft_trial(self._of(repeats), like=like, progress=progress))
         if self.problem.settings.draft:
-            return drafted
-        if _late_share(days) is None:
-            draft = drafted[-1].draft
-            problem = replace(self._of(repeats), area=draft.area)
-            drafted[-1] = drafted[-1].late(drawn_lateness_s(problem, draft.water, draft.sailed))
-        reached = drafted[-1].margin >= 0 and not self.fullest
-        if reached and (shorter := self.without_spare_runs(drafted[-1])) is not drafted[-1]:
-            drafted.append(shorter)
-        return _alike_late(drafted)
+            return [*days, day]
+        trials = replace(self._of(repeats), area=day.draft.area), day.draft.water, day.draft.sailed
+        late = in_order(drawn_lateness_s, trials, () if _late_share(days) is not None else ((),))  # begun now
+        reached = day.margin >= 0 and not self.fullest
+        shorter = self.without_spare_runs(day) if reached else day
+        drawn = [day.late(late_s) for late_s in late] or [day]
+        return _alike_late([*days, *drawn, *([] if shorter is day else [shorter])])
 
     def without_spare_runs(self, day: DraftedDay) -> DraftedDay:
         """The day, or a shorter one with fewer of its runs that reaches the accuracy too."""

@@ -178,7 +178,7 @@ def archipelago(folder: Path, corners: int) -> Path:
 
 PARTS: dict[str, tuple[Callable[[int], float], tuple[int, ...]]] = {
     "hours of runs": (runs, (1, 2, 4)),
-    "candidates": (candidates, (14, 100, 1000)),
+    "candidates": (candidates, (10, 100, 1000, 10_000)),
     "drawn trials": (draws, (500, 5000, 100_000)),
     "corners of a chart, loading": (loading, (1000, 10_000, 100_000, 1_000_000)),
     "corners of a chart, measuring": (measuring, (1000, 10_000, 100_000, 1_000_000)),

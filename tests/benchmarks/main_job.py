@@ -57,11 +57,12 @@ class MainJob:
     wall_s: float = 0.0
 
 
-def main_job(scenario: Path) -> MainJob:
-    """A scenario run by a fresh process."""
-    command = [sys.executable, __file__, "--measure", str(scenario)]
+def main_job(scenario: Path, *, seed: int = 0, version: Path = ROOT) -> MainJob:
+    """A scenario run by a fresh process, with the version in a checkout."""
+    command = [sys.executable, __file__, "--measure", str(scenario), "--seed", str(seed)]
+    environment = {**os.environ, "PYTHONPATH": str(version)}
     together_mib, begun_s = 0.0, time.monotonic()
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as process:
         while True:
             try:
                 output, _ = process.communicate(timeout=SAMPLED_S)
@@ -73,9 +74,11 @@ def main_job(scenario: Path) -> MainJob:
     return replace(MainJob(**json.loads(output)), together_mib=together_mib, wall_s=time.monotonic() - begun_s)
 
 
-def measured(scenario: Path) -> MainJob:
-    """A scenario run by this process, which has done nothing else."""
-    sys.path.insert(0, str(ROOT / "tests"))
+def measured(scenario: Path, seed: int) -> MainJob:
+    """A scenario run by this process, which has done nothing else, with the version that it finds."""
+    import expdesign
+
+    sys.path.insert(0, str(Path(expdesign.__file__).parents[1] / "tests"))
     import counted_work
     from expdesign import workflows
 
@@ -93,7 +96,7 @@ def measured(scenario: Path) -> MainJob:
     with tempfile.TemporaryDirectory() as folder:
         run = workflows.run
         reach("design")
-        outcome = run(scenario, Path(folder), jobs=0, cache=False, progress=progress)
+        outcome = run(scenario, Path(folder), seed=seed, jobs=0, cache=False, progress=progress)
         reach("files")
         legs = json.loads((Path(folder) / "plan.json").read_text("utf-8"))["legs"]
     paths = Counter(leg["path"] for leg in legs if "path" in leg)
@@ -178,6 +181,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenarios", nargs="*", type=Path, default=sorted(SCENARIOS.glob("*.toml")))
     parser.add_argument("--measure", type=Path, help="print the numbers of one scenario, run in this process, as JSON")
+    parser.add_argument("--seed", type=int, default=0, help="of --measure")
     parser.add_argument("--calls", action="store_true", help="count calls of libraries instead")
     chosen = parser.parse_args()
     if chosen.calls:
@@ -186,7 +190,7 @@ if __name__ == "__main__":
             told = ", ".join(f"{name} {count}" for name, count in sorted(calls(scenario).items()))
             print(f"| {scenario.stem} | {told} |", flush=True)
     elif chosen.measure:
-        print(json.dumps(vars(measured(chosen.measure))))
+        print(json.dumps(vars(measured(chosen.measure, chosen.seed))))
     else:
         names = (*PHASES, "all [s]", "NumPy + IPOPT [s]", "x baseline", "memory", "together")
         print("| version | scenario |", " | ".join(names), "|")

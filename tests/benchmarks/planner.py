@@ -10,7 +10,9 @@ an hour of trials of the 30 m ship, 2.5 m draught, through the sounds of Alesund
 Commencement Bay (the S-57 cell `US5WA22M.000`).
 
 With ``--paths`` every scenario is planned by OMPL and by the visibility graph, one after the other: repositioning and
-its bound, probability of leaving the water, least clearance, day, wall and processor seconds, and what found the paths.
+its bound, probability of leaving the water, least clearance, day as planned and the median of drawn trials, wall and
+processor seconds, and what found the paths. With ``--other CHECKOUT [--seeds N ...]`` the same with the version of
+another checkout and with this one, in turn, seed by seed.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import argparse
 import shutil
 import tempfile
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import get_args
 
@@ -30,7 +33,7 @@ from expdesign.plan.search.planners import LatticeSearch
 from expdesign.plan.values import PathsName
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
-from main_job import SCENARIOS, main_job
+from main_job import ROOT, SCENARIOS, MainJob, main_job
 
 SEABED = ", ".join(f"seabed{depth}m = {depth}" for depth in (0, 5, 10, 20, 50, 100, 200, 350))
 CHARTS = {
@@ -114,18 +117,39 @@ def path_rows(scenario: Path) -> Iterator[str]:
         with tempfile.TemporaryDirectory() as folder:
             copy = Path(shutil.copytree(scenario.parent, Path(folder) / "scenarios")) / scenario.name
             copy.write_text(scenario.read_text("utf-8").replace("[plan]\n", f'[plan]\npaths = "{way}"\n'), "utf-8")
-            job = main_job(copy)
-        facts = job.summary
-        found = ", ".join(f"{count} {source}" for source, count in sorted(job.paths.items()))
-        yield (
-            f"| {scenario.stem} | {way} | {facts['repositioning_s']:.0f} ({facts['repositioning_bound_s']:.0f}) s "
-            f"| {facts['leave_water_probability']:.3f} | {facts['least_clearance_m']:.1f} m "
-            f"| {facts['informative_s'] + facts['repositioning_s']:.0f} s | {job.wall_s:.0f} s "
-            f"| {sum(job.phase_s.values()):.1f} s | {found} |"
-        )
+            yield told(scenario.stem, way, main_job(copy))
 
 
-PATHS = ("scenario", "paths", "repositioning (bound)", "leaves", "clearance", "day", "wall", "processor", "found by")
+def version_rows(scenario: Path, other: Path, seed: int) -> Iterator[str]:
+    """A line for the version of another checkout, and one for this; with odd seeds this one runs first."""
+    versions = [("before", other), ("now", ROOT)]
+    for name, version in versions if seed % 2 == 0 else versions[::-1]:
+        yield told(f"{scenario.stem}, seed {seed}", name, main_job(scenario, seed=seed, version=version))
+
+
+def told(of: str, which: str, job: MainJob) -> str:
+    """A line of what a job took and gave."""
+    facts, found = job.summary, ", ".join(f"{count} {source}" for source, count in sorted(job.paths.items()))
+    day_s = facts["informative_s"] + facts["repositioning_s"]
+    return (
+        f"| {of} | {which} | {facts['repositioning_s']:.0f} ({facts['repositioning_bound_s']:.0f}) s "
+        f"| {facts['leave_water_probability']:.3f} | {facts['least_clearance_m']:.1f} m "
+        f"| {day_s:.0f} ({day_s + facts['extra_time_median_s']:.0f}) s | {job.wall_s:.0f} s "
+        f"| {sum(job.phase_s.values()):.1f} s | {found} |"
+    )
+
+
+TOLD = (
+    "scenario",
+    "of",
+    "repositioning (bound)",
+    "leaves",
+    "clearance",
+    "day (median)",
+    "wall",
+    "processor",
+    "found by",
+)
 PLANS = ("scenario", "verified", "clearance", "repositioning", "bound", "ratio", "of informative", "lattice (bound)",
          "of lattice")  # fmt: skip
 
@@ -134,12 +158,18 @@ if __name__ == "__main__":
     parser.add_argument("scenarios", nargs="*", type=Path)
     parser.add_argument("--charts", type=Path)
     parser.add_argument("--paths", action="store_true")
+    parser.add_argument("--other", type=Path, metavar="CHECKOUT")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="of --other")
     wished = parser.parse_args()
     examples = [] if wished.charts else sorted(SCENARIOS.glob("*.toml"))
-    print("|", " | ".join(PATHS if wished.paths else PLANS), "|")
+    print("|", " | ".join(TOLD if wished.paths or wished.other else PLANS), "|")
     print("|---" * 9 + "|")
     with tempfile.TemporaryDirectory() as written:
         extra = [] if wished.charts is None else list(charted(wished.charts, Path(written)))
         for scenario in [*(wished.scenarios or examples), *extra]:
-            for line in path_rows(scenario) if wished.paths else [row(scenario)]:
+            if wished.other:
+                lines = chain.from_iterable(version_rows(scenario, wished.other, seed) for seed in wished.seeds)
+            else:
+                lines = path_rows(scenario) if wished.paths else iter([row(scenario)])
+            for line in lines:
                 print(line, flush=True)
