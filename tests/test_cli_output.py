@@ -15,7 +15,7 @@ from expdesign import workflows as real_workflows
 from expdesign.cli import main
 from expdesign.cli.app import WORKFLOWS
 from expdesign.cli.options import repeat_option
-from expdesign.cli.summary import _rows
+from expdesign.export.document import fact_rows
 from short_examples import copied
 
 SUMMARY = {
@@ -364,5 +364,5 @@ def test_the_module_is_the_console_script() -> None:
 
 
 def test_what_nobody_knows_has_no_unit() -> None:
-    rows = dict(_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
+    rows = dict(fact_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
     assert rows == {"day median": "-", "bound": "-", "day": "60 s"}

@@ -29,10 +29,11 @@ from expdesign.export import (
     steered_entry,
     write_files,
 )
+from expdesign.export.document import Table
 from expdesign.export.estimate_page import EstimateContent, estimate_html, estimate_notes
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text, note_on_roll
+from expdesign.workflows.outcome import Outcome, command_text, document_of, note_on_roll
 from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
@@ -101,9 +102,9 @@ def estimate(
     progress("done", 1.0)
     return Outcome(
         files=written,
-        summary={**_estimate_summary(found), **note_on_roll(ship)},
-        tables=_estimate_tables(found),
-        notes=estimate_notes(content),
+        document=document_of(
+            {**_estimate_summary(found), **note_on_roll(ship)}, _estimate_tables(found), estimate_notes(content)
+        ),
     )
 
 
@@ -158,7 +159,7 @@ def _estimate_summary(found: Assessment) -> dict[str, object]:
     }
 
 
-def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
+def _estimate_tables(found: Assessment) -> tuple[Table, ...]:
     tables = [
         *([(prediction_title(found), prediction_table(found))] if found.compared else []),
         ("Estimates, with standard deviations", parameter_table(found)),
@@ -174,7 +175,7 @@ def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
     residuals = [item.estimate.residuals for item in found.methods]
     if steered or any((own.rows_of < own.rows).any() for own in residuals):
         tables.append(("Samples used", _used_samples(found)))
-    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
+    return tuple(Table(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
 
 
 def _used_samples(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

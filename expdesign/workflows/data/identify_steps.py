@@ -10,6 +10,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import Content, vessel_toml, write_files
+from expdesign.export.document import Table
 from expdesign.export.step_trial_page import (
     REPEAT_HEADER,
     StepTrialContent,
@@ -40,7 +41,7 @@ from expdesign.step_trials import (
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
 from expdesign.workflows.data.step_list import listed_steps
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import data_files
 
 SIMULATED_STEP_S = 0.5
@@ -109,7 +110,7 @@ def identify_steps(
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes))
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
@@ -184,13 +185,11 @@ def _summary(content: StepTrialContent) -> dict[str, object]:
     }
 
 
-def _tables(content: StepTrialContent) -> tuple[TextTable, ...]:
-    tables = [
-        TextTable(title="The step trial", header=("finding",), rows=tuple((text,) for text in sentences(content)))
-    ]
+def _tables(content: StepTrialContent) -> tuple[Table, ...]:
+    tables = [Table(title="The step trial", header=("finding",), rows=tuple((text,) for text in sentences(content)))]
     if to_repeat(content):
-        tables.append(TextTable(title="Steps to repeat", header=REPEAT_HEADER, rows=tuple(repeat_rows(content))))
+        tables.append(Table(title="Steps to repeat", header=REPEAT_HEADER, rows=tuple(repeat_rows(content))))
     if content.nominal is not None:
         header = ("parameter", "before", "after the steps")
-        tables.append(TextTable(title="Nominal vessel", header=header, rows=tuple(nominal_rows(content))))
+        tables.append(Table(title="Nominal vessel", header=header, rows=tuple(nominal_rows(content))))
     return tuple(tables)

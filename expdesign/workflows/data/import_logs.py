@@ -16,6 +16,7 @@ from expdesign import __version__
 from expdesign.conventions import OUTPUTS, whole_turns
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, read_plan, write_files
+from expdesign.export.document import Table
 from expdesign.export.import_page import (
     ImportContent,
     channel_rows,
@@ -63,7 +64,7 @@ from expdesign.scenario import load_mapping, load_vessel
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOVED = 3.0  # standard errors from which a computer's clock is set by what another file saw
@@ -174,9 +175,8 @@ def import_logs(
         with suppress(OSError):
             (folder / name).unlink()
     progress("done", 1.0)
-    return Outcome(
-        files=written, summary=_summary(content, written), tables=_tables(content), notes=content.notes
-    )  # fmt: skip
+    document = document_of(_summary(content, written), _tables(content), content.notes)
+    return Outcome(files=written, document=document)
 
 
 def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Decisions:
@@ -410,7 +410,7 @@ def _steered(content: ImportContent) -> bool:
     return any(inputs_of(run.stretch.columns) for run in content.runs)
 
 
-def _tables(content: ImportContent) -> tuple[TextTable, ...]:
+def _tables(content: ImportContent) -> tuple[Table, ...]:
     tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]] = [
         ("Channels that are used", ("column", "channel", "unit", "times", "why"), channel_rows(content)),
         ("Not used", ("log", "channel", "why"), unused_rows(content)),
@@ -422,4 +422,4 @@ def _tables(content: ImportContent) -> tuple[TextTable, ...]:
             response_rows(content),
         ),
     ]
-    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
+    return tuple(Table(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)

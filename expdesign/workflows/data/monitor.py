@@ -15,6 +15,7 @@ import numpy as np
 from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import Content, write_files
+from expdesign.export.document import Table
 from expdesign.export.monitor_page import (
     Moment,
     MonitorContent,
@@ -56,7 +57,7 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.workers import workers
 
 
@@ -188,7 +189,7 @@ def monitor(
     content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now, asked))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -342,11 +343,11 @@ def _summary(content: MonitorContent) -> dict[str, object]:
     }
 
 
-def _tables(content: MonitorContent) -> tuple[TextTable, ...]:
+def _tables(content: MonitorContent) -> tuple[Table, ...]:
     verdict = tuple((sentence,) for sentence in sentences(content))
     return (
-        TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=verdict),
-        TextTable(
+        Table(title="Is it still the ship of the reference?", header=("verdict",), rows=verdict),
+        Table(
             title="Changes that are watched for", header=monitor_header(content), rows=tuple(monitor_tables(content))
         ),
     )

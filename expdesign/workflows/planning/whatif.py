@@ -15,6 +15,7 @@ from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
+from expdesign.export.document import Table
 from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
 from expdesign.export.whatif_page.page import table_header, table_row
 from expdesign.information import PrimitiveInformation, estimated_parameters
@@ -26,7 +27,7 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
@@ -112,7 +113,7 @@ def whatif(
     files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(whatif_html, content)}
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content)))
 
 
 def _check(case: Scenario, path: Path, seed: int) -> None:
@@ -225,10 +226,10 @@ def _summary(content: WhatIfContent) -> dict[str, object]:
     }
 
 
-def _tables(content: WhatIfContent) -> tuple[TextTable, ...]:
+def _tables(content: WhatIfContent) -> tuple[Table, ...]:
     rows = tuple(table_row(content, case) for case in content.cases)
     differences = tuple((name, sentence) for name, sentences in explanations(content) for sentence in sentences)
     return (
-        TextTable(title="Side by side", header=table_header(content), rows=rows),
-        TextTable(title="Differences", header=("Case", "What differs"), rows=differences),
+        Table(title="Side by side", header=table_header(content), rows=rows),
+        Table(title="Differences", header=("Case", "What differs"), rows=differences),
     )

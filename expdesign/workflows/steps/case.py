@@ -10,9 +10,10 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import FileError, NoPlan
 from expdesign.export import Content, write_files
+from expdesign.export.document import Table
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.outcome import Outcome, document_of, note_on_roll
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
@@ -33,7 +34,7 @@ def written(
     files: Mapping[str, Content],
     summary: Mapping[str, object],
     progress: Progress,
-    tables: tuple[TextTable, ...] = (),
+    tables: tuple[Table, ...] = (),
 ) -> Outcome:
     """Write files into `out` or runs/<scenario>, and report them. A plan takes an earlier draft away."""
     folder = out or Path("runs") / case.name
@@ -46,9 +47,9 @@ def written(
     remarks = {"remarks": list(case.remarks)} if case.remarks and "remarks" not in summary else {}
     return Outcome(
         files=paths,
-        summary={"scenario": case.name, **summary, **note, **roll, **remarks},
-        tables=tables,
-        notes=(*before, *case.area.notes),
+        document=document_of(
+            {"scenario": case.name, **summary, **note, **roll, **remarks}, tables, (*before, *case.area.notes)
+        ),
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
+from expdesign.export.document import Table
 from expdesign.export.foresight_page import (
     HEADER,
     OPERATION_HEADER,
@@ -30,7 +31,7 @@ from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
@@ -123,8 +124,8 @@ def _operation(
     summary = {"voyages_without_change": found.nominal, "false_alarms": found.false_alarms}
     sentences = tuple((text,) for text in operation_sentences(found))
     tables = (
-        TextTable(title="What a watch in operation would find", header=OPERATION_HEADER, rows=operation_rows(found)),
-        TextTable(title="In words", header=("finding",), rows=sentences),
+        Table(title="What a watch in operation would find", header=OPERATION_HEADER, rows=operation_rows(found)),
+        Table(title="In words", header=("finding",), rows=sentences),
     )
     return written(case, out, files, summary, progress, tables)
 
@@ -164,6 +165,6 @@ def foresight_summary(content: ForesightContent) -> dict[str, object]:
     }
 
 
-def foresight_tables(found: Foresight) -> tuple[TextTable, ...]:
+def foresight_tables(found: Foresight) -> tuple[Table, ...]:
     """Power of every cause, at its least visible."""
-    return (TextTable(title="What a diagnosis would find", header=HEADER, rows=foresight_rows(found)),)
+    return (Table(title="What a diagnosis would find", header=HEADER, rows=foresight_rows(found)),)

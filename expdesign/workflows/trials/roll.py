@@ -10,6 +10,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import Content, vessel_toml, write_files
+from expdesign.export.document import Table
 from expdesign.export.roll_page import (
     CURE_HEADER,
     PARAMETER_HEADER,
@@ -42,7 +43,7 @@ from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import Batch
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 
 
 def roll(
@@ -116,7 +117,7 @@ def roll(
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes))
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:
@@ -208,8 +209,8 @@ def _summary(content: RollContent) -> dict[str, object]:
     }
 
 
-def _tables(content: RollContent) -> tuple[TextTable, ...]:
-    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
-    values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
-    cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
+def _tables(content: RollContent) -> tuple[Table, ...]:
+    found = Table(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
+    values = Table(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
+    cures = Table(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
     return (found, values, cures) if cures.rows else (found, values)
