@@ -144,6 +144,12 @@ def section(title: str, *blocks: Block, level: Literal[2, 3] = 2) -> Section:
     return Section(title=title, blocks=blocks, level=level)
 
 
+def filled(*sections: Section) -> tuple[Section, ...]:
+    """The sections without those whose tables have no rows."""
+    tables = ([block for block in part.blocks if isinstance(block, Table)] for part in sections)
+    return tuple(part for part, own in zip(sections, tables, strict=True) if not own or any(one.rows for one in own))
+
+
 def notes_of(texts: Sequence[str], *, of: str = "") -> tuple[Note, ...]:
     """A note of each text."""
     return tuple(Note(text, of) for text in texts)

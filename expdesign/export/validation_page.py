@@ -384,8 +384,8 @@ def _accuracy(results: tuple[Validated, ...]) -> Iterator[Section]:
     if predicted is not None:
         caption = (
             f"Design \u201c{predicted.design}\u201d: standard deviation observed in the trials divided by the "
-            "predicted one, with 95 % sampling error. Circles use the true ship and test the theory. Diamonds use the nominal "
-            "model, as a forecast before the trial does."
+            "predicted one, with 95 % sampling error. Circles use the true ship and test the theory. Diamonds use the "
+            "nominal model, as a forecast before the trial does."
         )
         figure = Figure(draw=partial(spread_figure, predicted), caption=caption)
         yield section("Predicted and observed accuracy", figure)

@@ -17,8 +17,8 @@ from expdesign.export.files import strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_summary, design_tables, designed
 from expdesign.workflows.steps.scored import growth_files, growth_summary, growth_tables, parameters_of, ready
 from expdesign.workflows.steps.workers import workers
@@ -161,7 +161,7 @@ def durations(
     }
     summary = {**growth_summary(growth, case), **design_summary(design)}
     tables = (*growth_tables(growth), *design_tables(design, compared))
-    return written(case, out, files, summary, progress, tables)
+    return written(case, out, files, noted(case, document_of(summary, tables)), progress)
 
 
 def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, progress: Progress) -> Outcome:
@@ -175,4 +175,5 @@ def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, 
         "not_informative_on_their_own": [item.primitive.name for item in tried if not item.informative],
         **design_summary(design),
     }
-    return written(case, out, files, summary, progress, (covariance_table(tried), *design_tables(design, compared)))
+    document = document_of(summary, (covariance_table(tried), *design_tables(design, compared)))
+    return written(case, out, files, noted(case, document), progress)
