@@ -36,6 +36,7 @@ def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), not
         notes: on the data.
     """
     findings, own, facts, values = list[str](), list[str](), dict[str, object](), dict[str, object]()
+    cells = {cell for table in tables for row in table.rows for cell in row}
     for key, value in summary.items():
         words = key.replace("_", " ")
         if key.endswith(SENTENCES):
@@ -47,7 +48,7 @@ def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), not
             continue
         values[key] = value
     return Document(
-        findings=tuple(line for line in findings if line not in notes),
+        findings=tuple(line for line in findings if line not in {*notes, *cells}),
         facts=facts,
         values=values,
         sections=tuple(Section(title=table.title, blocks=(table,)) for table in tables),
