@@ -48,7 +48,7 @@ def unverified(summary: Mapping[str, object]) -> str:
 
 def print_summary(outcome: Outcome) -> None:
     """Facts, tables, findings and notes of the document, then the files and the page to open."""
-    from expdesign.export.document import fact_rows
+    from expdesign.export.document import fact_rows, listings
 
     document = outcome.document
     console = Console(highlight=False, markup=False, soft_wrap=True)
@@ -64,6 +64,10 @@ def print_summary(outcome: Outcome) -> None:
         console.print()
     for one in document.tables:
         _print_table(console, one)
+    for title, lines in listings(document):
+        console.print(title, style="bold")
+        console.print(*lines, sep="\n")
+        console.print()
     for line in (*document.findings, *[""] * bool(document.findings)):
         console.print(line)
     if document.all_notes:

@@ -59,7 +59,7 @@ class Items:
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines as they are typed."""
+    """Lines as they are typed, on page and terminal."""
 
     lines: tuple[str, ...]
 
@@ -137,6 +137,12 @@ class Document:
             for block in section.blocks
             if isinstance(block, Table) and block.on != "page" and block.rows
         )
+
+
+def listings(document: Document) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Every listing of a document under the title of its section."""
+    for part in document.sections:
+        yield from ((part.title, block.lines) for block in part.blocks if isinstance(block, Listing))
 
 
 def section(title: str, *blocks: Block, level: Literal[2, 3] = 2) -> Section:

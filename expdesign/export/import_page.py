@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from expdesign.export.document import Document, Figure, Table, filled, section
+from expdesign.export.document import Document, Figure, Listing, Table, filled, section
 from expdesign.export.files import finite, strict_json
 from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, page_figure, svg
 from expdesign.export.words import counted
@@ -251,7 +251,6 @@ def import_document(content: ImportContent, folder: Path) -> Document:
             "runs": len(content.runs),
             "channels_used": sum(bool(use.column) for use in content.mapping.uses),
             "sample_time_s": content.sampled.sample_time_s,
-            **({"next": f"expdesign estimate {folder} --vessel VESSEL.toml"} if steered else {}),
         },
         values={
             "logs": [f"{log.source}: {log.clock}, {len(log.channels)} channels" for log in content.logs],
@@ -268,6 +267,7 @@ def import_document(content: ImportContent, folder: Path) -> Document:
                 ),
             ),
             *parts,
+            *([section("Next", Listing((f"expdesign estimate {folder} --vessel VESSEL.toml",)))] if steered else []),
         ),
         notes=content.notes,
         command=content.command,

@@ -223,9 +223,9 @@ def load_document(content: LoadContent) -> Document:
                 "Load cases, in this order",
                 Table(header=CASE_HEADER, rows=case_rows(content), texts=4),
                 "Heights are above the origin of the vessel file\u2019s heights. Every run begins upright, on a "
-                "steady straight course. Each load case is planned on the chart by itself:",
-                Listing(content.commands),
+                "steady straight course.",
             ),
+            section("Each load case is planned on the chart by itself", Listing(content.commands)),
             section(
                 "What the trial will tell",
                 Table(header=PRECISION_HEADER, rows=precision_rows(content), texts=2),

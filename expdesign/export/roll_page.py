@@ -341,9 +341,9 @@ def roll_document(content: RollContent) -> Document:
         about=EQUATION,
         mark=None if estimate.trusted else Mark(text=f"None to be trusted: {headline(content)}", good=False),
         findings=roll_sentences(content),
-        facts={"parameters_determined": report.rank, "parameters_sought": len(report.free)},
+        facts={"rank": report.rank, "free": len(report.free)},
         values={
-            "trusted": estimate.trusted,
+            "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
             "parameters": estimate.values,
             "std": {name: std for name, std in estimate.std.items() if name not in estimate.held},
             "held": list(estimate.held),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
-from expdesign.export.document import Document, Figure, fact_rows
+from expdesign.export.document import Block, Document, Figure, Table, fact_rows
 from expdesign.export.formats.format import xml_text
 from expdesign.progress import Progress, in_phases, silent
 
@@ -39,14 +39,19 @@ def _shown(value: object) -> object:
 
 def document_html(document: Document, *, progress: Progress = silent) -> str:
     """One HTML page without any outside reference."""
-    sections = document.sections
+    sections = [part for part in document.sections if not part.blocks or any(map(_on_page, part.blocks))]
     contents = [(number, section.title) for number, section in enumerate(sections, start=1) if section.level == 2]
     return page_template("document.html").render(
         document=document,
+        sections=sections,
         facts=list(fact_rows(document.facts)),
         contents=contents if len(contents) >= MANY_SECTIONS else (),
         drawn=_drawn([block for part in sections for block in part.blocks if isinstance(block, Figure)], progress),
     )
+
+
+def _on_page(block: Block) -> bool:
+    return not isinstance(block, Table) or block.on != "terminal"
 
 
 def _drawn(figures: list[Figure], progress: Progress) -> dict[int, object]:

@@ -9,14 +9,8 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
-from expdesign.export.foresight_page import (
-    ForesightContent,
-    OperationContent,
-    foresight_document,
-    foresight_json,
-    operation_document,
-    operation_json,
-)
+from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
+from expdesign.export.operation_page import OperationContent, operation_document, operation_json
 from expdesign.export.pages import document_html
 from expdesign.export.routes import read_plan
 from expdesign.foresight import TrialRun, design_runs, foresee_operation
