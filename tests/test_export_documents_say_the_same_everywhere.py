@@ -123,7 +123,7 @@ def makers() -> list[Callable[..., Document]]:
 def test_kinds_of_results_with_a_document_have_no_page_of_their_own() -> None:
     """Their notes could else be on one and not on the other; what they return says which renderings there are."""
     found = makers()
-    assert len(found) >= 9
+    assert len(found) >= 10
     templates = {path.stem for path in EXPORT.glob("*/templates/*.html")}
     for maker in found:
         assert maker.__annotations__["return"] == "Document", maker.__name__

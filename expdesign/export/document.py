@@ -47,6 +47,7 @@ class Figure:
 
     draw: Callable[[], str | Markup]
     caption: str | Markup = ""
+    legend: Sequence[Mapping[str, str]] = ()  # sign, colour and text of what is drawn, below it
     above: bool = False  # whether the caption is a title above it
 
 

@@ -87,7 +87,8 @@ def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]
 
 
 def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, Content]:
-    from expdesign.export.refused_page import Refusal, refused_html, refused_json
+    from expdesign.export.pages import document_html
+    from expdesign.export.refused_page import Refusal, refused_document, refused_json
 
     there = sorted(path.name for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
     refusal = Refusal(
@@ -102,4 +103,4 @@ def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[st
         command=command,
         version=__version__,
     )
-    return {"refused.json": refused_json(refusal), "refused.html": partial(refused_html, refusal)}
+    return {"refused.json": refused_json(refusal), "refused.html": partial(document_html, refused_document(refusal))}
