@@ -40,9 +40,9 @@ def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), not
     for key, value in summary.items():
         words = key.replace("_", " ")
         if key.endswith(SENTENCES):
-            findings += (f"{line}" if key in SENTENCES else f"{words}: {line}" for line in _lines(value))
+            findings += (line if key in SENTENCES else f"{words}: {line}" for line in _lines(value))
         elif key.startswith("note"):
-            own += (f"{line}" if key == "notes" else f"{words}: {line}" for line in _lines(value))
+            own += (line if key == "notes" else f"{words}: {line}" for line in _lines(value))
         elif not tables or _brief(value, notes):
             facts[key] = value
             continue
@@ -69,7 +69,7 @@ def _brief(value: object, notes: Sequence[str]) -> bool:
 
 LONGEST = 200
 """Characters of a list that gets a line beside tables."""
-SENTENCES = ("remarks", "judgements")
+SENTENCES = ("remarks",)
 """Endings of entries of a summary that hold sentences."""
 
 
