@@ -15,7 +15,8 @@ from expdesign import workflows as real_workflows
 from expdesign.cli import main
 from expdesign.cli.app import WORKFLOWS
 from expdesign.cli.options import repeat_option
-from expdesign.cli.summary import _rows
+from expdesign.export.document import fact_rows
+from expdesign.workflows.outcome import Outcome, document_of
 from short_examples import copied
 
 SUMMARY = {
@@ -70,14 +71,7 @@ REPLAN = {
 COMMANDS = ("run", "score", "durations", "plan", "export", "simulate", "estimate", "replan")
 
 
-@dataclass
-class Finished:
-    """What a workflow returns."""
-
-    files: tuple[Path, ...] = (Path("runs/a/plan.json"), Path("runs/a/report.html"))
-    summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
-    tables: tuple[object, ...] = ()
-    notes: tuple[str, ...] = ()
+FILES = (Path("runs/a/plan.json"), Path("runs/a/report.html"))
 
 
 @dataclass
@@ -88,11 +82,11 @@ class Workflows:
     summary: dict[str, object] = field(default_factory=lambda: dict(SUMMARY))
 
     def __getattr__(self, name: str) -> object:
-        def workflow(*arguments: object, progress: object, **options: object) -> Finished:
+        def workflow(*arguments: object, progress: object, **options: object) -> Outcome:
             self.calls.append((name, arguments, options))
             for fraction in (0.0, 0.01, 0.5, 1.0):
                 progress("at work", fraction)  # type: ignore[operator]
-            return Finished(summary=self.summary)
+            return Outcome(files=FILES, document=document_of(self.summary))
 
         return workflow
 
@@ -272,6 +266,7 @@ def test_json_is_alone_on_stdout_and_progress_on_stderr(
         "command": "run",
         "files": ["runs/a/plan.json", "runs/a/report.html"],
         "summary": SUMMARY,
+        "findings": [],
         "notes": [],
     }
     assert captured.err.splitlines() == ["[  0%] at work", "[ 50%] at work", "[100%] at work"]
@@ -364,5 +359,5 @@ def test_the_module_is_the_console_script() -> None:
 
 
 def test_what_nobody_knows_has_no_unit() -> None:
-    rows = dict(_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
+    rows = dict(fact_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
     assert rows == {"day median": "-", "bound": "-", "day": "60 s"}

@@ -15,10 +15,11 @@ import pytest
 from design_case import SCENARIOS
 from expdesign.cli import main
 from expdesign.cli.summary import as_json, print_summary
+from expdesign.export.document import Table
 from expdesign.scenario import load_scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.workflows import Outcome
-from expdesign.workflows.outcome import TextTable
+from expdesign.workflows.outcome import document_of
 from expdesign.workflows.steps.planned import plan_summary
 from export_case import plan, tug
 from roll_files import KNOWN, UNKNOWN, stated, three
@@ -101,9 +102,9 @@ def test_a_remark_is_printed_once_however_long_and_whatever_tables_there_are(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     long, tabled = "A sentence that goes on. " * 20, "A sentence of the table."
-    table = TextTable(title="Findings", header=("finding",), rows=((tabled,),))
+    table = Table(title="Findings", header=("finding",), rows=((tabled,),))
     summary = {"number": float("nan"), "note_on_depths": long, "remarks": [tabled, "Another."], "chart_remarks": [long]}
-    outcome = Outcome(files=(), summary=summary, tables=(table,))
+    outcome = Outcome(files=(), document=document_of(summary, (table,)))
     print_summary(outcome)
     told = capsys.readouterr().out
     assert [told.count(text) for text in (tabled, "Another.", f"note on depths: {long}", f"chart remarks: {long}")] == [

@@ -78,7 +78,7 @@ def test_the_command_tells_what_is_missing_and_ends_as_a_defect(
 ):
     data, ship = write(tmp_path / "run.csv", sail(trial()[:200])), vessel_file(tmp_path / "ship.toml")
     if place == "page":
-        monkeypatch.setattr(command, "estimate_html", broken)
+        monkeypatch.setattr(command, "document_html", broken)
     else:
         from expdesign.export.estimate_page import page
 

@@ -12,13 +12,14 @@ from scipy.stats import binomtest
 from design_case import SCENARIOS
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import InputError
-from expdesign.export.foresight_page import (
+from expdesign.export.operation_page import (
     OperationContent,
-    operation_html,
+    operation_document,
     operation_json,
     operation_rows,
     operation_sentences,
 )
+from expdesign.export.pages import document_html
 from expdesign.foresight import OperationForesight, foresee_operation, interval
 from expdesign.foresight.operation import changed, hidden_changes, ordinary_orders, voyage
 from expdesign.processes import local_processes
@@ -99,7 +100,7 @@ def test_intervals_are_exact(count: int, trials: int) -> None:
 
 def test_page_file_and_table_agree(found: OperationForesight) -> None:
     content = OperationContent(scenario="story", vessel="tender", found=found, command="expdesign foresee", version="0")
-    told, page = json.loads(operation_json(content)), operation_html(content)
+    told, page = json.loads(operation_json(content)), document_html(operation_document(content))
     assert [row["found"] for row in told["changes"]] == [item.found for item in found.rows]
     assert f"{found.nominal} voyages" in told["sentences"][0]
     for row in operation_rows(found):

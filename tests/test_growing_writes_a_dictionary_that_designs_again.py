@@ -53,7 +53,7 @@ def test_the_written_dictionary_gives_the_same_design_without_searching(grown, t
 def test_every_addition_is_reported_with_its_gain(grown):
     folder, outcome = grown
     growth = json.loads((folder / "growth.json").read_text())
-    (table,) = (item for item in outcome.tables if item.title.startswith("Manoeuvres added"))
+    (table,) = (item for item in outcome.document.tables if item.title.startswith("Manoeuvres added"))
     assert len(table.rows) == len(growth["rounds"]) == outcome.summary["manoeuvres_added"] > 0
     names = [spec.name for spec in load_dictionary(folder / "dictionary-grown.toml")]
     assert [row["name"] for row in growth["rounds"]] == names[-len(table.rows) :]

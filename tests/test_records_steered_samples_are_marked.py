@@ -82,6 +82,6 @@ def test_estimates_say_which_samples_they_used(tmp_path: Path) -> None:
     assert "500 of 2000 samples are marked as steered" in (tmp_path / "out" / "estimate.html").read_text(
         encoding="utf-8"
     )
-    (table,) = (item for item in outcome.tables if item.title == "Samples used")
+    (table,) = (item for item in outcome.document.tables if item.title == "Samples used")
     by_equation = "du/dt 1498, dv/dt 1498, dr/dt 1498"
     assert ("iv", "1498", by_equation, "500", "left out") in table.rows

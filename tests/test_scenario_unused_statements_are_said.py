@@ -8,11 +8,12 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.cli.summary import print_summary
+from expdesign.export.document import Table
 from expdesign.scenario import load_scenario
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import column_name
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, document_of
 from scenario_files import spoil, write_scenario
 
 WIND, CURRENT, UNREAD, CERTAIN = (
@@ -133,6 +134,7 @@ def test_a_command_says_them_on_the_terminal(tmp_path, capsys):
 @pytest.mark.parametrize("key", ["remarks", "chart_remarks", "notes", "note_on_broken_off"])
 def test_what_must_be_heard_is_told_beside_tables_however_long(capsys, key):
     long = " ".join(str(number) for number in range(200))
-    table = TextTable(title="a", header=("b",), rows=(("c",),))
-    print_summary(Outcome(files=(), summary={key: long if key.startswith("note_") else [long]}, tables=(table,)))
+    table = Table(title="a", header=("b",), rows=(("c",),))
+    summary = {key: long if key.startswith("note_") else [long]}
+    print_summary(Outcome(files=(), document=document_of(summary, (table,))))
     assert long in " ".join(capsys.readouterr().out.split())

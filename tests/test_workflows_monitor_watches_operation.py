@@ -69,7 +69,7 @@ def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture
 def no_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that look at no page: drawing it takes longer than an hour's watch."""
-    monkeypatch.setattr("expdesign.workflows.data.monitor.monitor_html", lambda content: "")
+    monkeypatch.setattr("expdesign.workflows.data.monitor.document_html", lambda document: "")
 
 
 def told_in(folder: Path) -> dict[str, object]:

@@ -10,6 +10,7 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.errors import NoPlan, NotInformative
+from expdesign.export.document import Document
 from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.workflows.outcome import Outcome
@@ -56,7 +57,7 @@ def test_earlier_results_stay_and_are_named_as_such(tmp_path):
 
 def finished(folder: Path, name: str) -> Outcome:
     """A command that writes one file into a folder."""
-    return written(load_scenario(SCENARIOS / "story.toml"), folder, {name: "{}"}, {}, silent)
+    return written(load_scenario(SCENARIOS / "story.toml"), folder, {name: "{}"}, Document(), silent)
 
 
 def test_a_plan_that_is_found_takes_an_earlier_draft_away_and_other_results_do_not(tmp_path):

@@ -35,9 +35,10 @@ def test_three_files_give_the_load_and_say_what_they_do_not_tell(tmp_path: Path)
 
 def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
-    found = roll(three(tmp_path), tmp_path / "out", loads=loads).summary
+    outcome = roll(three(tmp_path), tmp_path / "out", loads=loads)
+    found = outcome.summary
     assert (found["rank"], found["free"], found["held"]) == (8, 8, [])
-    assert "wrong sign" not in str(found["remarks"])
+    assert "wrong sign" not in str(outcome.document)
     values, stds = found["parameters"], found["std"]
     assert isinstance(values, dict)
     assert isinstance(stds, dict)
@@ -54,8 +55,8 @@ def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
         np.savetxt(
             path, np.column_stack([table[n] for n in names.split(",")]), delimiter=",", header=names, comments=""
         )
-    remarks = roll(files, tmp_path / "out", loads=loads).summary["remarks"]
-    assert "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign" in str(remarks)
+    notes = roll(files, tmp_path / "out", loads=loads).document.all_notes
+    assert "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign" in str(notes)
     assert "wrong sign" in (tmp_path / "out" / "roll.html").read_text()
 
 

@@ -8,7 +8,8 @@ import pytest
 from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
-from expdesign.export.whatif_page import Case, WhatIfContent, whatif_html
+from expdesign.export.pages import document_html
+from expdesign.export.whatif_page import Case, WhatIfContent, whatif_document
 from expdesign.scenario import load_scenario, load_variant
 from scenario_files import write_scenario
 
@@ -152,12 +153,12 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
     assert content.against(half).track == pytest.approx(0.5)
     assert content.against(half).accuracy == pytest.approx(1.0)
     assert content.against(unknown).track is None
-    page = whatif_html(content)
+    page = document_html(whatif_document(content))
     assert 'id="days-' in page
     assert page.count("Legs included, the day has 0.50 times the information of the scenario") == 1
     asked = replace(case_of("asked", track=None, day_s=0.0, legs_count=True), plan={})
     unplanned = WhatIfContent(cases=(first, asked), planned=False, command="", version="")
-    assert whatif_html(unplanned).count("These durations only state its accuracy;") == 1
+    assert document_html(whatif_document(unplanned)).count("These durations only state its accuracy;") == 1
     for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
         assert f">{minutes}<" in page
 
@@ -170,7 +171,7 @@ def test_where_legs_count_whole_days_are_compared_and_not_runs():
     np.testing.assert_allclose(against.ratios, np.sqrt([2.0, 0.5]))
     assert against.accuracy == against.track == pytest.approx(1.0)
     assert against.same_accuracy_s is None
-    assert "Legs count in its accuracy, so whole days are compared." in whatif_html(content)
+    assert "Legs count in its accuracy, so whole days are compared." in document_html(whatif_document(content))
 
 
 def test_what_a_case_does_not_use_is_said_of_it_and_of_all_only_once(tmp_path, capsys):

@@ -1,46 +1,32 @@
-"""Output of a finished command on stdout: key numbers and the place of the results, or the same as JSON."""
+"""A finished command's document on stdout: for people, or as JSON."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as Columns
 
 if TYPE_CHECKING:
-    from expdesign.workflows import Outcome, TextTable
-
-UNITS = {
-    "s": "s",
-    "m": "m",
-    "mps": "m/s",
-    "radps": "rad/s",
-    "rad": "rad",
-    "deg": "°",
-    "kn": "kn",
-    "rps": "1/s",
-    "kg": "kg",
-    "h": "h",
-}
-"""Last part of a name -> printed unit."""
-SENTENCES = ("remarks", "judgements", "notes")
-"""Entries of a summary with sentences, one line each, that need no words before them; others end so or are notes."""
-LONGEST = 200
-"""Characters of a list beside its name; longer ones are left to the tables."""
+    from expdesign.export.document import Table
+    from expdesign.workflows import Outcome
 
 
 def as_json(command: str, outcome: Outcome) -> str:
-    """One JSON object: `command`, `files` written, the workflow's `summary`, and the `notes` of its page."""
+    """One JSON object: `command`, `files` written, and the document's `summary`, `verdict`, `findings` and `notes`."""
+    document = outcome.document
     content = {
         "command": command,
         "files": [str(path) for path in outcome.files],
-        "summary": outcome.summary,
-        "notes": list(outcome.notes),
+        "summary": document.summary,
+        **({} if document.mark is None else {"verdict": document.mark.text}),
+        "findings": list(document.findings),
+        "notes": list(document.all_notes),
     }
     return json.dumps(_known(content), indent=2, ensure_ascii=False, allow_nan=False)
 
@@ -61,27 +47,32 @@ def unverified(summary: Mapping[str, object]) -> str:
 
 
 def print_summary(outcome: Outcome) -> None:
-    """Key numbers and tables, what the page finds and warns of beside them, then the files and the page to open."""
+    """Facts, tables, findings and notes of the document, then the files and the page to open."""
+    from expdesign.export.document import fact_rows, listings
+
+    document = outcome.document
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    table = Table(show_header=False, box=None, padding=(0, 3, 0, 0))
-    shown = {
-        key: value
-        for key, value in outcome.summary.items()
-        if not _is_told(key) and not _among_notes(value, outcome) and (not outcome.tables or _brief(value))
-    }
-    for row in _rows(shown):
+    if document.title:
+        console.print(f"{document.kind}: {document.title}", style="bold")
+    if document.mark is not None:
+        console.print(document.mark.text, style="bold")
+    table = Columns(show_header=False, box=None, padding=(0, 3, 0, 0))
+    for row in fact_rows(document.facts):
         table.add_row(*row)
     if table.row_count:
         console.print(table)
         console.print()
-    for text in outcome.tables:
-        _print_table(console, text)
-    lines = list(_unsaid(outcome))
-    for line in (*lines, *[""] * bool(lines)):
+    for one in document.tables:
+        _print_table(console, one)
+    for title, lines in listings(document):
+        console.print(title, style="bold")
+        console.print(*lines, sep="\n")
+        console.print()
+    for line in (*document.findings, *[""] * bool(document.findings)):
         console.print(line)
-    if outcome.notes:
+    if document.all_notes:
         console.print("Notes", style="bold")
-        for note in outcome.notes:
+        for note in document.all_notes:
             console.print(f"- {note}")
         console.print()
     for folder, names in _by_folder(outcome.files).items():
@@ -90,70 +81,15 @@ def print_summary(outcome: Outcome) -> None:
         console.print(f"Open {page} in a browser.")
 
 
-def _unsaid(outcome: Outcome) -> Iterator[str]:
-    """Notes and remarks of the summary that no table has, after what they are on."""
-    said = {cell for text in outcome.tables for row in text.rows for cell in row}
-    for key, value in outcome.summary.items():
-        if _is_told(key):
-            lines = (value,) if isinstance(value, str) else value
-            start = "" if key in SENTENCES else f"{key.replace('_', ' ')}: "
-            yield from (f"{start}{line}" for line in lines if line not in said and line not in outcome.notes)  # type: ignore[attr-defined]
-
-
-def _is_told(key: str) -> bool:
-    """Whether an entry has sentences, one line each."""
-    return key.startswith("note") or key.endswith(SENTENCES)
-
-
-def _brief(value: object) -> bool:
-    """Whether a value gets a line beside tables: no table of its own, and no long list."""
-    if isinstance(value, (list, tuple)):
-        return bool(value) and len(_text(value)) < LONGEST
-    return not isinstance(value, Mapping)
-
-
-def _among_notes(value: object, outcome: Outcome) -> bool:
-    """Whether an entry is a list of what the notes say anyway."""
-    return isinstance(value, (list, tuple)) and bool(value) and set(map(str, value)) <= set(outcome.notes)
-
-
-def _print_table(console: Console, text: TextTable) -> None:
+def _print_table(console: Console, table: Table) -> None:
     """Title, header and rows, each line as long as it needs to be."""
-    widths = [max(map(len, column)) for column in zip(text.header, *text.rows, strict=True)]
-    console.print(text.title, style="bold")
-    for index, row in enumerate((text.header, *text.rows)):
+    rows = [[cell.replace("\n", ", ") for cell in row] for row in (table.header, *table.rows)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    console.print(table.title, style="bold")
+    for index, row in enumerate(rows):
         line = "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         console.print(line, style="" if index else "underline")
     console.print()
-
-
-def _rows(summary: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """(label, value with unit) of every entry, nested ones after the name of their parent."""
-    for key, value in summary.items():
-        stem, _, suffix = key.rpartition("_")
-        unit = UNITS.get(suffix, "") if stem else ""
-        label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
-        if isinstance(value, Mapping):
-            yield from _rows(value, f"{label}, ")
-        else:
-            text = _text(value)
-            yield label, text if text == "-" else f"{text} {unit}".rstrip()
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float) and not math.isfinite(value):
-        return "-"
-    if isinstance(value, float):
-        return f"{value:.0f}" if 1e4 <= abs(value) < 1e9 else f"{value:.5g}"
-    if isinstance(value, Mapping):
-        return " ".join(_text(part) for part in value.values())
-    if isinstance(value, (list, tuple)):
-        return ", ".join(_text(part) for part in value)
-    return str(value)
 
 
 def _by_folder(files: tuple[Path, ...]) -> dict[str, list[str]]:

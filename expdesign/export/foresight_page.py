@@ -1,16 +1,17 @@
-"""What a diagnosis would find, before the trial is sailed: page, JSON and table."""
+"""What a diagnosis would find, before the trial is sailed: JSON and documents."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from expdesign.export import words
+from expdesign.export.document import Document, Figure, Table, filled, section
 from expdesign.export.files import finite, strict_json
-from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
@@ -19,10 +20,9 @@ from expdesign.export.pages.figures import (
     new_figure,
     page_figure,
     plain,
-    report_style,
     svg,
 )
-from expdesign.foresight import TOLD_APART, AddedRuns, Detectability, Foreseen, Foresight, OperationForesight, interval
+from expdesign.foresight import TOLD_APART, AddedRuns, Foreseen, Foresight
 
 # Power, confusions and added runs as JSON and as rows for people.
 
@@ -31,15 +31,15 @@ HALF = 0.5
 MOST_LISTED = 5
 """Largest number of causes in a sentence."""
 HEADER = (
-    "cause",
-    "least visible as",
-    "a size that matters",
-    "power",
-    "found",
-    "named",
+    "Cause",
+    "Least visible as",
+    "A size that matters",
+    "Power",
+    "Found",
+    "Named",
     "90 % from",
     "90 % with",
-    "not told from",
+    "Not told from",
 )
 """Columns of the table for people."""
 
@@ -200,124 +200,6 @@ def _added(runs: AddedRuns | None) -> dict[str, object] | None:
     return None if runs is None else {"runs": dict(runs.runs), "time_s": runs.time_s}
 
 
-# What a watch over a ship in operation would find: page, JSON and table.
-
-OPERATION_HEADER = ("change", "by", "found", "95 %", "median delay", "named rightly", "or as likely", "else taken for")
-"""Columns of the table for people."""
-FINDS = 0.5
-"""Share of voyages from which a change counts as found."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class OperationContent:
-    """The values that page and file show."""
-
-    # scenario, vessel: their names
-    scenario: str
-    vessel: str
-    found: OperationForesight  # what is foreseen
-    # command, version: to reproduce it
-    command: str
-    version: str
-
-
-def operation_rows(found: OperationForesight) -> tuple[tuple[str, ...], ...]:
-    """One row for each change and size, in the order of `OPERATION_HEADER`."""
-    return tuple(_row(item) for item in found.rows)
-
-
-def _row(item: Detectability) -> tuple[str, ...]:
-    low, high = interval(item.found, item.voyages)
-    return (
-        item.change,
-        f"{100.0 * item.size:g}{words.NB}%",
-        f"{item.found} of {item.voyages}",
-        f"{100 * low:.0f} to {100 * high:.0f} %",
-        words.duration(item.delay_s) if math.isfinite(item.delay_s) else "more than a voyage",
-        f"{item.named} of {item.found}",
-        f"{item.likely} of {item.found}",
-        ", ".join(f"{name} ({count})" for name, count in item.taken_for) or NONE,
-    )
-
-
-def operation_sentences(found: OperationForesight) -> tuple[str, ...]:
-    """What follows, in sentences."""
-    return tuple(_sentences_operation(found))
-
-
-def _sentences_operation(found: OperationForesight) -> Iterator[str]:
-    low, high = interval(found.false_alarms, found.nominal)
-    yield (
-        f"Of {words.counted(found.nominal, 'voyage')} of {words.duration(found.voyage_s)} without a change, "
-        f"{found.false_alarms or 'none'} raised an alarm (95 % interval of the share: {100 * low:.0f} to "
-        f"{100 * high:.0f} %). The threshold allows one in {found.false_alarm_days:g} days at most."
-    )
-    for change in dict.fromkeys(item.change for item in found.rows):
-        own = sorted((item for item in found.rows if item.change == change), key=lambda item: item.size)
-        first = next((item for item in own if item.found >= FINDS * item.voyages), None)
-        if first is None:
-            yield f"{_named(own[-1])} is found in {own[-1].found} of {own[-1].voyages} voyages only."
-            continue
-        yield (
-            f"{_named(first)} is found in {first.found} of {first.voyages} voyages, after "
-            f"{words.duration(first.delay_s)} in half of them."
-        )
-    for item in found.rows:
-        if item.taken_for and item.found - item.named > FINDS * item.found:
-            name, count = item.taken_for[0]
-            wrong, told = item.found - item.named, item.likely - item.named
-            yield (
-                f"{_named(item)} is mostly taken for another change: in {wrong} of "
-                f"{words.counted(item.found, 'alarm')}, most often for {name} ({count}). Of these, {told or 'none'} "
-                "say that the right one explains the data as well."
-            )
-    if found.not_watched:
-        yield f"These sensors and voyages give no information about {', '.join(found.not_watched)}."
-
-
-def _named(item: Detectability) -> str:
-    return f"{item.change.capitalize()} by {100.0 * item.size:g} %"
-
-
-def operation_json(content: OperationContent) -> str:
-    """The content as JSON; a delay of null is longer than a voyage."""
-    found = content.found
-    rows = []
-    for item in found.rows:
-        table = {**asdict(item), "delay_s": item.delay_s if math.isfinite(item.delay_s) else None}
-        table["found_interval"] = interval(item.found, item.voyages)
-        rows.append(table)
-    return strict_json(
-        {
-            "vessel": content.vessel,
-            "sentences": operation_sentences(found),
-            "voyage_s": found.voyage_s,
-            "reference_s": found.reference_s,
-            "voyages_without_change": found.nominal,
-            "false_alarms": found.false_alarms,
-            "false_alarm_days": found.false_alarm_days,
-            "changes": rows,
-            "watched": found.watched,
-            "not_watched": found.not_watched,
-        }
-    )
-
-
-def operation_html(content: OperationContent) -> str:
-    """One HTML page without any outside reference."""
-    return page_template("operation.html").render(
-        content=content,
-        sentences=operation_sentences(content.found),
-        header=OPERATION_HEADER,
-        rows=operation_rows(content.found),
-        lasts=words.duration(content.found.voyage_s),
-        learns=words.duration(content.found.reference_s),
-    )
-
-
-# The page on what a diagnosis would find.
-
-
 @page_figure
 def power_figure(found: Foresight) -> str:
     """Probability that the test accepts each cause, that held-out runs show it too, and that it is named first."""
@@ -344,23 +226,76 @@ def _name(item: Foreseen) -> str:
     return item.cause if item.cause.endswith(f":{item.name}") else f"{item.cause}: {item.name}"
 
 
-def foresight_html(content: ForesightContent) -> str:
-    """One HTML page without any outside reference."""
+PAIR_HEADER = ("Hidden", "also explained by", "cosine", "noncentrality left", "told apart")
+EVERY_HEADER = (
+    "Cause", "acts as", "size that matters", "power", "found", "because of", "noncentrality", "90 % from",
+)  # fmt: skip
+
+
+def foresight_document(content: ForesightContent) -> Document:
+    """What a diagnosis would find, for people."""
     found = content.found
-    with report_style():
-        figure = power_figure(found)
-    return page_template("foresee.html").render(
-        content=content,
-        found=found,
-        figure=figure,
-        lasts=words.duration(found.duration_s),
-        conclusions=conclusions(found),
-        header=HEADER[:-1],
-        rows=[row[:-1] for row in foresight_rows(found)],
-        pairs=_pairs(found),
-        together=None if found.together is None else runs_text(found.together),
-        every=[_every(item) for item in found.effects],
+    more = f". All effects that can reach it need {runs_text(found.together)}" if found.together else ""
+    return Document(
+        kind="A diagnosis before sailing",
+        title=content.scenario,
+        name=f"What a diagnosis of {content.scenario} would find",
+        about=f"{content.vessel}: {content.source}, {words.duration(found.duration_s)}.",
+        findings=conclusions(found),
+        facts={"diagnosed_s": found.duration_s, "causes_tested": len(found.weakest)},
+        values={
+            "trial": content.source,
+            "causes_missed": list(found.missed),
+            "causes_not_seen": [cause for cause, _ in found.unseen],
+            "not_told_apart": [
+                f"{item.cause} ({item.name}) from {other.cause}" for item, other in found.not_told_apart
+            ],
+        },
+        sections=filled(
+            section(
+                "Power",
+                Figure(draw=partial(power_figure, found), caption=POWER),
+                Table(header=HEADER, rows=foresight_rows(found), texts=2),
+                "\u201c90 % from\u201d is the size that the test accepts with that probability; \u201c90 % with\u201d "
+                f"are the runs of one manoeuvre that reach 90 % at the size that matters in the least time{more}.",
+            ),
+            section("Not told apart", Table(header=PAIR_HEADER, rows=_pairs(found), texts=2), APART),
+            section(
+                "Every effect",
+                Table(header=EVERY_HEADER, rows=[_every(item) for item in found.effects], texts=2, on="page"),
+            ),
+            section("Method", METHOD),
+        ),
+        command=content.command,
+        version=content.version,
     )
+
+
+POWER = (
+    "Probabilities for the effect of each cause with the least power, at the smallest size that matters. Pale bars: "
+    "the test accepts it. Dark bars: a diagnosis finds it, which also asks for a better simulation or prediction of "
+    "held-out runs. Diamonds: a diagnosis finds it, and it explains the data better than every other cause. The broken "
+    "line is the wanted power."
+)
+APART = (
+    "The cosine compares the effects of both causes on the measured signals, after those of all nuisance parameters "
+    "are removed. The noncentrality left is that of the hidden cause where the other one is estimated too. Told apart: "
+    "the share of trials in which the likelihood prefers the right cause by the margin that a diagnosis asks for, "
+    "among those in which its test finds it."
+)
+METHOD = (
+    "The trial is simulated with nothing hidden, with the sensors of the vessel file and the weather of the forecast, "
+    "and its diagnosis is begun. The sensitivity of the simulated signals to each cause, beside uncertain parameters, "
+    "initial states and a wandering current, gives the noncentrality of the cause's test; the level is that at which a "
+    "diagnosis accepts a cause, its many tests counted. A size matters if it changes the advance, the tactical "
+    "diameter or a first overshoot of the ship's own standard trials by 5 % (an overshoot by at least half a degree) "
+    "or costs 5 points of fit in simulating them and a stop, whichever is less; a parameter, from three of its stated "
+    "standard deviations on. Where standard trials show nothing of an effect, a default counts. The motion answers "
+    "each effect linearly; sizes other than those that matter are in proportion. The true ship is taken to be the "
+    "model in use, with parameters as wrong as the vessel file says. A diagnosis also asks that a cause improves the "
+    "simulation of runs that it was not fitted to: with few runs it finds weak causes less often than "
+    "its test accepts them."
+)
 
 
 def _every(item: Foreseen) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Results of an import: the mapping as a file, lines for a vessel file, JSON, tables and a page."""
+"""Results of an import: the mapping as a file, lines for a vessel file, JSON and a document."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from markupsafe import Markup
 
+from expdesign.export.document import Document, Figure, Listing, Table, filled, section
 from expdesign.export.files import finite, strict_json
-from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import GREY, LINES, drawn, light_grid, new_figure, page_figure, svg
+from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, page_figure, svg
+from expdesign.export.words import counted
 from expdesign.importing import Followed, Log, Run, Sampled, inputs_of
 from expdesign.importing import Mapping as Decisions
 from expdesign.vessel import response_keys, stem
@@ -219,14 +221,58 @@ def earlier_files(folder: Path) -> set[str]:
         return set()
 
 
-def import_html(content: ImportContent) -> str:
-    """One HTML page without any outside reference."""
-    track, times = drawn([lambda: _track(content), lambda: _series(content)])
-    return page_template("import.html").render(
-        content=content, track=track, times=times, channels=channel_rows(content), unused=unused_rows(content),
-        runs=run_rows(content), responses=response_rows(content),
-        sensors=[(key, f"{value:.4g}", words) for key, (value, words) in content.sensors.items()],
-    )  # fmt: skip
+def import_document(content: ImportContent, folder: Path) -> Document:
+    """The import for people; its runs are in `folder`."""
+    step = f"{content.sampled.sample_time_s:g} s"
+    clocks = " ".join(f"{log.source}: {log.clock}." for log in content.logs)
+    steered = any(inputs_of(run.stretch.columns) for run in content.runs)
+    sensors = [(key, f"{value:.4g}", words) for key, (value, words) in content.sensors.items()]
+    parts = filled(
+        section("Rejected", Table(header=("Where", "Why"), rows=content.rejected, texts=2)),
+        section(
+            "Channels that are used",
+            Table(header=("Column", "Channel", "Unit", "Times", "Why"), rows=channel_rows(content), texts=5),
+            "mapping.toml holds these decisions. Change what is wrong, and import again with --map mapping.toml.",
+        ),
+        section("Not used", Table(header=("Log", "Channel", "Why"), rows=unused_rows(content), texts=3)),
+        section(
+            "How actuators follow their orders",
+            Table(header=("Signal", "Rate per second", "Lag s", "Dead time s", "Left"), rows=response_rows(content)),
+            "Fitted to orders and positions reached; vessel-lines.toml has them as lines of a vessel file.",
+        ),
+        section("Sensors", Table(header=("Key under [sensors]", "Value", "From"), rows=sensors)),
+    )
+    return Document(
+        kind="Imported logs",
+        title=", ".join(log.source for log in content.logs),
+        name="Imported logs",
+        about=f"{counted(len(content.runs), 'run')} in steps of {step}. {clocks}",
+        facts={
+            "runs": len(content.runs),
+            "channels_used": sum(bool(use.column) for use in content.mapping.uses),
+            "sample_time_s": content.sampled.sample_time_s,
+        },
+        values={
+            "logs": [f"{log.source}: {log.clock}, {len(log.channels)} channels" for log in content.logs],
+            "runs_rejected": [f"{where}: {why}" for where, why in content.rejected],
+        },
+        sections=(
+            section(
+                "Runs",
+                Table(header=("File", "What", "Begins", "Lasts s", "Approach s"), rows=run_rows(content), texts=3),
+                Figure(draw=partial(_track, content), caption="Way over ground; runs in colour."),
+                Figure(
+                    draw=partial(_series, content),
+                    caption="What is written, over the time from the first row on; runs shaded.",
+                ),
+            ),
+            *parts,
+            *([section("Next", Listing((f"expdesign estimate {folder} --vessel VESSEL.toml",)))] if steered else []),
+        ),
+        notes=content.notes,
+        command=content.command,
+        version=content.version,
+    )
 
 
 def _thin(count: int) -> slice:

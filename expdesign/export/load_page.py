@@ -1,4 +1,4 @@
-"""Results of load plans: JSON, load cases as files, sentences, tables and a page."""
+"""Results of load plans: JSON, load cases as files, and a document."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign.export.document import Document, Listing, Table, section
 from expdesign.export.files import finite, strict_json
-from expdesign.export.pages import page_template
-from expdesign.export.words import counted
+from expdesign.export.words import counted, ship
 from expdesign.loading import LoadOption, LoadPlan
 from expdesign.roll import MEANINGS, UNITS
 
-# A load plan as JSON, tables, sentences and a page, and the files of its load cases.
-
-CASE_HEADER = ("case", "load", "runs", "manoeuvres", "time [s]")
-PRECISION_HEADER = ("parameter", "meaning", "value", "std before", "std after, at least", "unit")
-STEP_HEADER = ("load cases", "loads", "efficiency", "smallest relative sensitivity")
+CASE_HEADER = ("Case", "Load", "Runs", "Manoeuvres", "Time [s]")
+PRECISION_HEADER = ("Parameter", "Meaning", "Value", "Std before", "Std after, at least", "Unit")
+STEP_HEADER = ("Load cases", "Loads", "Efficiency", "Smallest relative sensitivity")
 
 HARDLY = 0.5
 """Relative standard deviation from which a parameter is said to be hardly determined."""
@@ -195,15 +193,55 @@ def loads_toml(content: LoadContent) -> str:
     return "\n".join(lines) + "\n"
 
 
-def load_plan_html(content: LoadContent) -> str:
-    """One HTML page without any outside reference."""
-    return page_template("load_plan.html").render(
-        content=content,
-        sentences=load_sentences(content),
-        case_header=[name.capitalize() for name in CASE_HEADER],
-        case_rows=case_rows(content),
-        precision_header=[name.capitalize() for name in PRECISION_HEADER],
-        precision_rows=precision_rows(content),
-        step_header=[name.capitalize() for name in STEP_HEADER],
-        step_rows=step_rows(content),
+def load_document(content: LoadContent) -> Document:
+    """The plan for people."""
+    plan, vessel = content.plan, content.plan.question.vessel
+    waves = (
+        "the waves of [roll.waves], met on all courses alike"
+        if vessel.pendulum is not None and vessel.pendulum.waves
+        else "no waves, as the vessel file has no [roll.waves]"
+    )
+    return Document(
+        kind="Roll trial: loads and manoeuvres",
+        title=content.scenario,
+        name="Loads and manoeuvres of a roll trial",
+        about=f"{ship(vessel)}. Known loads change how she rolls; from the change follow her inertia, damping, "
+        "righting moment and the weight of an unknown load.",
+        findings=load_sentences(content),
+        facts={
+            "runs": int(plan.repeats.sum()),
+            "efficiency": plan.chosen.efficiency,
+            "smallest_relative_sensitivity": float(plan.chosen.smallest),
+        },
+        values={
+            "scenario": content.scenario,
+            "load_cases": [option.name for option in content.options],
+            "gap": plan.design.gap,
+        },
+        sections=(
+            section(
+                "Load cases, in this order",
+                Table(header=CASE_HEADER, rows=case_rows(content), texts=4),
+                "Heights are above the origin of the vessel file\u2019s heights. Every run begins upright, on a "
+                "steady straight course.",
+            ),
+            section("Each load case is planned on the chart by itself", Listing(content.commands)),
+            section(
+                "What the trial will tell",
+                Table(header=PRECISION_HEADER, rows=precision_rows(content), texts=2),
+                "Standard deviations before the trial are those of the vessel file. Those after it are lower "
+                f"bounds: they count the noise of the sensors and {waves}, but not what the model of roll "
+                "misses, and an estimate by instruments reaches them only in part.",
+            ),
+            section(
+                "How many load cases",
+                Table(header=STEP_HEADER, rows=step_rows(content), texts=2),
+                "A plan with an efficiency of 0.9 needs 1/0.9 of the time for the information of the best plan "
+                "with all loads. The relative sensitivity is that of the equations along the combination of "
+                "parameters that they determine least. At 0.01 a coefficient changes by 1 % while the "
+                "parameters change by 100 %.",
+            ),
+        ),
+        command=content.command,
+        version=content.version,
     )

@@ -1,4 +1,4 @@
-"""A vessel out of a card, in a mariner's units: tables of her trials and of the sources, JSON, vessel file, page."""
+"""A vessel out of a card, in a mariner's units: JSON, vessel file, and a document with her trials and the sources."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from expdesign.export.document import Document, Table, notes_of, section
 from expdesign.export.files import finite, strict_json, vessel_toml
-from expdesign.export.pages import page_template
+from expdesign.export.words import ship
 from expdesign.particulars import Nominal, Predicted, Trial, is_usual, shown
 
-TRIAL_HEADER = ("trial", "result", "predicted", "95 % from", "to", "stated", "from particulars alone")
-FACTOR_HEADER = ("part of the forces", "source", "scatter before", "times", "scatter after")
-TAKEN_HEADER = ("thruster", "diameter", "full order", "pitch ratio", "wake", "thrust deduction")
+TRIAL_HEADER = ("Trial", "Result", "Predicted", "95 % from", "To", "Stated", "From particulars alone")
+FACTOR_HEADER = ("Part of the forces", "Source", "Scatter before", "Times", "Scatter after")
+TAKEN_HEADER = ("Thruster", "Diameter", "Full order", "Pitch ratio", "Wake", "Thrust deduction")
 RESULTS = {
     "speed_mps": "speed",
     "advance_m": "advance",
@@ -169,14 +170,35 @@ def _head(content: NominalContent) -> Iterator[str]:
     yield from content.notes
 
 
-def nominal_html(content: NominalContent) -> str:
-    """One HTML page without any outside reference."""
-    return page_template("nominal.html").render(
-        content=content,
-        trial_header=[name.capitalize() for name in TRIAL_HEADER],
-        trial_rows=trial_rows(content),
-        factor_header=[name.capitalize() for name in FACTOR_HEADER],
-        factor_rows=factor_rows(content),
-        taken_header=[name.capitalize() for name in TAKEN_HEADER],
-        taken_rows=taken_rows(content),
+def nominal_document(content: NominalContent) -> Document:
+    """The vessel for people."""
+    found = content.nominal
+    return Document(
+        kind="Nominal vessel, from particulars and stated trials",
+        title=found.vessel.name,
+        name=f"{found.vessel.name}: nominal vessel",
+        about=ship(found.vessel),
+        facts={
+            "parameters": len(found.vessel.model.names),
+            "stated_values": sum(len(one.stated) for one in found.predicted),
+        },
+        values={"vessel": found.vessel.name, "contradictions": list(found.contradictions)},
+        sections=(
+            section("To bear in mind", *notes_of(content.notes)),
+            section(
+                "Where the numbers come from",
+                Table(header=FACTOR_HEADER, rows=factor_rows(content), texts=2),
+                "Each part of the forces has the value of its source, times the number in the table. The scatter "
+                "is one standard deviation.",
+            ),
+            section("Thrusters that drive her", Table(header=TAKEN_HEADER, rows=taken_rows(content), texts=1)),
+            section(
+                "Her trials",
+                Table(header=TRIAL_HEADER, rows=trial_rows(content), texts=2),
+                "Intervals hold 95 of 100 trials of ships that the particulars and the stated values allow. "
+                "\u201cNo end\u201d: some of these ships do not come to the end of the trial.",
+            ),
+        ),
+        command=content.command,
+        version=content.version,
     )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from markupsafe import Markup
 
 from expdesign.errors import NoPlan
-from expdesign.export.pages import page_template
+from expdesign.export.document import Document, Figure, Items, section
 from expdesign.export.pages.figures import (
     BLACK,
     GREEN,
@@ -17,18 +18,15 @@ from expdesign.export.pages.figures import (
     PURPLE,
     VERMILION,
     page_figure,
-    report_style,
     svg,
 )
 from expdesign.export.report.chart import draw_position_ticks, draw_scale_and_north, sea_figure
+from expdesign.export.words import ship
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
 DRAFT_POSES = 2000  # of the track of a refused plan at most
-
-
-# One page and one table on a plan that was refused.
 
 WIDTH_IN = 6.4
 
@@ -73,7 +71,7 @@ class Refusal:
 
 
 def refused_json(refusal: Refusal) -> str:
-    """The same as `refused_html`, for programs."""
+    """The refusal for programs."""
     error, frame = refusal.error, refusal.area.frame
     place = None
     if error.place is not None:
@@ -99,13 +97,37 @@ def refused_json(refusal: Refusal) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
-def refused_html(refusal: Refusal) -> str:
-    """One HTML page without any outside reference."""
-    with report_style():
-        figure = _chart(refusal)
-    return page_template("refused.html").render(
-        content=refusal, error=refusal.error, chart=figure, legend=_legend(refusal)
+def refused_document(refusal: Refusal) -> Document:
+    """The refusal for people; the terminal has it as an error."""
+    error = refusal.error
+    place = [f"Place: {refusal.where}."] if refusal.where else []
+    helps = (
+        Items(tuple(_sentence(remedy) for remedy in error.remedies)) if error.remedies else "No remedy was looked for."
     )
+    others = f"They are of an earlier attempt, not of this one: {', '.join(refusal.earlier)}."
+    return Document(
+        kind="Refused \u2014 there is no plan, and nothing here may be sailed",
+        title=refusal.scenario,
+        name=f"Refused: {refusal.scenario}",
+        about=f"{ship(refusal.vessel)}, {refusal.area.name}",
+        sections=(
+            section(
+                "What stands in the way",
+                _sentence(error.obstacle),
+                *place,
+                Figure(draw=partial(_chart, refusal), legend=_legend(refusal)),
+            ),
+            section("What helps", helps),
+            *([section("What was tried", Items(error.tried))] if error.tried else []),
+            *([section("Other files in this folder", others)] if refusal.earlier else []),
+        ),
+        command=refusal.command,
+        version=refusal.version,
+    )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 @page_figure

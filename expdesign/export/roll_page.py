@@ -1,4 +1,4 @@
-"""Results of roll identification: JSON, sentences, tables and a page."""
+"""Results of roll identification: JSON and a document."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 
+from expdesign.export.document import Document, Mark, Table, filled, section
 from expdesign.export.files import finite, strict_json
-from expdesign.export.pages import page_template
 from expdesign.export.words import percent
 from expdesign.roll import (
     EFFECTS,
@@ -26,11 +27,9 @@ from expdesign.roll import (
     stiffness,
 )
 
-# Roll identification as JSON, tables, sentences and a page.
-
-PARAMETER_HEADER = ("parameter", "meaning", "estimate", "95 % interval", "unit")
-SCALED_HEADER = ("parameter", "at full scale", "95 % interval", "unit")
-CURE_HEADER = ("what more", "directions left open", "smallest relative sensitivity")
+PARAMETER_HEADER = ("Parameter", "Meaning", "Estimate", "95 % interval", "Unit")
+SCALED_HEADER = ("Parameter", "At full scale", "95 % interval", "Unit")
+CURE_HEADER = ("What more", "Directions left open", "Smallest relative sensitivity")
 NORMAL = 1.96
 LEAST_CHANCE = 1e-4
 """Smallest probability that is written out."""
@@ -312,15 +311,49 @@ def _parameter(content: RollContent, name: str) -> dict[str, object]:
     }
 
 
-def roll_html(content: RollContent) -> str:
-    """One HTML page without any outside reference."""
-    return page_template("roll.html").render(
-        content=content,
-        sentences=roll_sentences(content),
-        parameter_header=[name.capitalize() for name in PARAMETER_HEADER],
-        parameter_rows=parameter_rows(content),
-        scaled_header=[name.capitalize() for name in SCALED_HEADER],
-        scaled_rows=scaled_rows(content),
-        cure_header=[name.capitalize() for name in CURE_HEADER],
-        cure_rows=cure_rows(content),
+EQUATION = Markup(
+    "A<sub>1</sub> &phi;'' = &minus;(k + g S) &phi; &minus; d &phi;' + (K<sub>vd</sub> + S) a<sub>y</sub> + "
+    "K<sub>r</sub> r + K<sub>&delta;</sub> &delta;, with roll &phi;, positive to starboard, side acceleration "
+    "a<sub>y</sub>, yaw rate r and rudder &delta;. S is the first moment of all masses about the rotation axis, "
+    "negative for masses above it."
+)
+FROUDE = (
+    "By Froude\u2019s law, in the same water: in sea water, 2.5 % heavier than fresh, mass, moments and inertia of the "
+    "ship grow by as much. Damping by friction is relatively less at full scale."
+)
+SENSITIVITY = (
+    "One of these is enough where no direction is left open; the higher the sensitivity, the better. The sensitivity "
+    "is that of the coefficients of all cases to relative changes of the parameters, along the direction that the data "
+    "determine least. At 0.01 a coefficient changes by 1 % while the parameters change by 100 %."
+)
+
+
+def roll_document(content: RollContent) -> Document:
+    """The estimate for people."""
+    estimate, report = content.estimate, content.report
+    scaled = Table(header=SCALED_HEADER, rows=scaled_rows(content))
+    cures = Table(header=CURE_HEADER, rows=cure_rows(content))
+    as_long = f"The ship, {content.scale or 1.0:g} times as long as her model"
+    return Document(
+        kind="Roll and loading",
+        title=", ".join(case.name for case in estimate.problem.cases),
+        name="Roll and loading",
+        about=EQUATION,
+        mark=None if estimate.trusted else Mark(text=f"None to be trusted: {headline(content)}", good=False),
+        findings=roll_sentences(content),
+        facts={"rank": report.rank, "free": len(report.free)},
+        values={
+            "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
+            "parameters": estimate.values,
+            "std": {name: std for name, std in estimate.std.items() if name not in estimate.held},
+            "held": list(estimate.held),
+        },
+        sections=filled(
+            section("Parameters", Table(header=PARAMETER_HEADER, rows=parameter_rows(content), texts=2)),
+            section(as_long, scaled, FROUDE),
+            section("What would determine the rest", cures, SENSITIVITY),
+        ),
+        notes=content.notes,
+        command=content.command,
+        version=content.version,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from expdesign.estimation.methods import METHODS, method_named
 from expdesign.export import words
+from expdesign.export.document import Document, Figure, Section, Table, section
 from expdesign.export.files import finite, strict_json
-from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
@@ -22,7 +23,6 @@ from expdesign.export.pages.figures import (
     new_figure,
     page_figure,
     plain,
-    report_style,
     round_ticks,
     svg,
 )
@@ -320,23 +320,80 @@ def spread_figure(result: Validated) -> str:
     return svg(figure, key="spread", label="Observed over predicted standard deviation of each parameter")
 
 
-def validation_html(content: ValidationContent) -> str:
-    """One HTML page without any outside reference."""
-    predicted = next((item for item in content.results if np.isfinite(item.theory).all()), None)
-    with report_style():
-        figures = {
-            "errors": error_figure(content.results),
-            "spread": None if predicted is None else spread_figure(predicted),
-        }
-    return page_template("validation.html").render(
-        content=content,
-        judgements=judgements(content),
-        designs=[_design_row(content, item) for item in content.results],
-        tables=[(item.design, _parameter_rows(item)) for item in content.results],
-        predicted=predicted,
-        estimator=method_named(content.rehearsal.method).title,
-        figures=figures,
+PARAMETER_HEADER = (
+    "Parameter",
+    "Truth",
+    "Bias",
+    "Std. dev.\nobserved",
+    "Predicted\ntrue ship",
+    "Forecast\nnominal model",
+    "Stated\nby the estimator",
+    "95 % interval\ncontains truth",
+)
+
+
+def validation_document(content: ValidationContent) -> Document:
+    """The trials for people."""
+    rehearsal = content.rehearsal
+    return Document(
+        kind="Designs in Monte Carlo trials",
+        title=content.scenario,
+        name=f"Validation of the design of {content.scenario}",
+        about=f"{rehearsal.trials} simulated trials of each design. True ship: {rehearsal.truth.name}. Nominal model: "
+        f"{rehearsal.nominal.name}. Estimator: {method_named(rehearsal.method).title} ({rehearsal.method}).",
+        findings=judgements(content),
+        values={
+            "trials_of_each_design": rehearsal.trials,
+            "median_error": {item.design: float(np.median(item.errors)) for item in content.results},
+            "without_estimate": {item.design: item.failed for item in content.results},
+        },
+        sections=(
+            _designs(content),
+            *_accuracy(content.results),
+            *(_parameters(item) for item in content.results),
+            section(
+                "Method",
+                "Each trial simulates a number of whole runs from their entry velocities, measures them with the "
+                "sensors of the true ship, and estimates as with measured data. The prediction propagates the "
+                "sensor noise to first order. It is valid while the noise is small. Parameters are in SI units "
+                "and radians.",
+            ),
+        ),
+        command=content.command,
+        version=content.version,
     )
+
+
+def _designs(content: ValidationContent) -> Section:
+    header = ("Design", "Runs", "Median error", "95th percentile", f"Error below {ERROR_LIMIT:g}", "No estimate")
+    rows = [_design_row(content, item) for item in content.results]
+    return section(
+        "Designs",
+        Table(header=header, rows=rows, texts=2),
+        "All designs have the same informative time, up to the rounding to whole runs. The error of a trial is "
+        "the root mean square over the parameters of (estimate \u2212 truth) / |truth|.",
+        Figure(
+            draw=partial(error_figure, content.results),
+            caption="Share of trials whose error is below the value on the axis. A curve further left is better.",
+        ),
+    )
+
+
+def _accuracy(results: tuple[Validated, ...]) -> Iterator[Section]:
+    predicted = next((item for item in results if np.isfinite(item.theory).all()), None)
+    if predicted is not None:
+        caption = (
+            f"Design \u201c{predicted.design}\u201d: standard deviation observed in the trials divided by the "
+            "predicted one, with 95 % sampling error. Circles use the true ship and test the theory. Diamonds use the "
+            "nominal model, as a forecast before the trial does."
+        )
+        figure = Figure(draw=partial(spread_figure, predicted), caption=caption)
+        yield section("Predicted and observed accuracy", figure)
+
+
+def _parameters(result: Validated) -> Section:
+    table = Table(header=PARAMETER_HEADER, rows=_parameter_rows(result))
+    return section(f"Parameters, {result.design}", table)
 
 
 def _design_row(content: ValidationContent, result: Validated) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.values import Array
+from expdesign.vessel import Vessel
 
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 MOST_DECIMALS = 12
@@ -93,6 +94,12 @@ def told_apart(value: float, other: float, decimals: int = 1) -> tuple[str, str]
     if texts[0] != texts[1] or value == other or decimals > MOST_DECIMALS:
         return texts
     return told_apart(value, other, decimals + 1)
+
+
+def ship(vessel: Vessel) -> str:
+    """Her name and main dimensions."""
+    size = f"{vessel.length_m:g} m \N{MULTIPLICATION SIGN} {vessel.beam_m:g} m, draught {vessel.draught_m:g} m"
+    return f"{vessel.name} ({size})"
 
 
 def times(count: int) -> str:

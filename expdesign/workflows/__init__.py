@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.data.monitor import monitor
     from expdesign.workflows.data.watch_steps import watch_steps
     from expdesign.workflows.explanations.explain import explain
-    from expdesign.workflows.outcome import Outcome, TextTable
+    from expdesign.workflows.outcome import Outcome
     from expdesign.workflows.planning.durations import durations
     from expdesign.workflows.planning.export import check_routes, export
     from expdesign.workflows.planning.new import new

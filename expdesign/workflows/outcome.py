@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from expdesign.export.document import Document, Section, Table, fact_text
 from expdesign.vessel import NOT_ACTING_BACK, Vessel
 
 # Results of commands.
@@ -18,18 +19,58 @@ class Outcome:
     """Results of a command."""
 
     files: tuple[Path, ...]  # written, in the order of their contents
-    summary: Mapping[str, object]  # key numbers, ready for JSON; units in the names
-    tables: tuple[TextTable, ...] = ()  # the same for people where key numbers are many
-    notes: tuple[str, ...] = ()  # all that the page notes and warns of, so that nobody has to open it to be warned
+    document: Document  # what they hold, for people
+
+    @property
+    def summary(self) -> Mapping[str, object]:
+        """Key numbers, ready for JSON; units in the names."""
+        return self.document.summary
 
 
-@dataclass(frozen=True, kw_only=True)
-class TextTable:
-    """A table for a terminal."""
+def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), notes: Sequence[str] = ()) -> Document:
+    """A result that has no page, or one of its own, for terminal and JSON.
 
-    title: str  # what it shows
-    header: tuple[str, ...]  # names of the columns
-    rows: tuple[tuple[str, ...], ...]  # as many cells each
+    Args:
+        summary: key numbers; entries that end with one of `SENTENCES` hold findings, those that begin with note a note.
+        tables: each with a title.
+        notes: on the data.
+    """
+    findings, own, facts, values = list[str](), list[str](), dict[str, object](), dict[str, object]()
+    cells = {cell for table in tables for row in table.rows for cell in row}
+    for key, value in summary.items():
+        words = key.replace("_", " ")
+        if key.endswith(SENTENCES):
+            findings += (line if key in SENTENCES else f"{words}: {line}" for line in _lines(value))
+        elif key.startswith("note"):
+            own += (line if key == "notes" else f"{words}: {line}" for line in _lines(value))
+        elif not tables or _brief(value, notes):
+            facts[key] = value
+            continue
+        values[key] = value
+    return Document(
+        findings=tuple(line for line in findings if line not in {*notes, *cells}),
+        facts=facts,
+        values=values,
+        sections=tuple(Section(title=table.title, blocks=(table,)) for table in tables),
+        notes=(*own, *notes),
+    )
+
+
+def _lines(value: object) -> Iterator[str]:
+    yield from (value,) if isinstance(value, str) else map(str, value)  # type: ignore[call-overload]
+
+
+def _brief(value: object, notes: Sequence[str]) -> bool:
+    """Whether a value gets a line beside tables: no table of its own, no long list, and not what notes say."""
+    if isinstance(value, (list, tuple)):
+        return 0 < len(fact_text(value)) < LONGEST and not set(map(str, value)) <= set(notes)
+    return not isinstance(value, Mapping)
+
+
+LONGEST = 200
+"""Characters of a list that gets a line beside tables."""
+SENTENCES = ("remarks",)
+"""Endings of entries of a summary that hold sentences."""
 
 
 def note_on_roll(vessel: Vessel) -> dict[str, object]:

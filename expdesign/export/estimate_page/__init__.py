@@ -1,3 +1,5 @@
-"""The page about an estimation: one self-contained file."""
+"""The document of an estimation: parameters and which of them to use."""
 
-from expdesign.export.estimate_page.page import EstimateContent, estimate_html, estimate_notes
+from expdesign.export.estimate_page.page import EstimateContent, estimate_document
+
+__all__ = ["EstimateContent", "estimate_document"]

@@ -3,36 +3,44 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from markupsafe import Markup
 
 from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
 from expdesign.estimation.excitation import sample_notes
 from expdesign.export import words
+from expdesign.export.document import Document, Figure, Items, Section, Table, filled, notes_of, section
 from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
 from expdesign.export.files import (
     breach_sentences,
     disturbance_table,
+    estimate_warnings,
+    failure_rows,
+    fit_entries,
     fit_table,
+    limit_entries,
+    limit_table,
     motion_words,
+    parameter_entries,
+    parameter_table,
     plus_minus,
+    prediction_entries,
     prediction_table,
     prediction_title,
+    rows_entry,
+    steered_entry,
     unstable_warning,
 )
-from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import report_style
-from expdesign.progress import Progress, in_phases, silent
-from expdesign.vessel import Vessel
+from expdesign.vessel import NOT_ACTING_BACK, Vessel
 
 FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
 DRAWN_METHODS = 3  # largest number of methods in the figures of runs
-DRAWING_LOADS = 3.0  # how many figures could be drawn while the library for them loads, for the progress told
-
-
-# The content of the page.
+STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,126 +133,284 @@ def _names(best: Assessed, chosen: np.ndarray) -> str:
     return " and ".join(name for name, is_in in zip(best.one_step.outputs, chosen, strict=True) if is_in)
 
 
-DRAWING = "drawing the report"
 FACTOR = 1.959964
 """Standard deviations to either side that hold 95 % of a normal distribution."""
+LIMIT_HEADER = (
+    "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Parameter uncertainty",
+    "Fit limit by noise", "Error growth over the run", f"Error of {ASSESSMENT_TUNING.ahead_s:g} s prediction",
+)  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterRow:
-    """A parameter with one cell per method."""
-
-    name: str
-    term: str
-    before: str
-    cells: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class MethodNotes:
-    """Remarks on one method."""
-
-    name: str
-    title: str
-    how: str
-    chosen: bool
-    explained: str
-    correlation: str
-    warnings: tuple[str, ...]
-
-
-def estimate_html(content: EstimateContent, *, progress: Progress = silent) -> str:
-    """One HTML page without any outside reference."""
-    found = content.found
-    methods = [_notes(content, item) for item in found.methods]
-    page = page_template("estimate.html")
-    return page.render(
-        content=content,
-        found=found,
-        best=found.best,
-        summary=summary(content),
-        parameters=parameter_rows(content),
-        fits=fit_table(found),
-        predictions=prediction_table(found),
-        prediction_title=prediction_title(found),
-        motion=motion_words(found),
-        disturbances=disturbance_table(found),
-        limits=limit_rows(found),
-        why=[sentence(limits, run) for limits, run in zip(found.limits, found.best.runs, strict=True)],
-        ahead_s=ASSESSMENT_TUNING.ahead_s,
-        methods=methods,
-        explained=[(item.name, item.explained, item.correlation) for item in methods],
-        conditions=conditions(content),
-        advice=advice(content),
-        notes=_data_notes(content),
-        figures=_figures(content, progress),
-        sample_time_s=found.record.batches[0].sample_time_s,
+def estimate_document(content: EstimateContent) -> Document:
+    """The estimates for people."""
+    found, ship = content.found, content.vessel
+    step_s, batches = found.record.batches[0].sample_time_s, found.record.batches
+    return Document(
+        kind="Estimated manoeuvring model",
+        title=ship.name,
+        name=f"Estimate {ship.name}",
+        about=f"{words.ship(ship)}; sample time {step_s:g} s",
+        findings=tuple(summary(content)),
+        facts={
+            "runs": len(batches),
+            "samples": sum(len(batch) for batch in batches),
+            "runs_kept_apart": len(found.tests.batches),
+            "vessel_file_holds": found.best.method.name,
+        },
+        values={**estimate_values(found), **({} if ship.pendulum is None else {"note_on_roll": NOT_ACTING_BACK})},
+        sections=filled(
+            _parameters(content),
+            *_choice(content),
+            _fit(found),
+            _limits(found),
+            *_runs(content),
+            _residuals(found),
+            *_methods(content),
+            section("Current and wind", _table(disturbance_table(found), texts=3), DISTURBANCES),
+            section("Samples used", used_samples(found)),
+            section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
+        ),
+        notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(content)),
+        command=content.command,
+        version=content.version,
     )
 
 
-def estimate_notes(content: EstimateContent) -> tuple[str, ...]:
-    """The notes and warnings of the page: doubts about the data first, then advice, methods, files."""
-    record = content.found.record
-    methods = (_notes(content, item) for item in content.found.methods)
-    return (
-        *record.doubts,
-        *advice(content),
-        *conditions(content),
-        *(f"{item.name}: {warning}" for item in methods for warning in item.warnings),
-        *(note for note in _data_notes(content) if note not in record.doubts),
+def estimate_values(found: Assessment) -> dict[str, object]:
+    """More numbers, for JSON."""
+    return {
+        **({"why": found.why} if found.why else {}),
+        "parameters_of": found.motion,
+        "what_limits_the_fit": limit_entries(found),
+        "methods_left_out": list(found.left_out),
+        "methods": {
+            item.method.name: {
+                "parameters": parameter_entries(item),
+                "horizon_s": item.horizon_s,
+                "predictions": prediction_entries(found, item),
+                "fit": fit_entries(item),
+                "samples_used": item.estimate.residuals.rows,
+                "samples_used_by_equation": rows_entry(item),
+                "steered": steered_entry(item),
+                "warnings": len(estimate_warnings(found, item)),
+            }
+            for item in found.methods
+        },
+    }
+
+
+def _table(headed: tuple[tuple[str, ...], list[tuple[str, ...]]], *, texts: int = 1, title: str = "") -> Table:
+    header, rows = headed
+    return Table(title=title, header=header, rows=rows, texts=texts)
+
+
+def _parameters(content: EstimateContent) -> Section:
+    found = content.found
+    explained = tuple(f"{item.method.name}\n\u00b1 standard deviation, 95 % interval" for item in found.methods)
+    chosen = next(number for number, item in enumerate(found.methods, start=2) if item is found.best)
+    of_page = Table(
+        header=("Parameter\nits term", "Before", *explained), rows=parameter_rows(content), shaded=chosen, on="page"
+    )
+    title, (header, rows) = "Estimates, with standard deviations", parameter_table(found)
+    return section(
+        "Parameters",
+        of_page,
+        Table(title=title, header=header, rows=rows, on="terminal"),
+        f"{motion_words(found)} The model is in {content.vessel.model.form} form. The shaded column is written to the "
+        "vessel file. The standard deviations account for correlated residuals. They measure random error only, not "
+        "errors of the model structure.",
+        Figure(
+            draw=partial(interval_figure, found.methods, found.best),
+            caption="Estimates of all methods with 95 % intervals. A parameter may be absent from the true ship if its "
+            "interval contains zero.",
+        ),
     )
 
 
-def _data_notes(content: EstimateContent) -> list[str]:
-    """Notes on the files, and on methods without an answer."""
+def _choice(content: EstimateContent) -> Iterator[Section]:
+    """Which estimate to use."""
     found = content.found
-    return list(dict.fromkeys([*found.record.notes, *found.tests.notes, *found.left_out]))
+    yield section("Which estimate to use", *notes_of(advice(content)), Items(METHODS_IN_WORDS))
+    predictions = _table(prediction_table(found), title=prediction_title(found))
+    yield section(prediction_title(found), predictions, PREDICTIONS, level=3)
+    broken = conditions(content)
+    holds = "It holds in all runs, for the noise stated in the vessel file and no current."
+    yield section("Excitation condition", *(notes_of(broken) or (holds,)), level=3)
 
 
-def _figures(content: EstimateContent, progress: Progress) -> dict[str, object]:
+def _fit(found: Assessment) -> Section:
+    winds = found.best.method.name.endswith(("wind", "air"))
+    still = "in still water" + ", and, for methods with wind, in the measured wind" * winds
+    return section(
+        "Fit of the simulated output",
+        f"Each run is simulated from its first measured velocity with the measured inputs, {still}. 100 % is a perfect "
+        "fit. 0 % is as good as the mean of the measured velocity. Negative values are possible. A real current, "
+        "sensor noise and the accumulation of errors in long runs all lower the fit, even of a perfect model.",
+        _table(fit_table(found), texts=2, title="Fit of the simulated output to the measured one, in per cent"),
+    )
+
+
+def _limits(found: Assessment) -> Section:
+    header, rows = limit_table(found)
+    return section(
+        f"Causes of misfit of {found.best.method.name}",
+        MISFIT,
+        Table(header=LIMIT_HEADER, rows=limit_rows(found), texts=2, on="page"),
+        Table(header=header, rows=rows, texts=2, on="terminal"),
+    )
+
+
+def _runs(content: EstimateContent) -> Iterator[Section]:
+    """Every run as it was measured and simulated."""
     found = content.found
-    step = found.record.batches[0].sample_time_s
-    names = tuple(batch.name for batch in found.record.batches)
-    loading, drawing = in_phases(progress, DRAWING_LOADS, 3 + len(found.best.runs))
-    with report_style():
-        loading(DRAWING, 1.0)
-        figures: list[object] = []
-
-        def drawn(figure: object) -> object:
-            figures.append(figure)
-            drawing(DRAWING, len(figures) / (3 + len(found.best.runs)))
-            return figure
-
-        return {
-            "intervals": drawn(interval_figure(found.methods, found.best)),
-            "runs": [drawn(run_figure(index, content.drawn)) for index in range(len(found.best.runs))],
-            "residuals": drawn(residual_figure(found.best, names, step)),
-            "autocorrelation": drawn(autocorrelation_figure(found.best, step)),
-        }
+    figures = []
+    for number, (limits, run) in enumerate(zip(found.limits, found.best.runs, strict=True)):
+        use = "test run, not used for estimation" if run.use == "test" else "used for estimation"
+        about = " \u00b7 ".join([use, *([run.problem] if run.problem else [])])
+        caption = Markup("<b>{}</b> \u00b7 {}<br>{}").format(run.batch.name, about, sentence(limits, run))
+        figures.append(Figure(draw=partial(run_figure, number, content.drawn), caption=caption, above=True))
+    yield section("Run by run", *figures)
 
 
-def parameter_rows(content: EstimateContent) -> list[ParameterRow]:
-    """Every parameter of the model: value before, and (value with deviation, 95 % interval) per method."""
+def _residuals(found: Assessment) -> Section:
+    best, names = found.best, tuple(batch.name for batch in found.record.batches)
+    step_s = found.record.batches[0].sample_time_s
+    rows = [
+        (
+            item.method.name,
+            _listed(item.one_step.outputs, item.one_step.explained.tolist(), 3),
+            _listed(item.one_step.outputs, item.one_step.autocorrelation[1].tolist(), 2),
+        )
+        for item in found.methods
+    ]
+    header = ("Method", "Explained share of the sample-to-sample variance", "Correlation of successive residuals")
+    return section(
+        f"Residuals of {best.method.name}",
+        Figure(
+            draw=partial(residual_figure, best, names, step_s),
+            caption="One-step prediction errors, as accelerations. Dotted lines separate the runs.",
+        ),
+        Figure(
+            draw=partial(autocorrelation_figure, best, step_s),
+            caption="Autocorrelation of the residuals. White residuals stay in the grey band. A value near "
+            "\u22120.5 at the first lag indicates measurement noise. A slow decay indicates a slow effect that is "
+            "missing from the model.",
+        ),
+        Table(header=header, rows=rows, texts=3, on="page"),
+        "With noisy velocities the explained share is small or negative even for a good model: the noise of a "
+        "difference exceeds the motion between two samples. A small share is then no evidence against an estimate.",
+    )
+
+
+def _methods(content: EstimateContent) -> Iterator[Section]:
+    """How each method worked, and what it warns of."""
+    yield section("Methods and warnings")
+    for item in content.found.methods:
+        diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
+        warnings = notes_of((*item.estimate.warnings, *diverged), of=item.method.name)
+        title = f"{item.method.name}: {item.method.title}"
+        yield section(title, _how(content.found, item), *(warnings or ("No warnings.",)), level=3)
+
+
+def _how(found: Assessment, item: Assessed) -> str:
+    """Where the instruments of a method come from."""
+    if not item.uses_instruments:
+        return "No instruments."
+    source = "the parameters of the vessel file" if item.start == "nominal" else "the least-squares estimate"
+    refined = words.counted(item.estimate.refinements, "time")
+    return f"The first instruments are simulated with {source}, and refined {refined}. Subtracted mean: {found.mean}."
+
+
+def used_samples(found: Assessment) -> Table:
+    """Samples used by each method and equation, those marked as steered, what became of these; where they differ."""
+    residuals = [item.estimate.residuals for item in found.methods]
+    marked = any(batch.steered is not None for batch in found.record.batches)
+    rows = [
+        (
+            item.method.name,
+            str(item.estimate.residuals.rows),
+            ", ".join(f"d{name}/dt {count}" for name, count in rows_entry(item).items()),
+            str(steered.samples),
+            STEERED_WORDS[steered.treatment] if steered.samples else "",
+        )
+        for item in found.methods
+        for steered in (item.estimate.steered,)
+        if marked or any((own.rows_of < own.rows).any() for own in residuals)
+    ]
+    header = ("Method", "Samples used", "By equation", "Marked as steered", "Treatment of these")
+    return Table(header=header, rows=rows, texts=5)
+
+
+METHODS_IN_WORDS = (
+    Markup(
+        "<b>Least squares</b> (ls) is consistent only if the velocities are measured without noise and every force is "
+        "modelled. It has the smallest variance. With little noise it is a good choice."
+    ),
+    Markup(
+        "<b>Instrumental variables</b> (iv) remain consistent with noisy velocities under three conditions. The "
+        "simulated instruments follow the true motion. No disturbance is correlated with the inputs; feedback from a "
+        "noisy measurement to the inputs breaks this. The excitation condition holds: every velocity inside an "
+        "absolute value keeps its sign and stays clear of zero."
+    ),
+    Markup(
+        "<b>Output error</b> (oe, or oe-air with the measured wind) minimises the simulation error. It needs neither "
+        "instruments nor the excitation condition. Over whole runs it is the most accurate method if the sensors are "
+        "the only disturbance. If weather acts, or the ship is course-unstable, a horizon stops errors from "
+        "accumulating."
+    ),
+    Markup(
+        "<b>Augmented</b> methods also estimate an unknown mean current and wind. Methods <b>with measured wind</b> "
+        "use the anemometer; in strong wind only they are suitable. Without wind in the model, the hydrodynamic "
+        "parameters absorb the wind force."
+    ),
+    "A good fit on test runs is stronger evidence than a small standard deviation.",
+)
+PREDICTIONS = (
+    "Runs are left out in turn, or pieces of a few; every method estimates from the rest and predicts what was left "
+    "out, from measured velocities. Each error is a geometric mean over runs; 100 is no better than a constant."
+)
+MISFIT = (
+    "The misfit of a simulation is the accumulated effect of its one-step errors. These are split into their mean over "
+    "the run, their slow part and the rest. Each share of the squared misfit is computed by propagating one part "
+    "alone; shares are negative where parts cancel. The last column predicts from measured velocities and is relative "
+    "to the standard deviation of the motion. If it is small while the fit is bad, errors accumulate or the ship is "
+    "unstable; the model itself can still be useful."
+)
+DISTURBANCES = (
+    "Velocities to north (N) and east (E) over ground, with standard deviations to first order. Mean current and "
+    "second moments are estimated from nuisance parameters. The sum of the variances is not among them: it is a "
+    "constant, which instruments without mean do not see. Without measured wind, drag terms of water and air coincide, "
+    "and only a combination of current and wind can be estimated."
+)
+
+
+def _data_notes(content: EstimateContent) -> tuple[str, ...]:
+    """Notes on the files, doubts first, and on methods without an answer."""
+    found = content.found
+    return tuple(dict.fromkeys([*found.record.doubts, *found.record.notes, *found.tests.notes, *found.left_out]))
+
+
+def parameter_rows(content: EstimateContent) -> list[tuple[str, ...]]:
+    """Every parameter of the model: its term, value before, and value with deviation and 95 % interval per method."""
     model = content.vessel.model
     return [
-        ParameterRow(
-            name=term.name,
-            term=f"{term.expression} in d{term.equation}/dt",
-            before=words.significant(float(value)),
-            cells=tuple(_cell(item, term.name) for item in content.found.methods),
+        (
+            f"{term.name}\n{term.expression} in d{term.equation}/dt",
+            words.significant(float(value)),
+            *(_cell(item, term.name) for item in content.found.methods),
         )
         for term, value in zip(model.terms, model.parameters, strict=True)
     ]
 
 
-def _cell(item: Assessed, name: str) -> tuple[str, str]:
+def _cell(item: Assessed, name: str) -> str:
     estimate = item.estimate
     if name not in estimate.names:
-        return words.significant(estimate.held[name]), "not estimated"
+        return f"{words.significant(estimate.held[name])}\nnot estimated"
     index = estimate.names.index(name)
     value, std = float(estimate.values[index]), float(estimate.std[index])
     low, high = (words.significant(value + sign * FACTOR * std) for sign in (-1, 1))
-    return plus_minus(value, std).replace("-", words.MINUS), f"{low} to {high}"
+    return f"{plus_minus(value, std)}\n{low} to {high}".replace("-", words.MINUS)
 
 
 def limit_rows(found: Assessment) -> list[tuple[str, ...]]:
@@ -276,27 +442,6 @@ def _growth(factor: float) -> str:
 
 def _percent(value: float) -> str:
     return f"{words.number(float(value), 0)}{words.NB}%" if math.isfinite(value) else "-"
-
-
-def _notes(content: EstimateContent, item: Assessed) -> MethodNotes:
-    estimate, found = item.estimate, item.one_step
-    how = "No instruments."
-    if item.uses_instruments:
-        source = "the parameters of the vessel file" if item.start == "nominal" else "the least-squares estimate"
-        how = (
-            f"The first instruments are simulated with {source}, and refined "
-            f"{words.counted(estimate.refinements, 'time')}. Subtracted mean: {content.found.mean}."
-        )
-    diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
-    return MethodNotes(
-        name=item.method.name,
-        title=item.method.title,
-        how=how,
-        chosen=item is content.found.best,
-        explained=_listed(found.outputs, found.explained.tolist(), 3),
-        correlation=_listed(found.outputs, found.autocorrelation[1].tolist(), 2),
-        warnings=(*estimate.warnings, *diverged),
-    )
 
 
 def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:

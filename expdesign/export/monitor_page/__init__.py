@@ -1,11 +1,6 @@
-"""Results of a watch over a ship in operation: JSON, sentences and a page."""
+"""A watch over a ship in operation as JSON and a document."""
 
-from expdesign.export.monitor_page.content import (
-    Moment,
-    MonitorContent,
-    monitor_header,
-    monitor_json,
-    monitor_tables,
-    sentences,
-)
-from expdesign.export.monitor_page.page import budget_entries, monitor_html
+from expdesign.export.monitor_page.content import Moment, MonitorContent, monitor_json
+from expdesign.export.monitor_page.page import budget_entries, monitor_document
+
+__all__ = ["Moment", "MonitorContent", "budget_entries", "monitor_document", "monitor_json"]

@@ -332,14 +332,14 @@ def delay_s(content: MonitorContent, number: int) -> float:
 
 
 def monitor_header(content: MonitorContent) -> tuple[str, ...]:
-    """Header of `monitor_tables`."""
+    """Header of `monitor_rows`."""
     since_s = float(content.state.whole.since_s[0])
     anew = any(alarm.since_s < since_s for alarm in content.found)
     since = f"since {when(since_s)}" if anew else "since the watch began"
-    return ("change", "size watched for", "alarm after", since, "not distinguishable from")
+    return ("Change", "Size watched for", "Alarm after", since[:1].upper() + since[1:], "Not distinguishable from")
 
 
-def monitor_tables(content: MonitorContent) -> list[tuple[str, ...]]:
+def monitor_rows(content: MonitorContent) -> list[tuple[str, ...]]:
     """A row for each change, under `monitor_header`."""
     last = content.moments[-1] if content.moments else None
     rows: list[tuple[str, ...]] = []

@@ -9,12 +9,13 @@ of terms (absolute contributions beside each other, by manoeuvre).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
+from expdesign.export.document import Document, Figure, Table, section
 from expdesign.export.files import finite
-from expdesign.export.monitor_page.content import MonitorContent, monitor_header, monitor_tables, sentences
-from expdesign.export.pages import page_template
+from expdesign.export.monitor_page.content import MonitorContent, monitor_header, monitor_rows, sentences
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
@@ -24,7 +25,6 @@ from expdesign.export.pages.figures import (
     new_figure,
     page_figure,
     plain,
-    report_style,
     svg,
 )
 from expdesign.export.words import HOUR, SINCE_1970_S, hours, when
@@ -79,12 +79,7 @@ def budget_figure(content: MonitorContent) -> str:
     return svg(figure, key="budget", label="Share of every term in each equation, by kind of stretch")
 
 
-def budget_header() -> tuple[str, ...]:
-    """Header of `budget_tables`."""
-    return ("change", *KINDS)
-
-
-def budget_tables(content: MonitorContent) -> list[tuple[str, ...]]:
+def budget_rows(content: MonitorContent) -> list[tuple[str, ...]]:
     """A row for each change that is watched for: time to an alarm in stretches of each kind."""
     delays = delays_s(content)
     rows = [("in the data", *(hours(value) for value in content.state.budget.duration_s.tolist()))]
@@ -187,19 +182,54 @@ def _shown(content: MonitorContent) -> Sequence[int]:
     return list(dict.fromkeys([*(alarm.change for alarm in content.found), *best]))[:SHOWN]
 
 
-def monitor_html(content: MonitorContent) -> str:
-    """One HTML page without any outside reference."""
-    with report_style():
-        figures = {"statistic": statistic_figure(content), "estimate": estimate_figure(content)}
-        figures["budget"] = budget_figure(content)
-    return page_template("monitor.html").render(
-        content=content,
-        sentences=sentences(content),
-        judged=hours(content.state.judged_s),
-        left_out=hours(content.state.left_out_s),
-        header=tuple(name[0].upper() + name[1:] for name in monitor_header(content)),
-        rows=monitor_tables(content),
-        budget_header=tuple(name.capitalize() for name in budget_header()),
-        budget_rows=budget_tables(content),
-        figures=figures,
+def monitor_document(content: MonitorContent) -> Document:
+    """The watch for people."""
+    state, kinds = content.state, (kind.capitalize() for kind in KINDS)
+    alarms = len(content.found) + (0 if content.roll is None else len(content.roll.alarms))
+    return Document(
+        kind="Ship in operation",
+        title=content.vessel,
+        name=f"{content.vessel} in operation",
+        about=f"Judged in stretches of {content.calibration.stretch_s:g} s: {hours(state.judged_s)} judged, and "
+        f"{hours(state.left_out_s)} not, as they are not like the reference. Reference: "
+        f"{content.calibration.stretches} stretches.",
+        findings=sentences(content),
+        facts={"judged_h": state.judged_s / HOUR, "alarms": alarms},
+        sections=(
+            section(
+                "Statistic",
+                Figure(
+                    draw=partial(statistic_figure, content),
+                    caption="Largest log-likelihood ratio of any change that is watched for, against no change. It "
+                    "begins anew at zero whenever it falls below.",
+                ),
+                Figure(
+                    draw=partial(estimate_figure, content),
+                    caption="Each change, had it alone happened when the watch began, with 95 % intervals. The "
+                    "estimates begin anew after a change has settled.",
+                ),
+            ),
+            section(
+                "What is watched for",
+                Table(header=monitor_header(content), rows=monitor_rows(content), texts=5),
+                "\u201cAlarm after\u201d is the expected time from a change of this size to its alarm, in operation "
+                "like that of the reference. Changes that are not distinguishable raise the same alarm; a manoeuvre of "
+                "another kind would distinguish them.",
+            ),
+            section(
+                "Which manoeuvres reveal which change",
+                Figure(
+                    draw=partial(budget_figure, content),
+                    caption="Share of each term of the model in its equation, by what the ship does: sizes of the "
+                    "accelerations along the data that were compared with the model. A term that contributes little in "
+                    "a manoeuvre is not determined by it.",
+                ),
+                Table(header=("Change", *kinds), rows=budget_rows(content), texts=5, on="page"),
+                "Time that such stretches must last in all until a change of the size watched for is expected to raise "
+                "its alarm. Where it is short, such manoeuvres are the ones to watch or to sail.",
+            ),
+        ),
+        notes=content.notes,
+        command=content.command,
+        version=content.version,
     )

@@ -1,10 +1,18 @@
-"""Templates of self-contained pages: one set-up for all of them."""
+"""Self-contained pages: one set-up for their templates, and a document as a page."""
 
 from __future__ import annotations
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
+from expdesign.export.document import Block, Document, Figure, Table, fact_rows
 from expdesign.export.formats.format import xml_text
+from expdesign.progress import Progress, in_phases, silent
+
+MANY_SECTIONS = 7
+"""From which a page has links to them."""
+DRAWING = "drawing the page"
+DRAWING_LOADS = 3.0
+"""How many figures could be drawn while the library for them loads, for the progress told."""
 
 
 def page_template(name: str, *, package: str = __name__) -> Template:
@@ -21,8 +29,42 @@ def page_template(name: str, *, package: str = __name__) -> Template:
         lstrip_blocks=True,
         finalize=_shown,
     )
+    environment.filters.update(kind=lambda block: type(block).__name__, number=id)
     return environment.get_template(name)
 
 
 def _shown(value: object) -> object:
     return xml_text(value) if type(value) is str else value
+
+
+def document_html(document: Document, *, progress: Progress = silent) -> str:
+    """One HTML page without any outside reference."""
+    sections = [part for part in document.sections if not part.blocks or any(map(_on_page, part.blocks))]
+    contents = [(number, section.title) for number, section in enumerate(sections, start=1) if section.level == 2]
+    return page_template("document.html").render(
+        document=document,
+        sections=sections,
+        facts=list(fact_rows(document.facts)),
+        contents=contents if len(contents) >= MANY_SECTIONS else (),
+        drawn=_drawn([block for part in sections for block in part.blocks if isinstance(block, Figure)], progress),
+    )
+
+
+def _on_page(block: Block) -> bool:
+    return not isinstance(block, Table) or block.on != "terminal"
+
+
+def _drawn(figures: list[Figure], progress: Progress) -> dict[int, object]:
+    """Every figure, by its identity."""
+    if not figures:
+        return {}
+    from expdesign.export.pages.figures import report_style  # a page without figures does not wait for it
+
+    loading, drawing = in_phases(progress, DRAWING_LOADS, len(figures))
+    with report_style():
+        loading(DRAWING, 1.0)
+        drawn: dict[int, object] = {}
+        for number, figure in enumerate(figures, start=1):
+            drawn[id(figure)] = figure.draw()
+            drawing(DRAWING, number / len(figures))
+    return drawn

@@ -1,4 +1,4 @@
-"""Results of a step trial: JSON, sentences, tables and a page."""
+"""Results of a step trial: JSON, sentences and a document."""
 
 from expdesign.export.step_trial_page.content import (
     REPEAT_HEADER,
@@ -19,4 +19,4 @@ from expdesign.export.step_trial_page.live import (
     to_do_csv,
     to_do_table,
 )
-from expdesign.export.step_trial_page.page import step_trial_html
+from expdesign.export.step_trial_page.page import step_trial_document

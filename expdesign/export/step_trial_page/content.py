@@ -18,7 +18,7 @@ from expdesign.vessel import Vessel, column_name
 SIGNIFICANT = 0.01  # p-value below which asymmetry and hysteresis are reported as found
 
 
-REPEAT_HEADER = ("step", "begins at", "throttle", "rudder", "why")
+REPEAT_HEADER = ("Step", "Begins at", "Throttle", "Rudder", "Why")
 STATES = ("speed", "yaw rate")
 STATE_UNITS = ("m/s", "rad/s")
 
@@ -210,16 +210,16 @@ def _order(value: float) -> str:
 
 
 STEP_HEADER = (
-    "step",
-    "throttle",
-    "rudder",
-    "steady after",
+    "Step",
+    "Throttle",
+    "Rudder",
+    "Steady after",
     "U [m/s]",
     "r [rad/s]",
-    "turns",
-    "time constant",
-    "inertia",
-    "remarks",
+    "Turns",
+    "Time constant",
+    "Inertia",
+    "Remarks",
 )
 
 

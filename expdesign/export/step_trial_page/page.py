@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
-from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, report_style, svg
+from expdesign.export.document import Document, Figure, Table, filled, section
+from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, svg
 from expdesign.export.step_trial_page.content import (
     REPEAT_HEADER,
     STEP_HEADER,
@@ -18,6 +20,7 @@ from expdesign.export.step_trial_page.content import (
     repeat_rows,
     sentences,
     step_rows,
+    to_repeat,
 )
 from expdesign.step_trials import CHANNELS, StepSample, Surface
 from expdesign.values import Array
@@ -121,20 +124,76 @@ def simulation_figure(part: Validated, key: str) -> str:
 MOST_SIMULATIONS = 4
 
 
-def step_trial_html(content: StepTrialContent) -> str:
-    """One HTML page without any outside reference."""
-    parts = (*content.tests, *content.own)[:MOST_SIMULATIONS]
-    with report_style():
-        figures = {"coverage": coverage_figure(content), "surfaces": surface_figure(content)}
-        simulations = [(part, simulation_figure(part, f"simulation{place}")) for place, part in enumerate(parts)]
-    return page_template("step_trial.html").render(
-        content=content,
-        sentences=sentences(content),
-        repeat_header=[name.capitalize() for name in REPEAT_HEADER],
-        repeat_rows=repeat_rows(content),
-        step_header=[name if name[1] == " " else name.capitalize() for name in STEP_HEADER],
-        step_rows=step_rows(content),
-        nominal_rows=nominal_rows(content),
-        figures=figures,
-        simulations=simulations,
+EQUATION = Markup(
+    "m<sub>U</sub>(U, r) dU/dt + &sigma;<sub>U</sub>(U, r) = throttle, m<sub>r</sub>(U, r) dr/dt + "
+    "&sigma;<sub>r</sub>(U, r) = rudder, each after its dead time. U is the speed {}, r the yaw rate."
+)
+NOMINAL = (
+    "The steady states and time constants of the steps were compared with those of this model, beside the values that "
+    "its file stated before. What steps of speed and yaw rate do not determine, above all of sway, keeps the standard "
+    "deviation stated before. vessel-steps.toml has standard deviations and correlations: a design with prior = "
+    '"parameter_std" goes on from there. expdesign estimate with the method oe refines the parameters on the same data.'
+)
+
+
+def step_trial_document(content: StepTrialContent) -> Document:
+    """The step trial for people."""
+    trial, shown = content.trial, (*content.tests, *content.own)[:MOST_SIMULATIONS]
+    through = "through the water" if any(trial.currents) else "over ground"
+    delays = {f"delay_{CHANNELS[place]}_s": trial.delays[place][0] for place, *_ in trial.model.halves}
+    return Document(
+        kind="Step trial",
+        title=content.nominal.name if content.nominal else trial.batches[0].name,
+        name="Step trial",
+        about=EQUATION.format(through),
+        findings=sentences(content),
+        facts={
+            "throttle": trial.controls.words[0],
+            "rudder": trial.controls.words[1],
+            "holds": len(trial.holds),
+            "steps_that_count": len(trial.counted),
+            **delays,
+        },
+        values={
+            "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
+            "fit": {
+                part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves}
+                for part in (*content.own, *content.tests)
+            },
+        },
+        sections=filled(
+            section("Steps to repeat", Table(header=REPEAT_HEADER, rows=repeat_rows(content), texts=5)),
+            section(
+                "Where the model holds",
+                Figure(
+                    draw=partial(coverage_figure, content),
+                    caption="The grey region is the convex hull of what was sailed, mirrored to both sides. Outside, "
+                    "where a polynomial cannot be trusted, the surfaces keep their value at the edge.",
+                ),
+            ),
+            section(
+                "Damping and inertia",
+                Figure(
+                    draw=partial(surface_figure, content),
+                    caption="Damping is the command that holds a steady state, in the unit of the command. Inertia is "
+                    "the command per acceleration: the time constant of a step times the slope of the damping.",
+                ),
+            ),
+            section("Simulation", *(_simulation(content, place, part) for place, part in enumerate(shown))),
+            section(
+                "Nominal vessel",
+                Table(header=("Parameter", "Before", "After the steps"), rows=nominal_rows(content), texts=3),
+                NOMINAL,
+            ),
+            section("All steps", Table(header=STEP_HEADER, rows=step_rows(content), texts=10, on="page")),
+        ),
+        notes=content.notes,
+        command=content.command,
+        version=content.version,
     )
+
+
+def _simulation(content: StepTrialContent, place: int, part: Validated) -> Figure:
+    fits = (f"{'Ur'[half]} {part.fit_percent[half]:.0f} %" for half, *_ in content.trial.model.halves)
+    caption = f"{part.name}: simulated from its first state with its commands alone. Fit {', '.join(fits)}."
+    return Figure(draw=partial(simulation_figure, part, f"simulation{place}"), caption=caption)

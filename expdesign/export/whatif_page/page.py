@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
-from expdesign.export.pages import page_template
+from expdesign.export.document import Document, Figure, Listing, Section, Table, section
 from expdesign.export.pages.figures import (
     LINES,
     REPOSITION,
@@ -15,11 +16,11 @@ from expdesign.export.pages.figures import (
     new_figure,
     page_figure,
     plain,
-    report_style,
     round_ticks,
     svg,
 )
 from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
+from expdesign.export.words import counted
 
 # Figures of variants: time for the same accuracy, standard deviation of each parameter, runs.
 
@@ -48,11 +49,9 @@ def time_figure(content: WhatIfContent) -> str:
 
 
 @page_figure
-def day_figure(content: WhatIfContent) -> str | None:
-    """Length of the day against the information of its whole track, a point a case; None where no day is known."""
+def day_figure(content: WhatIfContent) -> str:
+    """Length of the day against the information of its whole track, a point a case."""
     known = [(case, against.track) for case in content.cases if (against := content.against(case)) and against.track]
-    if not known:
-        return None
     figure = new_figure(6.4, 3.6)
     axes = figure.subplots()
     for (case, share), colour in zip(known, LINES * 9, strict=False):
@@ -69,11 +68,9 @@ def day_figure(content: WhatIfContent) -> str | None:
 
 
 @page_figure
-def ratio_figure(content: WhatIfContent) -> str | None:
-    """Standard deviations over those of the scenario, for each parameter; None when nothing can be compared."""
+def ratio_figure(content: WhatIfContent) -> str:
+    """Standard deviations over those of the scenario, for each parameter."""
     compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
-    if not compared:
-        return None
     names = content.cases[0].parameters
     figure = new_figure(6.4, 1.3 + 0.26 * len(names))
     axes = figure.subplots()
@@ -112,22 +109,91 @@ def runs_figure(content: WhatIfContent) -> str:
 DAY_COLUMNS = ("day [min]", "median [min]", "95 % [min]")
 
 
-def whatif_html(content: WhatIfContent) -> str:
-    """One HTML page without any outside reference."""
-    with report_style():
-        figures = {
-            "times": time_figure(content),
-            "days": day_figure(content),
-            "ratios": ratio_figure(content),
-            "runs": runs_figure(content),
-        }
-    return page_template("whatif.html").render(
-        content=content,
-        header=table_header(content),
-        rows=[_row(content, case) for case in content.cases],
-        explanations=explanations(content),
-        figures=figures,
+def whatif_document(content: WhatIfContent) -> Document:
+    """The variants for people."""
+    first, others = content.cases[0], len(content.cases) - 1
+    rows = [table_row(content, case) for case in content.cases]
+    told = explanations(content)
+    differences = [(name, sentence) for name, sentences in told for sentence in sentences]
+    changes = {case.name: case.changes for case in content.cases}
+    compared = [content.against(case) for case in content.cases]
+    return Document(
+        kind="What if",
+        title=first.name,
+        name=f"What if: {first.name}",
+        about=f"The scenario and {counted(others, 'variant')}, compared",
+        values=whatif_values(content),
+        sections=(
+            section(
+                "Side by side",
+                Table(header=table_header(content), rows=rows, texts=2),
+                COMPARED,
+                Figure(
+                    draw=partial(time_figure, content),
+                    caption="Bars: designed time. Diamonds: time for the accuracy of the scenario. A diamond left of "
+                    "the scenario\u2019s own is better.",
+                ),
+            ),
+            *([_days(content)] if any(against and against.track for against in compared) else []),
+            *(section(name, *([Listing(changes[name])] if changes[name] else []), *lines) for name, lines in told),
+            section("Differences", Table(header=("Case", "What differs"), rows=differences, on="terminal")),
+            *([_ratios(content)] if any(compared[1:]) else []),
+            section(
+                "Runs",
+                Figure(draw=partial(runs_figure, content), caption="Number of whole runs of each manoeuvre."),
+            ),
+            section(
+                "Assumptions",
+                "The standard deviations are those of instrumental-variable estimates from the runs alone, or from "
+                "whole days where legs count, to first order in the sensor noise, with the nominal model of each case. "
+                "Prior knowledge is not included.",
+            ),
+        ),
+        command=content.command,
+        version=content.version,
     )
+
+
+def whatif_values(content: WhatIfContent) -> dict[str, object]:
+    """Numbers of every case, for JSON."""
+    differences = dict(explanations(content))
+    return {
+        "cases": {
+            case.name: {
+                "problem": case.problem or None,
+                "informative_s": case.informative_s,
+                "accuracy": None if (against := content.against(case)) is None else against.accuracy,
+                "same_accuracy_s": None if against is None else against.same_accuracy_s,
+                "differences": list(differences.get(case.name, ())),
+            }
+            for case in content.cases
+        }
+    }
+
+
+def _days(content: WhatIfContent) -> Section:
+    caption = (
+        "Points: the day as planned, and the information of its whole track, legs included, compared with the "
+        "scenario\u2019s. Lines: to the 95th percentile of the simulated trials, with a mark at the median."
+    )
+    return section("The day and what it tells", Figure(draw=partial(day_figure, content), caption=caption))
+
+
+def _ratios(content: WhatIfContent) -> Section:
+    caption = (
+        "Expected standard deviation divided by that of the scenario, from the runs, or from whole days where legs "
+        "count. Values below 1 are more accurate."
+    )
+    return section("Accuracy of each parameter", Figure(draw=partial(ratio_figure, content), caption=caption))
+
+
+COMPARED = (
+    "\u201cInformation\u201d compares the variant with the scenario, for the parameters that both estimate. 2 \u00d7 "
+    "means half the variance. It is the determinant of the information matrix, to the power 1/p for p parameters. "
+    "\u201cSame accuracy\u201d is the informative time in which the runs of the variant, in the same proportions, are "
+    "as accurate as the scenario. Where a case asks for an accuracy in the shortest day, legs count, and "
+    "whole days are compared."
+)
 
 
 def table_header(content: WhatIfContent) -> tuple[str, ...]:
@@ -153,10 +219,6 @@ def table_row(content: WhatIfContent, case: Case) -> tuple[str, ...]:
         _short(case.gap_relative),
         *((_metres(case.plan),) if content.planned else ()),
     )
-
-
-def _row(content: WhatIfContent, case: Case) -> tuple[tuple[str, ...], tuple[str, ...], str]:
-    return table_row(content, case), case.changes, case.problem
 
 
 def _short(gap: float) -> str:

@@ -29,6 +29,7 @@ from expdesign.export.diagnosis_page import (
     roll_sentences,
 )
 from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
+from expdesign.export.document import Table
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
@@ -37,7 +38,7 @@ from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import doubted, measured
 from expdesign.workflows.steps.workers import workers
 
@@ -99,7 +100,9 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(files=written, summary=summary, tables=_tables(found), notes=(*handed_over, *diagnosis_notes(found)))
+    return Outcome(
+        files=written, document=document_of(summary, _tables(found), (*handed_over, *diagnosis_notes(found)))
+    )
 
 
 def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
@@ -181,9 +184,9 @@ def _summary(found: Diagnosis) -> dict[str, object]:
     }
 
 
-def _tables(found: Diagnosis) -> tuple[TextTable, ...]:
+def _tables(found: Diagnosis) -> tuple[Table, ...]:
     fits = ("output", "fit, %", "rms error", "mean error", "fit after", "rms error after", "mean error after")
-    accuracy = TextTable(
+    accuracy = Table(
         title="Simulation of the vessel file against the data, and after what was found",
         header=fits,
         rows=tuple(accuracy_rows(found)),
@@ -191,4 +194,4 @@ def _tables(found: Diagnosis) -> tuple[TextTable, ...]:
     if not found.findings:
         return (accuracy,)
     header, rows = diagnosis_tables(found)
-    return TextTable(title="Causes of the simulation error", header=header, rows=tuple(rows)), accuracy
+    return Table(title="Causes of the simulation error", header=header, rows=tuple(rows)), accuracy

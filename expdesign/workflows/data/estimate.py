@@ -7,36 +7,16 @@ from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
-from expdesign.assessment import NO_TESTS, Assessment, EstimateOptions, assess, settled
+from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled
 from expdesign.errors import InputError
-from expdesign.export import (
-    Content,
-    disturbance_table,
-    estimate_json,
-    estimate_warnings,
-    estimated_vessel,
-    failure_rows,
-    fit_entries,
-    fit_table,
-    limit_entries,
-    limit_table,
-    parameter_entries,
-    parameter_table,
-    prediction_entries,
-    prediction_table,
-    prediction_title,
-    rows_entry,
-    steered_entry,
-    write_files,
-)
-from expdesign.export.estimate_page import EstimateContent, estimate_html, estimate_notes
+from expdesign.export import Content, estimate_json, estimated_vessel, write_files
+from expdesign.export.estimate_page import EstimateContent, estimate_document
+from expdesign.export.pages import document_html
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import load_vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text, note_on_roll
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
-
-STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
 
 
 def estimate(
@@ -92,19 +72,15 @@ def estimate(
     progress("drawing the report", 0.7)
     command = _command(data, vessel, tests, velocity, options)
     content = EstimateContent(vessel=ship, found=found, command=command, version=__version__)
+    document = estimate_document(content)
     files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
-        "estimate.html": partial(estimate_html, content, progress=within(progress, 0.7, 0.98)),
+        "estimate.html": partial(document_html, document, progress=within(progress, 0.7, 0.98)),
     }
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(
-        files=written,
-        summary={**_estimate_summary(found), **note_on_roll(ship)},
-        tables=_estimate_tables(found),
-        notes=estimate_notes(content),
-    )
+    return Outcome(files=written, document=document)
 
 
 def _command(data: Sequence[Path], vessel: Path, tests: Sequence[Path], velocity: str, options: EstimateOptions) -> str:
@@ -129,65 +105,3 @@ def _words(options: EstimateOptions) -> dict[str, object]:
         "--offset": options.offset_mps,
         "--prior": options.prior,
     }
-
-
-def _estimate_summary(found: Assessment) -> dict[str, object]:
-    batches = found.record.batches
-    return {
-        "runs": len(batches),
-        "samples": sum(len(batch) for batch in batches),
-        "runs_kept_apart": len(found.tests.batches),
-        "vessel_file_holds": found.best.method.name,
-        **({"why": found.why} if found.why else {}),
-        "parameters_of": found.motion,
-        "what_limits_the_fit": limit_entries(found),
-        "methods_left_out": list(found.left_out),
-        "methods": {
-            item.method.name: {
-                "parameters": parameter_entries(item),
-                "horizon_s": item.horizon_s,
-                "predictions": prediction_entries(found, item),
-                "fit": fit_entries(item),
-                "samples_used": item.estimate.residuals.rows,
-                "samples_used_by_equation": rows_entry(item),
-                "steered": steered_entry(item),
-                "warnings": len(estimate_warnings(found, item)),
-            }
-            for item in found.methods
-        },
-    }
-
-
-def _estimate_tables(found: Assessment) -> tuple[TextTable, ...]:
-    tables = [
-        *([(prediction_title(found), prediction_table(found))] if found.compared else []),
-        ("Estimates, with standard deviations", parameter_table(found)),
-        ("Fit of the simulated output to the measured one, in per cent", fit_table(found)),
-        (f"Causes of misfit of {found.best.method.name}", limit_table(found)),
-    ]
-    if found.left_out:
-        tables.insert(0, ("Methods without an estimate", (("method", "why"), failure_rows(found))))
-    disturbances = disturbance_table(found)
-    if disturbances[1]:
-        tables.append(("Current and wind, with standard deviations", disturbances))
-    steered = any(batch.steered is not None for batch in found.record.batches)
-    residuals = [item.estimate.residuals for item in found.methods]
-    if steered or any((own.rows_of < own.rows).any() for own in residuals):
-        tables.append(("Samples used", _used_samples(found)))
-    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, (header, rows) in tables)
-
-
-def _used_samples(found: Assessment) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: samples used by each method and equation, those marked as steered, what became of these."""
-    rows: list[tuple[str, ...]] = [
-        (
-            item.method.name,
-            str(item.estimate.residuals.rows),
-            ", ".join(f"d{name}/dt {count}" for name, count in rows_entry(item).items()),
-            str(steered.samples),
-            STEERED_WORDS[steered.treatment] if steered.samples else "",
-        )
-        for item in found.methods
-        for steered in (item.estimate.steered,)
-    ]
-    return ("method", "samples used", "by equation", "marked as steered", "treatment of these"), rows

@@ -10,24 +10,13 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import Content, vessel_toml, write_files
-from expdesign.export.step_trial_page import (
-    REPEAT_HEADER,
-    StepTrialContent,
-    Validated,
-    nominal_rows,
-    repeat_rows,
-    sentences,
-    step_model_json,
-    step_trial_html,
-    to_repeat,
-)
+from expdesign.export.pages import document_html
+from expdesign.export.step_trial_page import StepTrialContent, Validated, step_model_json, step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.step_trials import (
-    CHANNELS,
-    Controls,
     Sailed,
     StepTrial,
     ahead_only,
@@ -40,7 +29,7 @@ from expdesign.step_trials import (
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
 from expdesign.workflows.data.step_list import listed_steps
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.measured import data_files
 
 SIMULATED_STEP_S = 0.5
@@ -101,15 +90,16 @@ def identify_steps(
         version=__version__,
     )
     progress("drawing the page", 0.9)
+    document = step_trial_document(content)
     files: dict[str, Content] = {
         "step-model.json": step_model_json(content),
-        "step-trial.html": partial(step_trial_html, content),
+        "step-trial.html": partial(document_html, document),
     }
     if content.nominal is not None:
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document)
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:
@@ -164,33 +154,3 @@ def _comments(content: StepTrialContent) -> tuple[str, ...]:
         'before and from the steps. Design on with [design] prior = "parameter_std", refine with expdesign estimate.',
         content.command,
     )
-
-
-def _summary(content: StepTrialContent) -> dict[str, object]:
-    trial: StepTrial = content.trial
-    controls: Controls = trial.controls
-    return {
-        "throttle": controls.words[0],
-        "rudder": controls.words[1],
-        "holds": len(trial.holds),
-        "steps_that_count": len(trial.counted),
-        "steps_to_repeat": [one.hold.number for one in to_repeat(content)],
-        **{f"delay_{CHANNELS[place]}_s": trial.delays[place][0] for place, *_ in trial.model.halves},
-        "fit": {
-            part.name: {"Ur"[place]: part.fit_percent[place] for place, *_ in trial.model.halves}
-            for part in (*content.own, *content.tests)
-        },
-        "remarks": [*sentences(content), *content.notes],
-    }
-
-
-def _tables(content: StepTrialContent) -> tuple[TextTable, ...]:
-    tables = [
-        TextTable(title="The step trial", header=("finding",), rows=tuple((text,) for text in sentences(content)))
-    ]
-    if to_repeat(content):
-        tables.append(TextTable(title="Steps to repeat", header=REPEAT_HEADER, rows=tuple(repeat_rows(content))))
-    if content.nominal is not None:
-        header = ("parameter", "before", "after the steps")
-        tables.append(TextTable(title="Nominal vessel", header=header, rows=tuple(nominal_rows(content))))
-    return tuple(tables)

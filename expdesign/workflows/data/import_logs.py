@@ -18,16 +18,13 @@ from expdesign.errors import FileError, InputError
 from expdesign.export import Content, read_plan, write_files
 from expdesign.export.import_page import (
     ImportContent,
-    channel_rows,
     earlier_files,
-    import_html,
+    import_document,
     import_json,
     mapping_toml,
-    response_rows,
-    run_rows,
-    unused_rows,
     vessel_lines,
 )
+from expdesign.export.pages import document_html
 from expdesign.importing import (
     COMPUTER,
     GNSS,
@@ -63,7 +60,7 @@ from expdesign.scenario import load_mapping, load_vessel
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOVED = 3.0  # standard errors from which a computer's clock is set by what another file saw
@@ -161,12 +158,13 @@ def import_logs(
         version=__version__,
     )  # fmt: skip
     progress("writing", 0.95)
+    document = import_document(content, folder)
     files: dict[str, Content] = {
         **texts,
         "mapping.toml": mapping_toml(mapping, read, command=command),
         "vessel-lines.toml": vessel_lines(content),
         "import.json": import_json(content),
-        "import.html": partial(import_html, content),
+        "import.html": partial(document_html, document),
     }
     before = earlier_files(folder)
     written = write_files(folder, files)
@@ -174,9 +172,7 @@ def import_logs(
         with suppress(OSError):
             (folder / name).unlink()
     progress("done", 1.0)
-    return Outcome(
-        files=written, summary=_summary(content, written), tables=_tables(content), notes=content.notes
-    )  # fmt: skip
+    return Outcome(files=written, document=document)
 
 
 def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Decisions:
@@ -390,36 +386,3 @@ def _csv(run: Run, found: Sampled) -> str:
     table: Array = np.column_stack([columns[name] for name in names])
     lines: Callable[[list[float]], str] = lambda values: row % tuple(values)  # noqa: E731
     return "\n".join([",".join(names), *map(lines, table.tolist())]) + "\n"
-
-
-def _summary(content: ImportContent, written: Sequence[Path]) -> dict[str, object]:
-    used = [use for use in content.mapping.uses if use.column]
-    folder = written[0].parent if written else Path()
-    return {
-        "logs": [f"{log.source}: {log.clock}, {len(log.channels)} channels" for log in content.logs],
-        "channels_used": len(used),
-        "runs": len(content.runs),
-        "sample_time_s": content.sampled.sample_time_s,
-        "runs_rejected": [f"{where}: {why}" for where, why in content.rejected],
-        **({"next": f"expdesign estimate {folder} --vessel VESSEL.toml"} if _steered(content) else {}),
-    }
-
-
-def _steered(content: ImportContent) -> bool:
-    """Whether there are runs with inputs."""
-    return any(inputs_of(run.stretch.columns) for run in content.runs)
-
-
-def _tables(content: ImportContent) -> tuple[TextTable, ...]:
-    tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]] = [
-        ("Channels that are used", ("column", "channel", "unit", "times", "why"), channel_rows(content)),
-        ("Not used", ("log", "channel", "why"), unused_rows(content)),
-        ("Runs", ("file", "what", "begins", "lasts s", "approach s"), run_rows(content)),
-        ("Rejected", ("where", "why"), [*content.rejected]),
-        (
-            "How actuators follow their orders",
-            ("signal", "rate", "lag s", "dead time s", "left"),
-            response_rows(content),
-        ),
-    ]
-    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)

@@ -9,6 +9,7 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import Content, write_files
+from expdesign.export.document import Table
 from expdesign.export.indices_form import (
     Held,
     IndicesContent,
@@ -23,7 +24,7 @@ from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import data_files, measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
@@ -82,7 +83,7 @@ def indices(
     files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
     written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes_in_words)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes_in_words))
 
 
 def _check_place(ship: Vessel, forward_m: float) -> None:
@@ -144,7 +145,7 @@ def _counts(content: IndicesContent, source: str) -> dict[str, object]:
     return {f"{source}_criteria_{word.replace(' ', '_')}": number for word, number in counted}
 
 
-def _tables(content: IndicesContent) -> tuple[TextTable, ...]:
+def _tables(content: IndicesContent) -> tuple[Table, ...]:
     criteria = f"MSC.137(76): {content.vessel.name}"
     if any(verdict.tolerance for _, verdict in content.verdicts):
         criteria += " (± is one sample of the record at the order)"
@@ -160,4 +161,4 @@ def _tables(content: IndicesContent) -> tuple[TextTable, ...]:
         (criteria, HEADER, verdict_rows(content)),
         ("Zig-zags", zigzags, zigzag_rows(content)),
     )
-    return tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
+    return tuple(Table(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)

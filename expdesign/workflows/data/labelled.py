@@ -14,6 +14,7 @@ from expdesign.durations import Constraints, DurationDesign, build_recorded, poo
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
 from expdesign.export import durations_json
+from expdesign.export.document import Table
 from expdesign.export.files import record_csv, recorded_dictionary_json, subsets_json
 from expdesign.information.recorded import BatchInformation, by_label, recorded_information
 from expdesign.progress import Progress, silent, within
@@ -21,7 +22,6 @@ from expdesign.records import row_labels
 from expdesign.rehearsal import Drawn, drawn_subsets, random_subsets, recorded_pieces, try_subsets
 from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
-from expdesign.workflows.outcome import TextTable
 
 OPTIMISED, RANDOM = "optimised", "random"
 
@@ -218,11 +218,11 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[TextTable, ...]:
+def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[Table, ...]:
     """Labels with their shares, and simulation errors of the designs."""
     design = found.design
     order = np.argsort(-np.array(found.gains))
-    shares = TextTable(
+    shares = Table(
         title="Labels by what they add beside all others",
         header=("label", "pieces", "gain beside the pool", "share", "pieces of the design"),
         rows=tuple(
@@ -236,7 +236,7 @@ def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[TextTable,
             for q in order
         ),
     )
-    errors = TextTable(
+    errors = Table(
         title="Simulation error on the pieces that a draw does not use, median (95 % of the draws below)",
         header=("design", "draws", *outputs, "norm", "degenerate models"),
         rows=tuple(

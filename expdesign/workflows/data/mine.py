@@ -14,6 +14,7 @@ from expdesign import __version__
 from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import write_files
+from expdesign.export.document import Table
 from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
@@ -30,7 +31,7 @@ from expdesign.workflows.data.labelled import (
     labelled_tables,
     piece_of,
 )
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
 
 
@@ -133,7 +134,7 @@ def _mined(
     }
     written = write_files(folder, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=(_table(subset, batches),), notes=record.notes)
+    return Outcome(files=written, document=document_of(_summary(content), (_table(subset, batches),), record.notes))
 
 
 SYMMETRIC = "symmetric part of the information"
@@ -172,7 +173,7 @@ def _designed(
     written = write_files(folder, labelled_files(found, names, model.outputs, command))
     progress("done", 1.0)
     tables = labelled_tables(found, model.outputs)
-    return Outcome(files=written, summary=labelled_summary(found), tables=tables, notes=record.notes)
+    return Outcome(files=written, document=document_of(labelled_summary(found), tables, record.notes))
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:
@@ -267,10 +268,10 @@ def _summary(content: Mapping[str, object]) -> dict[str, object]:
     return {**{name: content[name] for name in shown}, **note}
 
 
-def _table(subset: Subset, batches: Sequence[BatchInformation]) -> TextTable:
+def _table(subset: Subset, batches: Sequence[BatchInformation]) -> Table:
     of = {batch.name: batch for batch in batches}
     rows = zip(subset.names, subset.first, strict=True)
-    return TextTable(
+    return Table(
         title="Batches in the order in which each adds most, with the cumulative information",
         header=("rank", "batch", "seconds", "information", "chosen"),
         rows=tuple(

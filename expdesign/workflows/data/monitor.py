@@ -15,16 +15,8 @@ import numpy as np
 from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import Content, write_files
-from expdesign.export.monitor_page import (
-    Moment,
-    MonitorContent,
-    budget_entries,
-    monitor_header,
-    monitor_html,
-    monitor_json,
-    monitor_tables,
-    sentences,
-)
+from expdesign.export.monitor_page import Moment, MonitorContent, budget_entries, monitor_document, monitor_json
+from expdesign.export.pages import document_html
 from expdesign.export.words import counted
 from expdesign.monitoring import (
     TUNING,
@@ -56,7 +48,7 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.workers import workers
 
 
@@ -188,7 +180,7 @@ def monitor(
     content = _content(now.phase, now, asked, command)
     written = write_files(folder, _files(content, now, asked))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=monitor_document(content))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,7 +281,7 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
 def _files(content: MonitorContent, now: Watch, asked: Asked) -> dict[str, Content]:
     assert isinstance(now.phase, Watching)
     files: dict[str, Content] = {
-        "monitor.html": partial(monitor_html, content),
+        "monitor.html": partial(document_html, monitor_document(content)),
         "monitor.json": monitor_json(content, budget_entries(content)),
         STATE: _state(now, asked),
     }
@@ -332,21 +324,3 @@ def _resumed(path: Path, asked: Asked) -> Watch:
         if begun[name] != value:
             raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")
     return now
-
-
-def _summary(content: MonitorContent) -> dict[str, object]:
-    return {
-        "judged_h": content.state.judged_s / HOUR,
-        "alarms": len(content.found) + (0 if content.roll is None else len(content.roll.alarms)),
-        "remarks": list(sentences(content)),
-    }
-
-
-def _tables(content: MonitorContent) -> tuple[TextTable, ...]:
-    verdict = tuple((sentence,) for sentence in sentences(content))
-    return (
-        TextTable(title="Is it still the ship of the reference?", header=("verdict",), rows=verdict),
-        TextTable(
-            title="Changes that are watched for", header=monitor_header(content), rows=tuple(monitor_tables(content))
-        ),
-    )

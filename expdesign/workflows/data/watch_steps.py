@@ -15,6 +15,7 @@ import numpy as np
 from expdesign import __version__
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
+from expdesign.export.document import Table as TextTable
 from expdesign.export.step_trial_page import (
     TO_DO_HEADER,
     LiveContent,
@@ -43,7 +44,7 @@ from expdesign.step_trials.live import (
 )
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.workflows.data.step_list import listed_steps
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 
 STATE = "watch-steps-state.json"
 TO_DO = "steps-to-do.csv"
@@ -133,7 +134,7 @@ def watch_steps(
     content = _content(now, work)
     written = write_files(folder, _files(now, work))
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes))
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:

@@ -12,12 +12,13 @@ from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.durations import DurationProblem, build_fused, efficiencies, solve_durations
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import durations_json
+from expdesign.export.document import Table
 from expdesign.export.files import strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, TextTable
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_summary, design_tables, designed
 from expdesign.workflows.steps.scored import growth_files, growth_summary, growth_tables, parameters_of, ready
 from expdesign.workflows.steps.workers import workers
@@ -103,9 +104,9 @@ def covariances_json(tried: Sequence[Alone]) -> str:
     )
 
 
-def covariance_table(tried: Sequence[Alone]) -> TextTable:
+def covariance_table(tried: Sequence[Alone]) -> Table:
     """Trials of each primitive, and its largest bias beside the scatter."""
-    return TextTable(
+    return Table(
         title="Simulated trials of each manoeuvre alone; bias is counted in the covariance",
         header=("primitive", "seconds", "trials", "without estimate", "largest bias over scatter"),
         rows=tuple(
@@ -160,7 +161,7 @@ def durations(
     }
     summary = {**growth_summary(growth, case), **design_summary(design)}
     tables = (*growth_tables(growth), *design_tables(design, compared))
-    return written(case, out, files, summary, progress, tables)
+    return written(case, out, files, noted(case, document_of(summary, tables)), progress)
 
 
 def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, progress: Progress) -> Outcome:
@@ -174,4 +175,5 @@ def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, 
         "not_informative_on_their_own": [item.primitive.name for item in tried if not item.informative],
         **design_summary(design),
     }
-    return written(case, out, files, summary, progress, (covariance_table(tried), *design_tables(design, compared)))
+    document = document_of(summary, (covariance_table(tried), *design_tables(design, compared)))
+    return written(case, out, files, noted(case, document), progress)

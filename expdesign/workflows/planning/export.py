@@ -13,7 +13,7 @@ from expdesign.export import FORMATS, build_bridge_route, build_route, find_form
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.routes import ROUTE_NAME, read_plan
 from expdesign.progress import Progress, silent
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, document_of
 
 # `expdesign export`: route files of a plan made before.
 
@@ -54,7 +54,7 @@ def export(
         "track_within_m": route.fit.largest_m,
         "legs_in_allowed_water": route.fit.in_water,
     }
-    return Outcome(files=files, summary=summary)
+    return Outcome(files=files, document=document_of(summary))
 
 
 def _name(text: str | None) -> str:
@@ -89,4 +89,4 @@ def check_routes(files: Sequence[Path], *, progress: Progress = silent) -> Outco
         if problems:
             more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
             raise FileError(path, "", problems[0] + more)
-    return Outcome(files=(), summary={"files": len(files), "problems": 0})
+    return Outcome(files=(), document=document_of({"files": len(files), "problems": 0}))

@@ -11,7 +11,7 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.export import write_files
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_scenario
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, document_of
 
 TEMPLATES = files("expdesign") / "templates"
 KINDS = {
@@ -85,7 +85,7 @@ def new(folder: Path, *, kind: str = "azimuth", progress: Progress = silent) -> 
     load_scenario(folder / "scenario.toml")
     progress("done", 1.0)
     then = f"expdesign run {folder / 'scenario.toml'}"
-    return Outcome(files=paths, summary={"kind": kind, "ship": ship, "then": then})
+    return Outcome(files=paths, document=document_of({"kind": kind, "ship": ship, "then": then}))
 
 
 def _text(name: str) -> str:

@@ -7,22 +7,12 @@ from pathlib import Path
 
 from expdesign import __version__
 from expdesign.export import Content, write_files
-from expdesign.export.nominal_page import (
-    FACTOR_HEADER,
-    TAKEN_HEADER,
-    TRIAL_HEADER,
-    NominalContent,
-    factor_rows,
-    nominal_html,
-    nominal_json,
-    nominal_toml,
-    taken_rows,
-    trial_rows,
-)
+from expdesign.export.nominal_page import NominalContent, nominal_document, nominal_json, nominal_toml
+from expdesign.export.pages import document_html
 from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_card
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 
 
 def nominal(card: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
@@ -43,26 +33,12 @@ def nominal(card: Path, out: Path | None, *, seed: int = 0, progress: Progress =
         nominal=found, command=command_text("nominal", [card], {"--seed": seed}, usual={"--seed": 0}),
         version=__version__,
     )  # fmt: skip
+    document = nominal_document(content)
     files: dict[str, Content] = {
         "vessel.toml": nominal_toml(content),
         "nominal.json": nominal_json(content),
-        "nominal.html": partial(nominal_html, content),
+        "nominal.html": partial(document_html, document),
     }
     written = write_files(out or Path("runs") / f"{card.stem}-nominal", files)
     progress("done", 1.0)
-    tables = (
-        ("Where the numbers come from", FACTOR_HEADER, factor_rows(content)),
-        ("Thrusters that drive her", TAKEN_HEADER, taken_rows(content)),
-        (f"Trials of {found.vessel.name}", TRIAL_HEADER, trial_rows(content)),
-    )
-    return Outcome(
-        files=written,
-        summary={
-            "vessel": found.vessel.name,
-            "parameters": len(found.vessel.model.names),
-            "stated_values": sum(len(one.stated) for one in found.predicted),
-            "contradictions": list(found.contradictions),
-        },
-        tables=tuple(TextTable(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables),
-        notes=content.notes,
-    )
+    return Outcome(files=written, document=document)

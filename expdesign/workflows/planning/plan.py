@@ -7,8 +7,8 @@ from pathlib import Path
 from expdesign.durations import with_repeats
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.outcome import Outcome, command_text
-from expdesign.workflows.steps.case import drafted, loaded, written
+from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, plan_files, plan_summary, planned
@@ -62,4 +62,5 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
     else:
         day = planned_day(case, information, design, seed=seed, progress=planning)
     files = {**plan_files(case, day.plan), **day_files(case, day)}
-    return written(case, out, files, {**plan_summary(case, day.plan), **day_summary(day)}, progress, day_tables(day))
+    document = document_of({**plan_summary(case, day.plan), **day_summary(day)}, day_tables(day))
+    return written(case, out, files, noted(case, document), progress)

@@ -11,25 +11,15 @@ from expdesign import __version__
 from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan, UnknownName
 from expdesign.export import Content, write_files
-from expdesign.export.load_page import (
-    CASE_HEADER,
-    PRECISION_HEADER,
-    LoadContent,
-    case_rows,
-    load_plan_html,
-    load_plan_json,
-    load_sentences,
-    loads_toml,
-    precision_rows,
-    repeats_json,
-)
+from expdesign.export.load_page import LoadContent, load_document, load_plan_json, loads_toml, repeats_json
+from expdesign.export.pages import document_html
 from expdesign.information import PrimitiveInformation
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, ending, silent, within
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
@@ -110,16 +100,17 @@ def roll_plan(
         )  # fmt: skip
         placing = within(limited, 0.3, 1.0)
         placed = _placed(case, information, content, seed, placing) if place else ()
+    document = load_document(content)
     names = {_runs_name(number): repeats_json(content, number) for number in range(len(plan.repeats))}
     files: dict[str, Content] = {
-        "roll-plan.json": load_plan_json(content), "roll-plan.html": partial(load_plan_html, content),
+        "roll-plan.json": load_plan_json(content), "roll-plan.html": partial(document_html, document),
         "loads.toml": loads_toml(content), **names,
     }  # fmt: skip
     paths = write_files(folder, files)
     for number, own in enumerate(placed, start=1):
         paths += write_files(folder / f"case-{number}", own)
     progress("done", 1.0)
-    return Outcome(files=paths, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=paths, document=document)
 
 
 def _too_long(minutes: float, activity: str, *, cache: bool) -> NoAnswer:
@@ -204,22 +195,3 @@ def _trip(
     except NoPlan as error:
         error.obstacle = f"{name}: {error.obstacle}"
         raise
-
-
-def _summary(content: LoadContent) -> dict[str, object]:
-    plan = content.plan
-    return {
-        "scenario": content.scenario,
-        "load_cases": [option.name for option in content.options],
-        "runs": int(plan.repeats.sum()),
-        "efficiency": plan.chosen.efficiency,
-        "gap": plan.design.gap,
-        "smallest_relative_sensitivity": float(plan.chosen.smallest),
-        "remarks": list(load_sentences(content)),
-    }
-
-
-def _tables(content: LoadContent) -> tuple[TextTable, ...]:
-    found = TextTable(title="Load plan", header=("finding",), rows=tuple((text,) for text in load_sentences(content)))
-    cases = TextTable(title="Load cases", header=CASE_HEADER, rows=tuple(case_rows(content)))
-    return found, cases, TextTable(title="Precision", header=PRECISION_HEADER, rows=tuple(precision_rows(content)))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, command_text
-from expdesign.workflows.steps.case import drafted, loaded, written
+from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import (
@@ -88,4 +88,4 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
         **day_summary(day),
         **plan_summary(case, day.plan),
     }
-    return written(case, out, files, summary, progress, day_tables(day))
+    return written(case, out, files, noted(case, document_of(summary, day_tables(day))), progress)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from expdesign.dictionary.build import deviating
 from expdesign.progress import Progress, silent, within
-from expdesign.workflows.outcome import Outcome
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.scored import (
     actuation_remarks,
     parameters_of,
@@ -41,4 +41,5 @@ def score(
     told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
     if case.remarks or told:
         summary["remarks"] = [*case.remarks, *told]
-    return written(case, out, score_files(case, information), summary, progress, (ranking(case, information),))
+    document = document_of(summary, (ranking(case, information),))
+    return written(case, out, score_files(case, information), noted(case, document), progress)

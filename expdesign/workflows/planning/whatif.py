@@ -15,8 +15,8 @@ from expdesign import __version__
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
-from expdesign.export.whatif_page import Case, WhatIfContent, explanations, whatif_html, whatif_json
-from expdesign.export.whatif_page.page import table_header, table_row
+from expdesign.export.pages import document_html
+from expdesign.export.whatif_page import Case, WhatIfContent, whatif_document, whatif_json
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import expected_covariance
 from expdesign.memory import Memory, recalled, remembering, user_memory
@@ -26,7 +26,7 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
@@ -109,10 +109,11 @@ def whatif(
     )
     if all(case.problem for case in content.cases):
         raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
-    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(whatif_html, content)}
+    document = whatif_document(content)
+    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(document_html, document)}
     written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content))
+    return Outcome(files=written, document=document)
 
 
 def _check(case: Scenario, path: Path, seed: int) -> None:
@@ -206,29 +207,4 @@ def _described(
         plan=plan,
         legs_count=case.design.accuracy is not None,
         remarks=case.remarks,
-    )
-
-
-def _summary(content: WhatIfContent) -> dict[str, object]:
-    differences = dict(explanations(content))
-    return {
-        "cases": {
-            case.name: {
-                "problem": case.problem or None,
-                "informative_s": case.informative_s,
-                "accuracy": None if (against := content.against(case)) is None else against.accuracy,
-                "same_accuracy_s": None if against is None else against.same_accuracy_s,
-                "differences": list(differences.get(case.name, ())),
-            }
-            for case in content.cases
-        }
-    }
-
-
-def _tables(content: WhatIfContent) -> tuple[TextTable, ...]:
-    rows = tuple(table_row(content, case) for case in content.cases)
-    differences = tuple((name, sentence) for name, sentences in explanations(content) for sentence in sentences)
-    return (
-        TextTable(title="Side by side", header=table_header(content), rows=rows),
-        TextTable(title="Differences", header=("Case", "What differs"), rows=differences),
     )

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from expdesign import __version__
 from expdesign.errors import FileError, NoPlan
 from expdesign.export import Content, write_files
+from expdesign.export.document import Document
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, TextTable, note_on_roll
+from expdesign.workflows.outcome import Outcome, document_of, note_on_roll
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
@@ -27,29 +29,33 @@ def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) ->
     return load_scenario(scenario, vessel=vessel)
 
 
+def noted(case: Scenario, document: Document) -> Document:
+    """The document with what is to be heard about the scenario, its vessel, its chart and the data before the trial."""
+    roll = {} if "heel_max_deg" in document.summary else note_on_roll(case.vessel)
+    before = measured(case.design.prior_data, case.vessel).doubts if case.design.prior_data else ()
+    remarks = tuple(text for text in case.remarks if text not in document.findings)
+    told = document_of(roll, notes=(*before, *case.area.notes, *remarks))
+    name = {"scenario": case.name}
+    return replace(
+        document,
+        facts=document.facts if document.title else {**name, **document.facts},
+        values={**name, **document.values, **told.values},
+        notes=(*document.notes, *told.notes),
+    )
+
+
 def written(
-    case: Scenario,
-    out: Path | None,
-    files: Mapping[str, Content],
-    summary: Mapping[str, object],
-    progress: Progress,
-    tables: tuple[TextTable, ...] = (),
+    case: Scenario, out: Path | None, files: Mapping[str, Content], document: Document, progress: Progress
 ) -> Outcome:
     """Write files into `out` or runs/<scenario>, and report them. A plan takes an earlier draft away."""
     folder = out or Path("runs") / case.name
     paths = write_files(folder, files)
     left = _undeleted(folder) if PLAN in files else ()
-    note = {"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"} if left else {}
     progress("done", 1.0)
-    roll = {} if "heel_max_deg" in summary else note_on_roll(case.vessel)
-    before = measured(case.design.prior_data, case.vessel).doubts if case.design.prior_data else ()
-    remarks = {"remarks": list(case.remarks)} if case.remarks and "remarks" not in summary else {}
-    return Outcome(
-        files=paths,
-        summary={"scenario": case.name, **summary, **note, **roll, **remarks},
-        tables=tables,
-        notes=(*before, *case.area.notes),
-    )
+    if left:
+        said = document_of({"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"})
+        document = replace(document, values={**document.values, **said.values}, notes=(*document.notes, *said.notes))
+    return Outcome(files=paths, document=document)
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:
@@ -81,7 +87,8 @@ def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]
 
 
 def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[str, Content]:
-    from expdesign.export.refused_page import Refusal, refused_html, refused_json
+    from expdesign.export.pages import document_html
+    from expdesign.export.refused_page import Refusal, refused_document, refused_json
 
     there = sorted(path.name for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
     refusal = Refusal(
@@ -96,4 +103,4 @@ def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[st
         command=command,
         version=__version__,
     )
-    return {"refused.json": refused_json(refusal), "refused.html": partial(refused_html, refusal)}
+    return {"refused.json": refused_json(refusal), "refused.html": partial(document_html, refused_document(refusal))}

@@ -12,6 +12,7 @@ import numpy as np
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, efficiencies
 from expdesign.errors import InputError, NoAnswer
+from expdesign.export.document import Table
 from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
@@ -25,7 +26,6 @@ from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.vessel import VesselModel
-from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.design_problem import design_summary, designed
 from expdesign.workflows.steps.first_trial import calibration, first_note, is_wide, whole_trial
 from expdesign.workflows.steps.planned import plan_problem, planned
@@ -389,7 +389,7 @@ def day_summary(day: Day) -> dict[str, object]:
     }
 
 
-def day_tables(day: Day) -> tuple[TextTable, ...]:
+def day_tables(day: Day) -> tuple[Table, ...]:
     """The days tried."""
     found = day.shortest
     if found is None:
@@ -406,4 +406,4 @@ def day_tables(day: Day) -> tuple[TextTable, ...]:
         for number, item in enumerate(found.tried, start=1)
     )
     header = ("day", "seconds", "with go-arounds", "of these in runs", "information of what is needed", "runs")
-    return (TextTable(title="Days planned in search of the shortest", header=header, rows=rows),)
+    return (Table(title="Days planned in search of the shortest", header=header, rows=rows),)

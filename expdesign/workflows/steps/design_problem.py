@@ -21,6 +21,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.errors import FloorOutOfReach, InputError, NoAnswer, NotInformative
+from expdesign.export.document import Table
 from expdesign.information import (
     MEAN_SUBTRACTIONS,
     PrimitiveInformation,
@@ -40,7 +41,6 @@ from expdesign.scenario.values import BudgetSettings
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.outcome import TextTable
 from expdesign.workflows.steps.measured import measured
 
 if TYPE_CHECKING:
@@ -360,17 +360,17 @@ def design_summary(design: DurationDesign) -> dict[str, object]:
     }
 
 
-def design_tables(design: DurationDesign, compared: Sequence[Efficiencies]) -> tuple[TextTable, ...]:
+def design_tables(design: DurationDesign, compared: Sequence[Efficiencies]) -> tuple[Table, ...]:
     """How long to run each primitive, every design under every criterion, and how limits are kept."""
     return (_shares_table(design), *_efficiency_tables(compared), *_limits_tables(design))
 
 
-def _shares_table(design: DurationDesign) -> TextTable:
+def _shares_table(design: DurationDesign) -> Table:
     proof = design.certificate
     net = design.sensitivities - proof.prices
     told = [f"{value:.4f}" if kept else "excluded" for value, kept in zip(net, design.problem.included, strict=True)]
     columns = zip(design.problem.names, design.fractions, design.durations_s, design.repeats, told, strict=True)
-    return TextTable(
+    return Table(
         title=f"How long to run each primitive; at the optimum those used have sensitivity {proof.level:.6g}",
         header=("primitive", "share", "seconds", "whole runs", "sensitivity"),
         rows=tuple(
@@ -380,11 +380,11 @@ def _shares_table(design: DurationDesign) -> TextTable:
     )
 
 
-def _efficiency_tables(compared: Sequence[Efficiencies]) -> tuple[TextTable, ...]:
+def _efficiency_tables(compared: Sequence[Efficiencies]) -> tuple[Table, ...]:
     known = [item for item in compared if item.of]
     columns = list(known[0].of) if known else []
     tables = [
-        TextTable(
+        Table(
             title="Efficiency of designs by every criterion, 1 for its own optimum",
             header=("criterion", "makes least", *columns),
             rows=tuple((item.criterion, item.title, *(f"{item.of[name]:.3f}" for name in columns)) for item in known),
@@ -392,14 +392,14 @@ def _efficiency_tables(compared: Sequence[Efficiencies]) -> tuple[TextTable, ...
     ]
     missing = tuple((item.criterion, item.missing) for item in compared if item.missing)
     if missing:
-        tables.append(TextTable(title="Criteria not compared", header=("criterion", "because"), rows=missing))
+        tables.append(Table(title="Criteria not compared", header=("criterion", "because"), rows=missing))
     return tuple(tables)
 
 
-def _limits_tables(design: DurationDesign) -> tuple[TextTable, ...]:
+def _limits_tables(design: DurationDesign) -> tuple[Table, ...]:
     rows = tuple(
         (item.name, f"{item.limit:.5g}", f"{item.continuous:.5g}", f"{item.repeats:.5g}", f"{item.price:.3g}")
         for item in limits_kept(design)
     )
     header = ("limit", "asked", "optimal shares", "whole runs", "price")
-    return (TextTable(title="Limits on the durations", header=header, rows=rows),) if rows else ()
+    return (Table(title="Limits on the durations", header=header, rows=rows),) if rows else ()

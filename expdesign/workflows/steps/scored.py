@@ -10,6 +10,7 @@ import numpy as np
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.durations import bordered, pool_gains
 from expdesign.export import dictionary_json
+from expdesign.export.document import Table
 from expdesign.export.files import dictionary_files, growth_json
 from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
@@ -18,7 +19,6 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.signals import Commands, Trajectory
 from expdesign.vessel import Environment, Vessel, column_name
-from expdesign.workflows.outcome import TextTable
 
 SPEED_SLACK = 0.1
 """Share of the largest speed of the data by which a run may go beyond them."""
@@ -108,11 +108,11 @@ def score_files(case: Scenario, information: Sequence[PrimitiveInformation]) -> 
     return {"dictionary.json": text}
 
 
-def ranking(case: Scenario, information: Sequence[PrimitiveInformation]) -> TextTable:
+def ranking(case: Scenario, information: Sequence[PrimitiveInformation]) -> Table:
     """Primitives by what they add beside all others, which also ranks those that do not inform alone."""
     gains = pool_gains(np.array([bordered(item, case.design.mean_subtraction) for item in information]))
     order = np.argsort(np.where(np.isnan(gains), np.inf, -gains), kind="stable")
-    return TextTable(
+    return Table(
         title="Primitives by what they add to log det beside all others, and alone",
         header=("rank", "primitive", "gain beside the pool", "log det alone"),
         rows=tuple(
@@ -222,7 +222,7 @@ def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[
     }
 
 
-def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
+def growth_tables(growth: Growth | None) -> tuple[Table, ...]:
     """Gain of each addition."""
     if growth is None:
         return ()
@@ -240,7 +240,7 @@ def growth_tables(growth: Growth | None) -> tuple[TextTable, ...]:
     )
     header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
     title = f"Manoeuvres added; one improves the design if its d is above {growth.dimension}"
-    return (TextTable(title=title, header=header, rows=rows),) if rows else ()
+    return (Table(title=title, header=header, rows=rows),) if rows else ()
 
 
 def ready(

@@ -9,29 +9,18 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
-from expdesign.export.foresight_page import (
-    HEADER,
-    OPERATION_HEADER,
-    ForesightContent,
-    OperationContent,
-    conclusions,
-    foresight_html,
-    foresight_json,
-    foresight_rows,
-    operation_html,
-    operation_json,
-    operation_rows,
-    operation_sentences,
-)
+from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
+from expdesign.export.operation_page import OperationContent, operation_document, operation_json
+from expdesign.export.pages import document_html
 from expdesign.export.routes import read_plan
-from expdesign.foresight import Foresight, TrialRun, design_runs, foresee_operation
+from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
-from expdesign.workflows.steps.case import loaded, written
+from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
@@ -93,11 +82,12 @@ def foresee(
         version=__version__,
     )
     progress("writing the page", 0.95)
+    document = noted(case, foresight_document(content))
     files: dict[str, Content] = {
         "foresee.json": foresight_json(content),
-        "foresee.html": partial(foresight_html, content),
+        "foresee.html": partial(document_html, document),
     }
-    return written(case, out, files, foresight_summary(content), progress, foresight_tables(found))
+    return written(case, out, files, document, progress)
 
 
 def _operation(
@@ -116,17 +106,12 @@ def _operation(
         command=command_text("foresee", [scenario], {"--operation": voyages, "--seed": seed}),
         version=__version__,
     )
+    document = noted(case, operation_document(content))
     files: dict[str, Content] = {
         "operation.json": operation_json(content),
-        "operation.html": partial(operation_html, content),
+        "operation.html": partial(document_html, document),
     }
-    summary = {"voyages_without_change": found.nominal, "false_alarms": found.false_alarms}
-    sentences = tuple((text,) for text in operation_sentences(found))
-    tables = (
-        TextTable(title="What a watch in operation would find", header=OPERATION_HEADER, rows=operation_rows(found)),
-        TextTable(title="In words", header=("finding",), rows=sentences),
-    )
-    return written(case, out, files, summary, progress, tables)
+    return written(case, out, files, document, progress)
 
 
 def _trial(
@@ -148,22 +133,3 @@ def _trial(
     begin = track.trajectory
     run = TrialRun(name="plan", commands=track.commands, pose=begin.pose[0], velocity=begin.velocity[0])
     return (run,), track.environment
-
-
-def foresight_summary(content: ForesightContent) -> dict[str, object]:
-    """Key numbers of what is foreseen."""
-    found = content.found
-    return {
-        "trial": content.source,
-        "diagnosed_s": found.duration_s,
-        "causes_tested": len(found.weakest),
-        "causes_missed": list(found.missed),
-        "causes_not_seen": [cause for cause, _ in found.unseen],
-        "remarks": list(conclusions(found)),
-        "not_told_apart": [f"{item.cause} ({item.name}) from {other.cause}" for item, other in found.not_told_apart],
-    }
-
-
-def foresight_tables(found: Foresight) -> tuple[TextTable, ...]:
-    """Power of every cause, at its least visible."""
-    return (TextTable(title="What a diagnosis would find", header=HEADER, rows=foresight_rows(found)),)

@@ -9,12 +9,13 @@ from pathlib import Path
 
 from expdesign.errors import FileError, NoAnswer
 from expdesign.export import write_files
+from expdesign.export.document import Table
 from expdesign.export.files import finite, strict_json
 from expdesign.loading import Inclining, inclining
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.vessel import RollPendulum
-from expdesign.workflows.outcome import Outcome, TextTable
+from expdesign.workflows.outcome import Outcome, document_of
 
 HEADER = ("mass [kg]", "shift [m]", "heel [deg]", "std of GM [m]", "std of GM [%]", "std of inertia [%]")
 
@@ -71,9 +72,7 @@ def incline(
     progress("done", 1.0)
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     return Outcome(
-        files=files,
-        summary=summary,
-        tables=(TextTable(title="Inclining tests", header=HEADER, rows=tuple(table)),),
+        files=files, document=document_of(summary, (Table(title="Inclining tests", header=HEADER, rows=tuple(table)),))
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
+from expdesign.export.document import Table
 from expdesign.export.files import Known, replan_json
 from expdesign.export.report.tables import AT_REST, motion
 from expdesign.export.words import place
@@ -24,7 +25,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -141,7 +142,7 @@ def _replanned(
     facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(case, day.plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
     notes = (*_notes(known), *day.plan.area.notes)
-    return Outcome(files=written, summary=summary, tables=(_table(known), *day_tables(day)), notes=notes)
+    return Outcome(files=written, document=document_of(summary, (_table(known), *day_tables(day)), notes))
 
 
 def _stated_before(
@@ -228,9 +229,9 @@ def _motion(known: Known) -> str:
     return "at rest over ground" if moves == AT_REST else f"under way at {moves}"
 
 
-def _table(known: Known) -> TextTable:
+def _table(known: Known) -> Table:
     columns = zip(known.parameters, known.now, known.stated, known.so_far, known.after, known.purchases, strict=True)
-    return TextTable(
+    return Table(
         title="Parameters, and their standard deviations",
         header=("parameter", "value now", "std before", "from the data so far", "after the rest", "bought by"),
         rows=tuple(

@@ -10,17 +10,8 @@ from pathlib import Path
 from expdesign import __version__
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import Content, vessel_toml, write_files
-from expdesign.export.roll_page import (
-    CURE_HEADER,
-    PARAMETER_HEADER,
-    RollContent,
-    cure_rows,
-    headline,
-    parameter_rows,
-    roll_html,
-    roll_json,
-    roll_sentences,
-)
+from expdesign.export.pages import document_html
+from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.progress import Progress, silent
 from expdesign.records import load_records
 from expdesign.roll import (
@@ -42,7 +33,7 @@ from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import Batch
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 
 
 def roll(
@@ -111,12 +102,13 @@ def roll(
         scale=scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
-    files: dict[str, Content] = {"roll.json": roll_json(content), "roll.html": partial(roll_html, content)}
+    document = roll_document(content)
+    files: dict[str, Content] = {"roll.json": roll_json(content), "roll.html": partial(document_html, document)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
-    return Outcome(files=written, summary=_summary(content), tables=_tables(content), notes=content.notes)
+    return Outcome(files=written, document=document)
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:
@@ -193,23 +185,3 @@ def _check_passed(estimate: RollEstimate, used: LowPass) -> None:
                 f"in {case.name}, expected {100 * TUNING.passed_gain:.0f} % or more; set --lowpass-hz {4 * found:.2g}, "
                 "or period_s to what it is"
             )
-
-
-def _summary(content: RollContent) -> dict[str, object]:
-    estimate = content.estimate
-    return {
-        "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
-        "parameters": estimate.values,
-        "std": {name: std for name, std in estimate.std.items() if name not in estimate.held},
-        "held": list(estimate.held),
-        "rank": content.report.rank,
-        "free": len(content.report.free),
-        "remarks": [*roll_sentences(content), *content.notes],
-    }
-
-
-def _tables(content: RollContent) -> tuple[TextTable, ...]:
-    found = TextTable(title="Roll", header=("finding",), rows=tuple((text,) for text in roll_sentences(content)))
-    values = TextTable(title="Parameters", header=PARAMETER_HEADER, rows=tuple(parameter_rows(content)))
-    cures = TextTable(title="What would determine the rest", header=CURE_HEADER, rows=tuple(cure_rows(content)))
-    return (found, values, cures) if cures.rows else (found, values)

@@ -20,7 +20,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, in_waves, measure
 from expdesign.simulation import simulate as simulate_run
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, document_of
 
 
 def simulate(
@@ -70,7 +70,7 @@ def simulate(
         "wind_to_north_mps": float(weather.wind_to[0]),
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
-    return Outcome(files=files, summary=summary)
+    return Outcome(files=files, document=document_of(summary))
 
 
 def _truth_weather(forecast: Environment, own: Environment) -> Environment:

@@ -14,13 +14,14 @@ from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
 from expdesign.export import vessel_toml, write_files
-from expdesign.export.validation_page import ValidationContent, judgements, validation_html, validation_json
+from expdesign.export.pages import document_html
+from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, TextTable, command_text
+from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
@@ -97,12 +98,13 @@ def validate_design(
         ),
         version=__version__,
     )
+    document = validation_document(content)
     files = write_files(
-        folder, {"validation.json": validation_json(content), "validation.html": partial(validation_html, content)}
+        folder, {"validation.json": validation_json(content), "validation.html": partial(document_html, document)}
     )
     forget()
     progress("done", 1.0)
-    return Outcome(files=files, summary=_summary(content), tables=(_comparison(content), _table(content)))
+    return Outcome(files=files, document=document)
 
 
 def _method(case: Scenario, stated: str | None) -> str:
@@ -143,36 +145,3 @@ def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array],
         beside.replace(target)
 
     return done, keep, lambda: shutil.rmtree(folder, ignore_errors=True)
-
-
-def _summary(content: ValidationContent) -> dict[str, object]:
-    return {
-        "trials_of_each_design": content.rehearsal.trials,
-        "median_error": {item.design: float(np.median(item.errors)) for item in content.results},
-        "without_estimate": {item.design: item.failed for item in content.results},
-        "judgements": list(judgements(content)),
-    }
-
-
-def _comparison(content: ValidationContent) -> TextTable:
-    return TextTable(
-        title="Predicted and simulated accuracy",
-        header=("",),
-        rows=tuple((sentence,) for sentence in judgements(content)),
-    )
-
-
-def _table(content: ValidationContent) -> TextTable:
-    best = content.results[0]
-    rows = tuple(
-        (
-            name,
-            *(f"{item.found[index]:.3g}" for item in content.results),
-            f"{best.theory[index]:.3g}",
-            f"{best.forecast[index]:.3g}",
-            f"{100 * best.coverage[index]:.0f} %",
-        )
-        for index, name in enumerate(best.parameters)
-    )
-    header = ("Parameter", *(item.design for item in content.results), "predicted", "forecast", "interval holds truth")
-    return TextTable(title="Standard deviations found in simulated trials", header=header, rows=rows)
