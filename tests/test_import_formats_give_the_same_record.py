@@ -213,7 +213,7 @@ def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> 
     _, said = imported(write_own(tmp_path / "a.csv", trip))
     rate = said["actuators"]["rudder1"]["rate"]  # type: ignore[index]
     assert abs(rate["value"] - RATE_RADPS) < 0.002 * RATE_RADPS
-    assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "vessel-lines.toml").read_text()
+    assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "instruments.toml").read_text()
 
 
 def test_the_folder_is_what_other_commands_take(

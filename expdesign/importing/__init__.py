@@ -13,7 +13,9 @@ Times count from 1970 UTC where a clock has a date. Angles are in radians, headi
 
 from expdesign.importing.alignment import Lag, lag_of
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log
-from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use, bow_signals, guess
+from expdesign.importing.guess import guess
+from expdesign.importing.machines import bow_signals
+from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use
 from expdesign.importing.noise import sensor_keys
 from expdesign.importing.readers import READERS, read_log
 from expdesign.importing.responses import Followed, followed

@@ -22,11 +22,11 @@ from expdesign.export.import_page import (
     earlier_files,
     import_html,
     import_json,
+    instruments_toml,
     mapping_toml,
     response_rows,
     run_rows,
     unused_rows,
-    vessel_lines,
 )
 from expdesign.importing import (
     COMPUTER,
@@ -59,7 +59,7 @@ from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
-from expdesign.scenario import load_mapping, load_vessel
+from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -156,7 +156,7 @@ def import_logs(
     content = ImportContent(
         logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts),
         rejected=tuple(rejected),
-        followed=followed(table), sensors=sensor_keys(table, found.held_s), notes=tuple(notes),
+        followed=followed(table), sensors=sensor_keys(found), notes=tuple(notes),
         origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
         version=__version__,
     )  # fmt: skip
@@ -164,7 +164,7 @@ def import_logs(
     files: dict[str, Content] = {
         **texts,
         "mapping.toml": mapping_toml(mapping, read, command=command),
-        "vessel-lines.toml": vessel_lines(content),
+        INSTRUMENTS: instruments_toml(content),
         "import.json": import_json(content),
         "import.html": partial(import_html, content),
     }
