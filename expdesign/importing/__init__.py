@@ -5,6 +5,7 @@
         -> one time scale for all files                           alignment
         -> even steps without gaps                                sampling
         -> runs                                                   runs
+        -> what each is, in words                                 labels
     beside: how actuators follow their orders                     responses
             noise, rounding and interval of each sensor           noise
 
@@ -14,7 +15,8 @@ Times count from 1970 UTC where a clock has a date. Angles are in radians, headi
 from expdesign.importing.alignment import Lag, lag_of
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log
 from expdesign.importing.guess import guess
-from expdesign.importing.machines import bow_signals
+from expdesign.importing.labels import family, fitted, presumed
+from expdesign.importing.machines import bow_signals, sides
 from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use
 from expdesign.importing.noise import sensor_keys
 from expdesign.importing.readers import READERS, read_log
@@ -23,11 +25,8 @@ from expdesign.importing.runs import (
     Run,
     cut,
     cut_by_plan,
-    family,
     file_name,
-    fitted,
     inputs_of,
-    presumed,
     typical_length_m,
 )
 from expdesign.importing.sampling import NothingToWrite, Sampled, Stretch, sampled

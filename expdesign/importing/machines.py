@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import Mapping, Use
-from expdesign.importing.names import BOW, Mark
+from expdesign.importing.names import BOW, PORT, STARBOARD, Mark
 from expdesign.importing.units import SHARES, words
 from expdesign.values import Array
 from expdesign.vessel import Actuator
@@ -127,3 +127,14 @@ def bow_signals(mapping: Mapping) -> tuple[str, ...]:
         for use in mapping.uses
         if re.search(BOW, words(use.channel)) and use.column.endswith("_rps")
     )
+
+
+def sides(mapping: Mapping) -> dict[str, float]:
+    """Signal of a thruster -> side that the name of its channel says, -1 for port."""
+    found: dict[str, float] = {}
+    for use in mapping.uses:
+        if use.column.endswith("_rps"):
+            name, signal = words(use.channel), use.column.removeprefix("reached_").removesuffix("_rps")
+            side = -1.0 if re.search(PORT, name) else 1.0 if re.search(STARBOARD, name) else 0.0
+            found |= {signal: side} if side else {}
+    return found

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.importing.channels import Channel
-from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION
-from expdesign.importing.units import FACTORS, SHARES, split_unit, unit_word, words
+from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, dimension
+from expdesign.importing.units import FACTORS, KNOWN, SHARES, split_unit, unit_word, words
 from expdesign.records.file import Source, meaning
 from expdesign.values import Array
 
@@ -123,9 +123,19 @@ def marked(channel: Channel) -> Mark:
         column, rank = _rule(whole, ACTUATOR_RULES) or ("", 9)
     if name in ("x", "y", "z"):
         column, rank = _coordinate(name, channel.values), 3
+    if not _fits(column, unit_word(unit)):
+        column = ""
     if column in BESIDE and np.ptp(channel.values) == 0:
         column = ""
     return Mark(column=column, rank=rank, unit=unit_word(unit), name=name)
+
+
+def _fits(column: str, unit: str) -> bool:
+    """Whether a column can be in a unit that is stated: a speed in knots is no number of revolutions."""
+    kind = {"rudder": "angle", "a": "angle", "n": "revolutions"}.get(column)
+    if not column or not unit or column == "throttle" or (kind and unit in SHARES):
+        return True
+    return unit in FACTORS[kind or dimension(column)] or unit not in KNOWN
 
 
 def family_of(channel: Channel) -> tuple[str, str]:

@@ -31,6 +31,7 @@ PAIRS = (
 )
 PLACES = {"lat_deg", "lon_deg", "north_m", "east_m"}
 LONGEST_STEP_S, SHORTEST_STEP_S = 1.0, 0.01
+JITTER = 0.02  # share by which a usual interval may differ from the nearest round one
 SAME = 1.5  # ratio of intervals within which two rates are the same
 GAP = 3.5  # intervals without a reading that are a gap
 LEAST_GAP_S = 1.5
@@ -270,7 +271,9 @@ def _step(table: Table[str, Channel]) -> float:
     fastest_s = min(own, default=interval_s)
     if interval_s > LONGEST_STEP_S:
         interval_s = max(LONGEST_STEP_S, fastest_s)
-    return float(f"{max(interval_s, SHORTEST_STEP_S):.4g}")
+    interval_s = max(interval_s, SHORTEST_STEP_S)
+    rate = float(f"{interval_s:.1g}")  # of which stamps at reception differ by a little
+    return rate if abs(interval_s / rate - 1.0) < JITTER else float(f"{interval_s:.4g}")
 
 
 def _covered(channels: list[Channel], step_s: float) -> list[tuple[float, float]]:

@@ -12,6 +12,7 @@ from expdesign.errors import FileError
 from expdesign.importing.channels import Log, Reader
 from expdesign.importing.readers.ardupilot import is_ardupilot, read_ardupilot
 from expdesign.importing.readers.matlab import read_matlab, read_matlab73
+from expdesign.importing.readers.n2k import is_n2k, read_n2k
 from expdesign.importing.readers.px4 import read_px4
 from expdesign.importing.readers.ros import is_ros, read_ros
 from expdesign.importing.readers.sheets import read_excel, read_parquet
@@ -56,6 +57,12 @@ READERS = (
     Reader(
         name="MATLAB 7.3", meaning="the same of version 7.3, and other HDF5, by h5py",
         fits=_begins(b"MATLAB 7.3", b"\x89HDF"), read=read_matlab73, extra="logs",
+    ),
+    Reader(
+        name="NMEA 2000",
+        meaning="as text, by nmea2000: plain and fast lines of canboat and Actisense, frames of Yacht Devices, "
+        "candump -L; JSON of canboat's analyzer",
+        fits=is_n2k, read=read_n2k, extra="logs",
     ),
     Reader(
         name="text",

@@ -53,6 +53,7 @@ from expdesign.importing import (
     read_log,
     sampled,
     sensor_keys,
+    sides,
     typical_length_m,
 )
 from expdesign.importing.mapping import Mapping as Decisions
@@ -317,7 +318,10 @@ def _tried(
     taken = ship
     if ship is None:
         bow = bow_signals(mapping)
-        taken = presumed([run.stretch for run in runs], length_m=length_m, sample_time_s=found.sample_time_s, bow=bow)
+        taken = presumed(
+            [run.stretch for run in runs], length_m=length_m, sample_time_s=found.sample_time_s, bow=bow,
+            sides=sides(mapping),
+        )  # fmt: skip
     assert taken is not None
     batches, kept, refused = [], [], []
     texts: dict[str, str] = {}
