@@ -28,6 +28,7 @@ from logged_trial import (
     write_excel,
     write_matlab,
     write_matlab73,
+    write_n2k,
     write_nmea,
     write_opencpn,
     write_own,
@@ -41,6 +42,7 @@ KNOT, DEGREE = 1852 / 3600, math.pi / 180
 EXTRA = {
     write_excel: "openpyxl", write_parquet: "pyarrow", write_matlab73: "h5py", write_ulog: "pyulog",
     write_ros: "rosbags", write_ardupilot: "pymavlink", write_telemetry: "pymavlink",
+    write_n2k: "nmea2000",
 }  # fmt: skip
 
 
@@ -86,6 +88,7 @@ def errors(columns: dict[str, np.ndarray], trip: Voyage) -> dict[str, float]:
 # rounding of what each writer writes, at most; a turn of 0.03 rad/s times the rounding of times adds to headings
 FINE = {"lat_deg": 1e-8, "lon_deg": 1e-8, "heading_rad": 1.5e-6, "u_mps": 5e-5, "v_mps": 5e-5, "r_radps": 2e-8}
 BOARD = {"lat_deg": 6e-8, "lon_deg": 6e-8, "heading_rad": 1e-4, "u_mps": 5e-4, "v_mps": 5e-4, "r_radps": 1e-7}
+BUS = {"lat_deg": 6e-8, "lon_deg": 6e-8, "heading_rad": 7e-5, "u_mps": 6e-3, "v_mps": 6e-3, "r_radps": 1e-7}
 TELEMETRY = {**BOARD, "u_mps": 8e-3, "v_mps": 8e-3}
 CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], set[str]]] = {
     "ours": ("a.csv", write_own, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
@@ -101,6 +104,12 @@ CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], se
     },
     "nmea": ("a.nmea", write_nmea, FINE, {"n1_rps", "reached_rudder1_rad"}),
     "opencpn": ("a.csv", write_opencpn, FINE, {"n1_rps", "reached_rudder1_rad"}),
+    **{
+        f"nmea 2000 {form}": (
+            f"a.{form}", partial(write_n2k, form=form), BUS, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}
+        )
+        for form in ("plain", "candump", "frames", "ascii", "json")
+    },
     "excel": ("a.xlsx", write_excel, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
     "parquet": ("a.parquet", write_parquet, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
     "matlab": ("a.mat", write_matlab, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
@@ -125,7 +134,8 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
     assert set(bounds) | inputs <= set(found)
     assert {key: found[key] for key in bounds if found[key] > bounds[key]} == {}
     # an order is 0 or +-35 degrees, +-20 degrees, or a tenth of a degree for the course; pulses are rounded to 1/500
-    assert all(found[key] < (2e-3 if key == "tau_psi" else 2e-6) for key in inputs)
+    rounded = 6e-5 if case.startswith("nmea 2000") else 2e-6
+    assert all(found[key] < (2e-3 if key == "tau_psi" else rounded) for key in inputs)
     assert [run["what"] for run in said["runs"]] == ["zig-zag 20/20 starboard", "turning circle 35 starboard"]
 
 

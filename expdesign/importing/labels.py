@@ -123,7 +123,8 @@ def _actuators(
         found.append(Actuator(kind="force", number=1, limits=tuple(limit)))
     numbers = sorted({int("".join(c for c in name if c.isdigit())) for name in names if name[0] in "na"})
     for number in numbers:
-        size = 1.2 * max(sizes.get(f"n{number}_rps", 1.0), 1e-3)
+        alike = [f"{name}_rps" for name in sides] if f"n{number}" in sides else [f"n{number}_rps"]  # port as starboard
+        size = 1.2 * max(max((sizes[name] for name in alike if name in sizes), default=1.0), 1e-3)
         speed, turns = Limit(low=-size, high=size), f"a{number}_rad" in names
         kind = "azimuth" if turns else "tunnel" if f"n{number}" in bow else "propeller"
         place = 0.4 * length_m if kind == "tunnel" else -0.45 * length_m

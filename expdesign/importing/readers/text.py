@@ -35,6 +35,7 @@ PLACE = re.compile(
 COMMENT = "#%/"
 SHARE = 0.5  # of cells of a row of data that are numbers or times
 TEXTS_SHOWN = 3
+MOST_COLUMNS = 2000
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,11 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     """
     encoding = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline=None) as file:
-        sample = [line for line, _ in zip(file, range(SNIFFED), strict=False)]
+        sample = file.readlines(BLOCK_BYTES)[:SNIFFED]
     if not any(line.strip() for line in sample):
         raise FileError(path, "", "is empty, expected a log")
+    if (wide := max(line.count(separator) for line in sample[:2] for separator in SEPARATORS[:-1])) > MOST_COLUMNS:
+        raise FileError(path, "row 1", f"has {wide + 1} columns, expected at most {MOST_COLUMNS}")
     plain = [line for line in sample if "$" not in line and not line.startswith("!") and line.strip()]
     dialect = sniffed(plain)
     table = None if dialect is None else _Table(path, dialect, plain)
@@ -213,7 +216,17 @@ def _header(before: Sequence[Sequence[str]], width: int) -> tuple[tuple[str, ...
     names, units = rows[-1], [""] * width
     if len(rows) > 1 and sum(bool(split_unit(f"x [{cell.strip('[]()')}]")[1]) for cell in names if cell) > width / 3:
         names, units = rows[-2], [cell.strip("[]()") for cell in rows[-1]]
-    return tuple(name or f"column {k}" for k, name in enumerate(names, start=1)), tuple(units)
+    return _once([name or f"column {k}" for k, name in enumerate(names, start=1)]), tuple(units)
+
+
+def _once(names: Sequence[str]) -> tuple[str, ...]:
+    """The same, those that come again with their count: hdg, hdg (2)."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return tuple(found)
 
 
 @dataclass
