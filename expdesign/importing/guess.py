@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from expdesign.importing.channels import Channel, Log
 from expdesign.importing.machines import numbered
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, FileClock, Mapping, Use
@@ -35,7 +37,11 @@ def _best(channels: Sequence[Channel], marks: Sequence[Mark]) -> dict[tuple[str,
     """The channel of each column: by rank of its name, then readings; companions from one sentence or message."""
     found: dict[tuple[str, ...], Channel] = {}
     for key in sorted({mark.key for mark in marks if mark.column}):
-        own = [(m.rank, -len(c), k) for k, (c, m) in enumerate(zip(channels, marks, strict=True)) if m.key == key]
+        own = [
+            (m.rank + 10 * (np.ptp(c.values) == 0), -len(c), k)
+            for k, (c, m) in enumerate(zip(channels, marks, strict=True))
+            if m.key == key
+        ]
         longest = max(-count for _, count, _ in own)
         own = [item for item in own if -item[1] > 0.1 * longest]
         found[key] = channels[min(own)[2]]

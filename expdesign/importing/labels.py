@@ -145,7 +145,8 @@ def _actuators(
 def family(ship: Vessel, batch: Batch) -> str:
     """What a run is, in words, as the indices read it; else which inputs change."""
     try:
-        found, by = measured_trial(*_with_helm(ship, batch)), BY[Helm(vessel=ship).means]
+        like = _with_helm(ship, batch)
+        found, by = measured_trial(*like), BY[Helm(vessel=like[0]).means]
     except (InputError, NoAnswer):  # a run that no index describes is named by its inputs
         found, by = NotStandard(name=batch.name, reason=""), ""
     match found:
@@ -184,6 +185,12 @@ def _changes(ship: Vessel, batch: Batch) -> str:
 
 def _with_helm(ship: Vessel, batch: Batch) -> tuple[Vessel, Batch]:
     """The same where inputs are forces: their moment taken for a rudder of 35 degrees at most."""
+    if not any(one.kind in ("propeller", "azimuth", "force") for one in ship.actuators):  # only her helm is recorded
+        names, inputs = (*batch.input_names, "n1"), np.column_stack([batch.inputs, np.ones(len(batch))])
+        columns = {f"{n}_rps" if n == "n1" else f"{n}_rad": own for n, own in zip(names, inputs.T, strict=True)}
+        batch = replace(batch, input_names=names, inputs=inputs, reached=(), planned=None, delivered=None)
+        stretch = Stretch(time_s=batch.time_s, columns=columns)
+        return presumed([stretch], length_m=ship.length_m, sample_time_s=batch.sample_time_s, bow=()), batch
     if "tau_psi" not in batch.input_names:
         return ship, batch
     ahead, moment = (batch.inputs[:, batch.input_names.index(name)] for name in ("tau_x", "tau_psi"))

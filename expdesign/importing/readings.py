@@ -25,6 +25,8 @@ NEAR = 1.6  # factor within which a ratio is that of a unit
 WINDOW, WINDOW_S = 5, 10.0  # readings, and seconds, over which changes are compared, at least
 PULSES = (700.0, 2300.0)  # us
 SENSE = "turned over"
+DIRECTIONS = ("heading_rad", MAGNETIC, COG)
+NEAR_RAD = 0.5  # median by which heading and course, magnetic and true, differ at most
 
 
 def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> Use:
@@ -60,6 +62,12 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
     if mark.unit:
         return replace(use, why="its name and unit")
     if kind == "angle":
+        if (
+            mark.column in DIRECTIONS
+            and largest < RADIANS[mark.column]
+            and (like := _as_beside(mark, channel, channels))
+        ):
+            return replace(use, unit=like[0], why=f"its name; {like[0]}, in which it is near {like[1]}")
         rounded = bool((channel.values == np.round(channel.values, DECIMALS)).all())
         unit = "deg" if largest > RADIANS[mark.column] or rounded or _degrees_beside(channel, channels) else "rad"
         few = "" if largest > RADIANS[mark.column] or not rounded else " and of few decimals"
@@ -96,6 +104,22 @@ def _degrees_beside(channel: Channel, channels: Sequence[Channel]) -> bool:
     beside = [c for c in channels if family_of(c) == family_of(channel) and c is not channel]
     names = [(c, marked(c).column) for c in beside]
     return any(name in RADIANS and np.abs(c.values).max() > RADIANS[name] for c, name in names)
+
+
+def _as_beside(mark: Mark, channel: Channel, channels: Sequence[Channel]) -> tuple[str, str] | None:
+    """The unit in which a direction is near another one of its table that is in degrees, and the name of that one."""
+    for other in channels:
+        column = marked(other).column
+        beside = family_of(other) == family_of(channel) and len(other) == len(channel) and other is not channel
+        if beside and column in DIRECTIONS and column != mark.column and np.abs(other.values).max() > RADIANS[column]:
+            course = np.exp(-1j * np.radians(other.values))
+            apart = {
+                unit: float(np.median(np.abs(np.angle(np.exp(1j * factor * channel.values) * course))))
+                for unit, factor in (("rad", 1.0), ("deg", np.pi / 180.0))
+            }
+            near = min(apart, key=lambda unit: apart[unit])
+            return (near, other.name) if apart[near] < NEAR_RAD else None
+    return None
 
 
 @dataclass(frozen=True)
