@@ -79,6 +79,8 @@ NO_LOGS = {
     b"\xfd7zXZ": "compressed by xz, expected it unpacked",
     b"7z\xbc\xaf": "a 7z archive, expected the log itself, unpacked",
     b"Rar!": "a rar archive, expected the log itself, unpacked",
+    b"\xd4\xc3\xb2\xa1": "a capture of a network (pcap), expected NMEA 2000 as text, as by candump -L",
+    b"\n\r\r\n": "a capture of a network (pcapng), expected NMEA 2000 as text, as by candump -L",
     b"%PDF": "a PDF, expected the log itself",
     b"<?xml": "XML, expected a log with times, positions, speeds, headings and orders, as CSV or NMEA 0183",
 }
