@@ -1,7 +1,8 @@
 """Logs of ships and craft become files that this package reads; every decision is told, kept and may be changed.
 
     log -> channels (name, unit, times, readings)                readers
-        -> columns of ours, in our units and senses               mapping: guessed, or as a file says
+        -> columns of ours, in our units and senses               mapping: as a file says, or a guess by names,
+                                                                  readings and machines
         -> one time scale for all files                           alignment
         -> even steps without gaps                                sampling
         -> runs                                                   runs

@@ -10,9 +10,11 @@ from __future__ import annotations
 import json
 import logging
 import re
+from array import array
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +56,9 @@ FORMS = {
     ),
 }  # fmt: skip
 """Form of a line -> how it begins, with date and time of day, or seconds, as groups."""
+Series = tuple["array[float]", "array[float]"]
+"""Times and values."""
+Units = Mapping[str, str]
 LOOKED_AT = 4096  # bytes in which a form is told
 SHORT = 8  # bytes of a frame; longer lines are whole messages
 INSTANCES = {1: " starboard"}
@@ -81,11 +86,11 @@ def read_n2k(path: Path, sample_time_s: float) -> Log:
     form = _form(path)
     if form == "no times":
         raise FileError(path, "", "is NMEA 2000 without times, expected a record with them, as by candump -L")
-    found: defaultdict[tuple[str, str, int], list[tuple[str, str, float]]] = defaultdict(list)
+    found: defaultdict[tuple[str, str, int], Series] = defaultdict(lambda: (array("d"), array("d")))
     unread: Counter[str] = Counter()
     broken = 0
-    for stamp, message in _messages(path, form):
-        if message is None:
+    for time_s, message in _messages(path, form):
+        if message is None or time_s is None:
             broken += 1
             continue
         number, source, fields, units = message
@@ -102,16 +107,16 @@ def read_n2k(path: Path, sample_time_s: float) -> Log:
             value = fields.get(field)
             if isinstance(value, (int, float)):
                 what = f"{fields.get('reference', '')} {what}".strip().lower() if what == "heading" else what
-                found[f"{name}{where}.{what}", units.get(unit, unit), source].append((*stamp, float(value)))
+                times, values = found[f"{name}{where}.{what}", units.get(unit, unit), source]
+                times.append(time_s)
+                values.append(float(value))
     if not found:
         raise FileError(path, "", "holds NMEA 2000 without rudder, heading, turn, engine, position or speed")
     return _log(path, found, unread, broken)
 
 
-def _messages(
-    path: Path, form: str
-) -> Iterator[tuple[tuple[str, str], tuple[int, int, dict[str, Any], Mapping[str, str]] | None]]:
-    """((date or seconds, time of day), (number, device, field -> value, its own words for units)); None for broken."""
+def _messages(path: Path, form: str) -> Iterator[tuple[float | None, tuple[int, int, dict[str, Any], Units] | None]]:
+    """(seconds, (number, device, field -> value, its own words for units)) of each message; None where it is broken."""
     with path.open(encoding="latin-1") as file:
         lines = (line.strip() for line in file)
         lines = (line for line in lines if line and line[0] != "#")
@@ -126,19 +131,51 @@ def _of_lines(lines: Iterator[str], path: Path, own: re.Pattern[str]) -> Iterato
     for line in lines:
         begin = own.match(line)
         if begin is None:
-            yield ("", ""), None
+            yield None, None
             continue
-        stamp = (begin[1], begin[2] if own.groups > 1 else "")
+        time_s = _seconds(begin[1], begin[2]) if own.groups > 1 else float(begin[1])
         try:
             message = decoder.decode(line)
         except Exception:  # of broken lines it raises anything
-            yield stamp, None
+            yield None, None
             continue
         if message is not None:
             fields = {
                 field.id.lower(): field.raw_value if field.id == "instance" else field.value for field in message.fields
             }
-            yield stamp, (message.PGN, message.source, fields, {})
+            yield time_s, (message.PGN, message.source, fields, {})
+
+
+def _of_json(lines: Iterator[str]) -> Iterator[Any]:
+    units: Units = DEGREES
+    for line in lines:
+        try:
+            own = json.loads(line)
+            if "version" in own and "pgn" not in own:
+                units = {} if own.get("units") == "si" else DEGREES
+                continue
+            date, _, clock = own["timestamp"].replace("T", "-").rpartition("-")
+            fields = {
+                key.replace(" ", "").lower(): value.get("name", value.get("value"))
+                if isinstance(value, dict)
+                else value
+                for key, value in own["fields"].items()
+            }
+            yield _seconds(date, clock.rstrip("Z")), (int(own["pgn"]), int(own["src"]), fields, units)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            yield None, None
+
+
+@cache
+def _day_s(date: str) -> float:
+    return float(read_stamps([date]).day[0]) * DAY_S
+
+
+def _seconds(date: str, clock: str) -> float:
+    """Of a date, "" for none, and hh:mm:ss or hhmmss."""
+    digits = clock.replace(":", "")
+    second = 3600.0 * int(digits[:2]) + 60.0 * int(digits[2:4]) + float(digits[4:])
+    return (_day_s(date) if date else 0.0) + second
 
 
 def _combined(path: Path, own: re.Pattern[str]) -> bool:
@@ -148,26 +185,6 @@ def _combined(path: Path, own: re.Pattern[str]) -> bool:
     with path.open(encoding="latin-1") as file:
         sizes = [int(begin[3]) for line, _ in zip(file, range(2000), strict=False) if (begin := own.match(line))]
     return max(sizes, default=0) > SHORT
-
-
-def _of_json(lines: Iterator[str]) -> Iterator[Any]:
-    units: Mapping[str, str] = DEGREES
-    for line in lines:
-        try:
-            own = json.loads(line)
-            if "version" in own and "pgn" not in own:
-                units = {} if own.get("units") == "si" else DEGREES
-                continue
-            date, _, time = own["timestamp"].replace("T", "-").rpartition("-")
-            fields = {
-                key.replace(" ", "").lower(): value.get("name", value.get("value"))
-                if isinstance(value, dict)
-                else value
-                for key, value in own["fields"].items()
-            }
-            yield (date, time.rstrip("Z")), (int(own["pgn"]), int(own["src"]), fields, units)
-        except (ValueError, KeyError, TypeError, AttributeError):
-            yield ("", ""), None
 
 
 def _where(number: int, fields: Mapping[str, Any]) -> str:
@@ -180,33 +197,22 @@ def _where(number: int, fields: Mapping[str, Any]) -> str:
     return INSTANCES.get(int(own), f" {int(own)}") if number == 127488 else f" {int(own)}"
 
 
-def _log(
-    path: Path,
-    found: Mapping[tuple[str, str, int], list[tuple[str, str, float]]],
-    unread: Counter[str],
-    broken: int,
-) -> Log:
+def _log(path: Path, found: Mapping[tuple[str, str, int], Series], unread: Counter[str], broken: int) -> Log:
     best: dict[str, tuple[str, int]] = {}
-    for (name, unit, source), rows in found.items():
-        if name not in best or len(rows) > len(found[name, *best[name]]):
+    for (name, unit, source), (_, values) in found.items():
+        if name not in best or len(values) > len(found[name, *best[name]][1]):
             best[name] = unit, source
     notes = [f"left out {counted(broken, 'line')} that cannot be read"] if broken else []
     channels: list[Channel] = []
     clock = COMPUTER
-    for (name, unit, source), rows in found.items():
+    for (name, unit, source), (stamps, values) in found.items():
         if best[name] != (unit, source):
-            unread[f"{name} of device {source}"] += len(rows)
+            unread[f"{name} of device {source}"] += len(values)
             continue
-        dates, times, values = zip(*rows, strict=True)
-        if times[0]:
-            second = read_stamps([text if ":" in text else _colons(text) for text in times]).second
-            if dates[0]:
-                stamps = read_stamps(list(dates)).day * DAY_S + second
-            else:
-                stamps, clock = over_midnight(second), OWN
-        else:
-            stamps = np.array(dates, dtype=float)
-        order, own, more = set_right(np.asarray(stamps, dtype=float), what=name)
+        times = np.array(stamps)
+        if times[0] < DAY_S:  # without a date
+            times, clock = over_midnight(times), OWN
+        order, own, more = set_right(times, what=name)
         notes += more
         numbers = np.array(values)[order]
         channels.append(Channel(name=name, source=path.name, unit=unit, time_s=own, values=numbers))
@@ -214,10 +220,6 @@ def _log(
         channels = [_renamed(channel, "Engine.rpm", "Engine port.rpm") for channel in channels]
     unused = tuple(f"{name} ({count})" for name, count in unread.most_common())
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=unused)
-
-
-def _colons(clock: str) -> str:
-    return f"{clock[:2]}:{clock[2:4]}:{clock[4:]}"
 
 
 def _renamed(channel: Channel, old: str, new: str) -> Channel:
