@@ -461,3 +461,49 @@ def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
             for name, message in messages.items():
                 writer.write(links[name], ns, serialize(message, topics[name]))
     return path
+
+
+SHIP = """
+[vessel]
+name = "field-50m"
+length_m = 50.0
+beam_m = 10.0
+draught_m = 3.0
+sample_time_s = 1.0
+[[actuators]]
+kind = "propeller"
+speed_min_rps = -4.0
+speed_max_rps = 4.0
+[[actuators]]
+kind = "rudder"
+forward_m = -25.0
+angle_min_rad = -0.62
+angle_max_rad = 0.62
+angle_rate_radps = 0.05
+[model]
+structure = "custom"
+form = "continuous"
+terms = [
+  {equation = "u", name = "X_uu", expression = "abs(u)*u"},
+  {equation = "u", name = "X_nn", expression = "abs(n1)*n1"},
+  {equation = "u", name = "X_vr", expression = "v*r"},
+  {equation = "v", name = "Y_uv", expression = "abs(u)*v"},
+  {equation = "v", name = "Y_ur", expression = "u*r"},
+  {equation = "r", name = "N_ur", expression = "abs(u)*r"},
+  {equation = "r", name = "N_ud", expression = "abs(u)*u*sin(rudder1)"},
+]
+[model.parameters]
+X_uu = -0.005
+X_nn = 0.007
+X_vr = 1.0
+Y_uv = -0.03
+Y_ur = -0.4
+N_ur = -0.03
+N_ud = 0.0006
+[sensors]
+position_m = 0.3
+heading_rad = 0.003
+velocity_mps = 0.02
+yaw_rate_radps = 0.001
+"""
+"""A vessel file for the voyage, with parameters that are not those of `derivative`."""

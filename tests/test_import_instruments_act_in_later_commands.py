@@ -15,8 +15,7 @@ from expdesign.export import vessel_toml
 from expdesign.importing import Channel, sampled, sensor_keys
 from expdesign.importing.mapping import COG, SOG, Mapping
 from expdesign.scenario import equipped_vessel, load_vessel
-from logged_trial import Voyage, sentence, voyage
-from test_import_formats_give_the_same_record import SHIP
+from logged_trial import SHIP, Voyage, sentence, voyage
 
 SILENT = SHIP[: SHIP.index("[sensors]")]
 TOLD = {"position_interval_s": 5.0, "velocity_interval_s": 5.0, "heading_rad": 0.004}

@@ -29,7 +29,7 @@ TOLD = ("rate", "lag_s", "delay_s")  # fields of a response
 class InstrumentsFile(Table):
     """What an import leaves beside its runs; `estimate`, `diagnose`, `mine`, `monitor` and `indices` read it."""
 
-    topic: ClassVar[str] = "vessel"  # which has these keys
+    topic: ClassVar[str] = "instruments"
 
     sensors: SensorsTable = Field(
         default_factory=SensorsTable,
