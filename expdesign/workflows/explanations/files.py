@@ -55,8 +55,8 @@ MAPPINGS = (
 )
 INSTRUMENTS_TEXT = (
     "expdesign import leaves it beside its runs, with what the logs tell. estimate, diagnose, mine, monitor and "
-    "indices use it where the vessel file says nothing, and say so; what the vessel file states counts, and a difference is "
-    "told. Change or delete what is wrong."
+    "indices use it where the vessel file says nothing, and say so; what the vessel file states counts, and a "
+    "difference is told. Change or delete what is wrong."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
