@@ -6,6 +6,7 @@ writer in a kept library are written by hand, from their specification.
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 from dataclasses import dataclass
@@ -197,6 +198,51 @@ def write_opencpn(path: Path, trip: Voyage) -> Path:
     for k, line in enumerate(lines):
         rows.append(f'{iso(trip.time_s[k // each] + 0.012)},NMEA0183,{line[3:6]},"{line}"')
     path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def n2k(trip: Voyage) -> list[tuple[float, int, int, bytes, dict[str, object]]]:
+    """Time, message, priority, its eight bytes after the standard, and fields as canboat's analyzer names them."""
+    found: list[tuple[float, int, int, bytes, dict[str, object]]] = []
+    columns = (trip.time_s, trip.lat_deg, trip.lon_deg, trip.heading_rad, trip.speed_mps, trip.course_rad, trip.r_radps,
+               trip.n_rps, trip.order_rad, trip.rudder_rad)  # fmt: skip
+    for k, row in enumerate(np.stack(columns, axis=1).tolist()):
+        time_s, lat, lon, heading, speed, course, rate, rps, order, rudder = row
+        sid = k % 250
+        found += [
+            (time_s, 129025, 2, struct.pack("<ii", round(lat * 1e7), round(lon * 1e7)),
+             {"Latitude": lat, "Longitude": lon}),
+            (time_s, 129026, 2, struct.pack("<BBHH2x", sid, 0xFC, round(course * 1e4), round(speed * 100)),
+             {"COG Reference": "True", "COG": course, "SOG": speed}),
+            (time_s, 127250, 2, struct.pack("<BHhhB", sid, round(heading * 1e4), 0x7FFF, 0x7FFF, 0xFC),
+             {"Heading": heading, "Reference": "True"}),
+            (time_s, 127251, 2, struct.pack("<Bi3x", sid, round(rate / 3.125e-8)), {"Rate": rate}),
+            (time_s, 127245, 2, struct.pack("<BBhhH", 0, 0xF8, round(order * 1e4), round(rudder * 1e4), 0xFFFF),
+             {"Instance": 0, "Angle Order": order, "Position": rudder}),
+            (time_s, 127488, 2, struct.pack("<BHHbH", 0, round(rps * 240), 0xFFFF, 0x7F, 0xFFFF),
+             {"Instance": 0, "Speed": rps * 60}),
+        ]  # fmt: skip
+    return found
+
+
+def write_n2k(path: Path, trip: Voyage, *, form: str) -> Path:
+    """NMEA 2000 as text: plain, candump, frames of gateways, Actisense's ASCII, or JSON."""
+    lines = []
+    for time_s, number, priority, body, fields in n2k(trip):
+        stamp, source = iso(time_s), 12
+        name = f"{priority << 26 | number << 8 | source:08X}"
+        octets = [f"{byte:02X}" for byte in body]
+        lines.append({
+            "plain": f"{stamp},{priority},{number},{source},255,8,{','.join(octets).lower()}",
+            "candump": f"({time_s:.6f}) can0 {name}#{''.join(octets)}",
+            "frames": f"{stamp[11:23]} R {name} {' '.join(octets)}",
+            "ascii": f"A{stamp[11:23].replace(':', '')} {source:02X}FF{priority} {number:05X} {''.join(octets)}",
+            "json": json.dumps(
+                {"timestamp": stamp, "prio": priority, "src": source, "dst": 255, "pgn": number, "fields": fields}
+            ),
+        }[form])  # fmt: skip
+    head = ['{"version":"6.0.0","units":"si"}'] if form == "json" else ["# a comment"]
+    path.write_text("\n".join([*head, *lines]) + "\n")
     return path
 
 
@@ -415,3 +461,49 @@ def write_ros(path: Path, trip: Voyage, *, kind: str) -> Path:
             for name, message in messages.items():
                 writer.write(links[name], ns, serialize(message, topics[name]))
     return path
+
+
+SHIP = """
+[vessel]
+name = "field-50m"
+length_m = 50.0
+beam_m = 10.0
+draught_m = 3.0
+sample_time_s = 1.0
+[[actuators]]
+kind = "propeller"
+speed_min_rps = -4.0
+speed_max_rps = 4.0
+[[actuators]]
+kind = "rudder"
+forward_m = -25.0
+angle_min_rad = -0.62
+angle_max_rad = 0.62
+angle_rate_radps = 0.05
+[model]
+structure = "custom"
+form = "continuous"
+terms = [
+  {equation = "u", name = "X_uu", expression = "abs(u)*u"},
+  {equation = "u", name = "X_nn", expression = "abs(n1)*n1"},
+  {equation = "u", name = "X_vr", expression = "v*r"},
+  {equation = "v", name = "Y_uv", expression = "abs(u)*v"},
+  {equation = "v", name = "Y_ur", expression = "u*r"},
+  {equation = "r", name = "N_ur", expression = "abs(u)*r"},
+  {equation = "r", name = "N_ud", expression = "abs(u)*u*sin(rudder1)"},
+]
+[model.parameters]
+X_uu = -0.005
+X_nn = 0.007
+X_vr = 1.0
+Y_uv = -0.03
+Y_ur = -0.4
+N_ur = -0.03
+N_ud = 0.0006
+[sensors]
+position_m = 0.3
+heading_rad = 0.003
+velocity_mps = 0.02
+yaw_rate_radps = 0.001
+"""
+"""A vessel file for the voyage, with parameters that are not those of `derivative`."""

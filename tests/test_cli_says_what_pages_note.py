@@ -54,6 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (log,) = voyages(1, "random", last_s=6000.0, seed=3)
     log["r_radps"] = 0.9 * log["r_radps"]
     write_log(folder / "hours.csv", {**log, "mood": log["time_s"]}, (*log, "mood"))
+    (folder / "instruments.toml").write_text("[sensors]\nwind_mps = 0.4\nvelocity_mps = 0.9\n")
     return folder
 
 
@@ -76,6 +77,8 @@ def test_the_terminal_says_all_that_the_page_notes(
     told = capsys.readouterr().out
     assert DOUBT.get(command, "the headings are read every 4 s") in told
     assert "ignored mood" in told
+    assert f"by {folder.name}/instruments.toml, as ship.toml does not say: wind_mps = 0.4" in told
+    assert f"{folder.name}/instruments.toml shows velocity_mps = 0.9, where ship.toml says" in told
     lines = [" ".join(line.removeprefix("- ").split()) for line in told.splitlines()]
     for page in tmp_path.glob("*.html"):
         noted = noted_on(page)

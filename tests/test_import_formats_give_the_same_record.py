@@ -18,6 +18,7 @@ from expdesign.cli import main
 from expdesign.importing import read_log
 from logged_trial import (
     RATE_RADPS,
+    SHIP,
     START_S,
     Voyage,
     nmea,
@@ -28,6 +29,7 @@ from logged_trial import (
     write_excel,
     write_matlab,
     write_matlab73,
+    write_n2k,
     write_nmea,
     write_opencpn,
     write_own,
@@ -41,6 +43,7 @@ KNOT, DEGREE = 1852 / 3600, math.pi / 180
 EXTRA = {
     write_excel: "openpyxl", write_parquet: "pyarrow", write_matlab73: "h5py", write_ulog: "pyulog",
     write_ros: "rosbags", write_ardupilot: "pymavlink", write_telemetry: "pymavlink",
+    write_n2k: "nmea2000",
 }  # fmt: skip
 
 
@@ -86,6 +89,7 @@ def errors(columns: dict[str, np.ndarray], trip: Voyage) -> dict[str, float]:
 # rounding of what each writer writes, at most; a turn of 0.03 rad/s times the rounding of times adds to headings
 FINE = {"lat_deg": 1e-8, "lon_deg": 1e-8, "heading_rad": 1.5e-6, "u_mps": 5e-5, "v_mps": 5e-5, "r_radps": 2e-8}
 BOARD = {"lat_deg": 6e-8, "lon_deg": 6e-8, "heading_rad": 1e-4, "u_mps": 5e-4, "v_mps": 5e-4, "r_radps": 1e-7}
+BUS = {"lat_deg": 6e-8, "lon_deg": 6e-8, "heading_rad": 7e-5, "u_mps": 6e-3, "v_mps": 6e-3, "r_radps": 1e-7}
 TELEMETRY = {**BOARD, "u_mps": 8e-3, "v_mps": 8e-3}
 CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], set[str]]] = {
     "ours": ("a.csv", write_own, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
@@ -101,6 +105,12 @@ CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], se
     },
     "nmea": ("a.nmea", write_nmea, FINE, {"n1_rps", "reached_rudder1_rad"}),
     "opencpn": ("a.csv", write_opencpn, FINE, {"n1_rps", "reached_rudder1_rad"}),
+    **{
+        f"nmea 2000 {form}": (
+            f"a.{form}", partial(write_n2k, form=form), BUS, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}
+        )
+        for form in ("plain", "candump", "frames", "ascii", "json")
+    },
     "excel": ("a.xlsx", write_excel, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
     "parquet": ("a.parquet", write_parquet, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
     "matlab": ("a.mat", write_matlab, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
@@ -125,7 +135,8 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
     assert set(bounds) | inputs <= set(found)
     assert {key: found[key] for key in bounds if found[key] > bounds[key]} == {}
     # an order is 0 or +-35 degrees, +-20 degrees, or a tenth of a degree for the course; pulses are rounded to 1/500
-    assert all(found[key] < (2e-3 if key == "tau_psi" else 2e-6) for key in inputs)
+    rounded = 6e-5 if case.startswith("nmea 2000") else 2e-6
+    assert all(found[key] < (2e-3 if key == "tau_psi" else rounded) for key in inputs)
     assert [run["what"] for run in said["runs"]] == ["zig-zag 20/20 starboard", "turning circle 35 starboard"]
 
 
@@ -213,7 +224,7 @@ def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> 
     _, said = imported(write_own(tmp_path / "a.csv", trip))
     rate = said["actuators"]["rudder1"]["rate"]  # type: ignore[index]
     assert abs(rate["value"] - RATE_RADPS) < 0.002 * RATE_RADPS
-    assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "vessel-lines.toml").read_text()
+    assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "instruments.toml").read_text()
 
 
 def test_the_folder_is_what_other_commands_take(
@@ -231,48 +242,3 @@ def test_the_folder_is_what_other_commands_take(
     )
     for name, truth in (("N_ud", 0.0005), ("N_ur", -0.02), ("Y_ur", -0.3)):  # of differences over a second
         assert found["ls"]["parameters"][name]["value"] == pytest.approx(truth, rel=0.02)
-
-
-SHIP = """
-[vessel]
-name = "field-50m"
-length_m = 50.0
-beam_m = 10.0
-draught_m = 3.0
-sample_time_s = 1.0
-[[actuators]]
-kind = "propeller"
-speed_min_rps = -4.0
-speed_max_rps = 4.0
-[[actuators]]
-kind = "rudder"
-forward_m = -25.0
-angle_min_rad = -0.62
-angle_max_rad = 0.62
-angle_rate_radps = 0.05
-[model]
-structure = "custom"
-form = "continuous"
-terms = [
-  {equation = "u", name = "X_uu", expression = "abs(u)*u"},
-  {equation = "u", name = "X_nn", expression = "abs(n1)*n1"},
-  {equation = "u", name = "X_vr", expression = "v*r"},
-  {equation = "v", name = "Y_uv", expression = "abs(u)*v"},
-  {equation = "v", name = "Y_ur", expression = "u*r"},
-  {equation = "r", name = "N_ur", expression = "abs(u)*r"},
-  {equation = "r", name = "N_ud", expression = "abs(u)*u*sin(rudder1)"},
-]
-[model.parameters]
-X_uu = -0.005
-X_nn = 0.007
-X_vr = 1.0
-Y_uv = -0.03
-Y_ur = -0.4
-N_ur = -0.03
-N_ud = 0.0006
-[sensors]
-position_m = 0.3
-heading_rad = 0.003
-velocity_mps = 0.02
-yaw_rate_radps = 0.001
-"""

@@ -307,7 +307,7 @@ def test_slow_sensors_keep_their_interval(tmp_path: Path, trip: Voyage) -> None:
     )
     _, said, out = run_import(tmp_path / "a.txt")
     assert "lat_deg is read every 5 s" in notes_of(said)
-    assert "position_interval_s = 5.0" in (out / "vessel-lines.toml").read_text()
+    assert "position_interval_s = 5.0" in (out / "instruments.toml").read_text()
     assert said["sample_time_s"] == 1.0
 
 
@@ -320,7 +320,7 @@ def test_the_runs_of_a_plan_are_found_by_its_commands() -> None:
     commands = Commands(sample_time_s=1.0, names=("n1", "rudder1"), values=np.column_stack([np.full(600, 3.0), plan]))
     seen = np.concatenate([np.zeros(137), plan, np.zeros(80)]) + rng.normal(scale=0.02, size=817)
     stretch = Stretch(time_s=np.arange(817.0), columns={"rudder1_rad": seen, "u_mps": np.ones(817)})
-    record = Sampled(stretches=(stretch,), sample_time_s=1.0, notes=(), held_s={})
+    record = Sampled(stretches=(stretch,), sample_time_s=1.0, notes=(), held_s={}, channels={})
     runs, words = cut_by_plan(record, commands, [("circle a", 0, 200), ("zig-zag b", 350, 600)])
     assert [(run.name, run.stretch.time_s[0], len(run.stretch)) for run in runs] == [
         ("circle a", 137.0, 200),
@@ -544,7 +544,7 @@ def test_readings_that_a_log_repeats_give_noise_and_interval_of_their_own(tmp_pa
     table = np.column_stack([part.time_s[:count], rows])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="", fmt="%.8f")
     _, _, out = run_import(tmp_path / "a.csv")
-    sensors = dict(re.findall(r"^(\w+) = ([\d.e-]+)", (out / "vessel-lines.toml").read_text(), re.MULTILINE))
+    sensors = dict(re.findall(r"^(\w+) = ([\d.e-]+)", (out / "instruments.toml").read_text(), re.MULTILINE))
     assert float(sensors["position_interval_s"]) == 1.0
     # of 1300 and 6500 readings: a robust deviation of third differences is known to about 4 and 2 per cent
     assert float(sensors["position_m"]) == pytest.approx(0.3, rel=0.15)

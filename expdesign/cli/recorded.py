@@ -69,8 +69,9 @@ def import_(
 ) -> None:
     """Turn logs, as ships and craft record them, into runs that the other commands read.
 
-    Writes a CSV file for each run, mapping.toml with all decisions, vessel-lines.toml with what the logs tell of
-    actuators and sensors, import.json and import.html. estimate, diagnose, indices and mine take the folder.
+    Writes a CSV file for each run, mapping.toml with all decisions, instruments.toml with what the logs tell of
+    sensors and actuators, import.json and import.html. estimate, diagnose, mine, monitor and indices take the folder,
+    and use instruments.toml where the vessel file says nothing.
 
     Example: expdesign import bridge.nmea rudder.csv --vessel ship.toml
     """

@@ -151,23 +151,24 @@ def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def vessel_lines(content: ImportContent) -> str:
-    """What the logs tell of actuators and sensors, as lines to be put into a vessel file."""
+def instruments_toml(content: ImportContent) -> str:
+    """What the logs tell of actuators and sensors, which commands read that are given the folder."""
     lines = [
-        "# Lines for a vessel file, to be copied into its tables: what the logs tell of actuators and sensors.",
+        "# What the logs tell of sensors and actuators, by keys of vessel files. estimate, diagnose, mine, monitor and",
+        "# indices use it where the vessel file says nothing, and say so. Change or delete what is wrong.",
         f"# Made by: {content.command}",
     ]
-    for one in content.followed:
-        keys = response_keys(stem(one.signal))
-        lines += ["", f"# In the table [[actuators]] that has {one.signal}; {one.moves} changes of its order:"]
-        for key, value in (("rate", one.rate), ("lag_s", one.lag_s), ("delay_s", one.delay_s)):
-            if value is not None:
-                lines.append(f"# {keys[key]} = {value[0]:.3g}  # standard error {value[1]:.1g}")
-        if abs(one.offset) > 3 * one.rest:
-            lines.append(f"# {keys['offset']} = {one.offset:.3g}  # reached less ordered, at rest")
     if content.sensors:
         lines += ["", "[sensors]"]
         lines += [f"{key} = {value!r}  # {words}" for key, (value, words) in content.sensors.items()]
+    for one in content.followed:
+        keys = response_keys(stem(one.signal))
+        lines += ["", f"[actuators.{one.signal}]  # {one.moves} changes of its order"]
+        for key, value in (("rate", one.rate), ("lag_s", one.lag_s), ("delay_s", one.delay_s)):
+            if value is not None:
+                lines.append(f"{keys[key]} = {value[0]:.4g}  # standard error {value[1]:.1g}")
+        if abs(one.offset) > 3 * one.rest:
+            lines.append(f"# {keys['offset']} = {one.offset:.3g}: reached less ordered, at rest; not used")
     return "\n".join(lines) + "\n"
 
 
@@ -238,7 +239,8 @@ def import_document(content: ImportContent, folder: Path) -> Document:
         section(
             "How actuators follow their orders",
             Table(header=("Signal", "Rate per second", "Lag s", "Dead time s", "Left"), rows=response_rows(content)),
-            "Fitted to orders and positions reached; vessel-lines.toml has them as lines of a vessel file.",
+            "Fitted to orders and positions reached; instruments.toml has them, and other "
+            "commands use them where the vessel file says nothing.",
         ),
         section("Sensors", Table(header=("Key under [sensors]", "Value", "From"), rows=sensors)),
     )

@@ -1,10 +1,12 @@
 """Logs of ships and craft become files that this package reads; every decision is told, kept and may be changed.
 
     log -> channels (name, unit, times, readings)                readers
-        -> columns of ours, in our units and senses               mapping: guessed, or as a file says
+        -> columns of ours, in our units and senses               mapping: as a file says, or a guess by names,
+                                                                  readings and machines
         -> one time scale for all files                           alignment
         -> even steps without gaps                                sampling
         -> runs                                                   runs
+        -> what each is, in words                                 labels
     beside: how actuators follow their orders                     responses
             noise, rounding and interval of each sensor           noise
 
@@ -13,7 +15,10 @@ Times count from 1970 UTC where a clock has a date. Angles are in radians, headi
 
 from expdesign.importing.alignment import Lag, lag_of
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log
-from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use, bow_signals, guess
+from expdesign.importing.guess import guess
+from expdesign.importing.labels import family, fitted, presumed
+from expdesign.importing.machines import bow_signals, sides
+from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use
 from expdesign.importing.noise import sensor_keys
 from expdesign.importing.readers import READERS, read_log
 from expdesign.importing.responses import Followed, followed
@@ -21,11 +26,8 @@ from expdesign.importing.runs import (
     Run,
     cut,
     cut_by_plan,
-    family,
     file_name,
-    fitted,
     inputs_of,
-    presumed,
     typical_length_m,
 )
 from expdesign.importing.sampling import NothingToWrite, Sampled, Stretch, sampled

@@ -24,6 +24,8 @@ RESET_S, RESET_STEPS = 2.0, 10.0
 RESTART_GAP_S = 60.0
 """Put between readings before and after a clock began anew [s]."""
 DAY_S = 86400.0
+LARGEST = 1e20
+"""No reading of any quantity in any unit is as large; times in ns since 1970 are 2e18."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,15 +150,17 @@ def channels_of(
 ) -> tuple[list[Channel], list[str]]:
     """Channels of a table whose rows (k,) share a clock, and notes on it; readings that are no numbers are left out."""
     order, times, notes = set_right(np.asarray(time_s, dtype=float), what=what or source)
-    found = []
+    found, beyond = [], []
     for name, values in columns.items():
         own = np.asarray(values, dtype=float)[order]
-        known = np.isfinite(own)
+        known = np.abs(own) < LARGEST
+        beyond += [name] * bool((np.isfinite(own) & ~known).any())
         if known.any():
             unit = (units or {}).get(name, "")
             # most channels of a table have all readings, and then share its times
             times_of = times if known.all() else times[known]
             found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own[known]))
+    notes += [f"{', '.join(beyond)}: readings beyond {LARGEST:g} are left out"] * bool(beyond)
     return found, notes
 
 

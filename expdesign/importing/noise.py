@@ -1,15 +1,14 @@
-"""Noise and rounding of the readings of each sensor, as lines of a vessel file."""
+"""Noise, rounding and interval of the readings of each sensor, as keys of `[sensors]` in vessel files."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 
 from expdesign.importing.channels import Channel
-from expdesign.importing.mapping import NORTHWARD, SOG
-from expdesign.kinematics import held
+from expdesign.importing.sampling import SAME, Sampled
 from expdesign.values import Array
 
 EARTH_M_PER_DEG = 111195.0
@@ -17,39 +16,45 @@ THIRD = math.sqrt(20.0)
 """Standard deviation of third differences of white noise of one."""
 STEPS = 2000
 WHOLE = 0.98
-LOOKED_AT = 20_000
-"""Samples from which it is told whether a log repeats readings."""
-KEYS = (("heading_rad", "heading_rad", "heading"), ("r_radps", "yaw_rate_radps", "yaw_rate"),
-        ("u_mps", "velocity_mps", "velocity"), (NORTHWARD, "velocity_mps", "velocity"),
-        (SOG, "velocity_mps", "velocity"), ("lat_deg", "position_m", "position"), ("north_m", "position_m", "position"),
-        ("wind_speed_mps", "wind_mps", "wind"), ("roll_rad", "roll_rad", ""))  # fmt: skip
-"""Column, key of its noise in [sensors], and sensor whose interval is stated beside it."""
+DITHERED = 0.3  # noise over rounding above which means of readings are finer than the rounding
+KEYS = (("heading_rad", ("heading_rad",), "heading"), ("yaw_rate_radps", ("r_radps",), "yaw_rate"),
+        ("velocity_mps", ("u_mps", "v_mps"), "velocity"), ("position_m", ("lat_deg",), "position"),
+        ("position_m", ("north_m", "east_m"), "position"), ("wind_mps", ("wind_speed_mps",), "wind"),
+        ("roll_rad", ("roll_rad",), ""))  # fmt: skip
+"""Key of a sensor's noise in [sensors], the columns that show it, and the sensor whose interval is stated beside."""
 
 
-def sensor_keys(found: Mapping[str, Channel], held_s: Mapping[str, float]) -> dict[str, tuple[float, str]]:
-    """Key of [sensors] -> value, and what it is, for every sensor that the columns show."""
+def sensor_keys(found: Sampled) -> dict[str, tuple[float, str]]:
+    """Key of [sensors] -> value for the rows that are written, and what it is, for every sensor that shows."""
     keys: dict[str, tuple[float, str]] = {}
-    for column, key, sensor in KEYS:
-        if column not in found or key in keys:
+    for key, columns, sensor in KEYS:
+        own = [found.channels[name] for name in columns if name in found.channels]
+        if not own or key in keys:
             continue
-        scale = EARTH_M_PER_DEG if column == "lat_deg" else 1.0
-        values = found[column].values
-        if column == "heading_rad":
-            values = np.unwrap(values)
-        interval_s = held_s.get(column, 0.0)
-        how = held(values[:LOOKED_AT, None])
-        if how is not None and not how.interpolated:  # the log repeats what was read before
-            values = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0)]
-            interval_s = how.interval * found[column].interval_s
-        rounding = scale * step_of(values)
-        noise = scale * white_noise(values)
-        value = max(noise, rounding / math.sqrt(12.0))
+        value, words = _noise(own, found.sample_time_s)
         if value > 0:
-            words = f"noise {noise:.2g}, rounded to {rounding:.2g}" if rounding else f"noise {noise:.2g}"
             keys[key] = float(f"{value:.2g}"), words
-        if sensor and interval_s:
-            keys[f"{sensor}_interval_s"] = float(f"{interval_s:.4g}"), "between readings"
+        if sensor and columns[0] in found.held_s:
+            keys[f"{sensor}_interval_s"] = float(f"{found.held_s[columns[0]]:.4g}"), "between readings"
     return keys
+
+
+def _noise(channels: Sequence[Channel], step_s: float) -> tuple[float, str]:
+    """Standard deviation of the readings of one sensor in the rows that are written, and words on it."""
+    squares, noises, roundings, averaged = [], [], [], False
+    for channel in channels:
+        scale = EARTH_M_PER_DEG if channel.name == "lat_deg" else 1.0
+        values = np.unwrap(channel.values) if channel.name == "heading_rad" else channel.values
+        rounding, noise = scale * step_of(values), scale * white_noise(values)
+        share = channel.interval_s / step_s
+        averaged = share < 1.0 / SAME
+        mean = math.sqrt(share) if averaged else 1.0
+        coarse = rounding / math.sqrt(12.0) * (mean if noise > DITHERED * rounding else 1.0)
+        squares.append(max(noise * mean, coarse) ** 2)
+        noises.append(noise)
+        roundings.append(rounding)
+    words = f"noise {max(noises):.2g}" + (f", rounded to {max(roundings):.2g}" if any(roundings) else "")
+    return math.sqrt(float(np.mean(squares))), words + (" in each reading, of which rows are means" if averaged else "")
 
 
 def step_of(values: Array) -> float:

@@ -1,4 +1,4 @@
-"""Where runs begin and end in a record, and what ship to take them for where no vessel file says it.
+"""Where runs begin and end in a record.
 
 A run is a stretch in which helm or engine orders act, with the approach before it. It ends where the helm is amidships
 and the engine order stands, for about the time in which a ship sails three of her lengths; what lies between two runs
@@ -9,19 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
-from expdesign.errors import InputError, NoAnswer
 from expdesign.importing.sampling import Sampled, Stretch
-from expdesign.indices import NotStandard, measured_trial
-from expdesign.indices.values import Circle, Stop, ZigZag
 from expdesign.records.file import REACHED, is_input
-from expdesign.signals import Batch, Commands
+from expdesign.signals import Commands
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Limit, Term, Vessel, VesselModel
 
 QUIET_LENGTHS, QUIET_S = 3.0, (5.0, 60.0)
 """Way in ship lengths, and time [s], that a pause between two runs must last."""
@@ -184,149 +180,6 @@ def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, in
 def _orders(columns: Mapping[str, Array]) -> dict[str, Array]:
     """Signal column -> order where it is recorded, else the position reached."""
     return {name: columns.get(name, values) for name, values in inputs_of(columns).items()}
-
-
-def presumed(stretches: Sequence[Stretch], *, length_m: float, sample_time_s: float, bow: Sequence[str]) -> Vessel:
-    """A ship of this length with the recorded inputs, whose answers have the size that the record shows.
-
-    Only her signs are presumed: propellers drive her ahead, rudders and moments to starboard turn her to starboard.
-
-    Args:
-        stretches: with the same columns.
-        length_m: of the ship [m].
-        sample_time_s: of the record [s].
-        bow: signals of thrusters across the bow, e.g. ("n3",).
-    """
-    inputs = [inputs_of(stretch.columns) for stretch in stretches]
-    names = [name for name in inputs[0] if all(name in own for own in inputs)]
-    actuators = _actuators(
-        names, {name: max(float(np.abs(own[name]).max()) for own in inputs) for name in names}, length_m, bow
-    )
-    terms = [Term("u", "X_abs_u_u", "abs(u)*u"), Term("v", "Y_abs_u_v", "abs(u)*v"), Term("r", "N_abs_u_r", "abs(u)*r")]
-    values = [-0.05 / length_m, -1.0 / length_m, -1.0 / length_m]
-    rudders = [one.signals[0] for one in actuators if one.kind == "rudder"]
-    if any(one.kind != "rudder" for one in actuators):
-        terms += [Term("u", "X_mu", "tau_x"), Term("r", "N_mu", "tau_psi")]
-        values += [1e-3, 1e-3 / length_m]
-    for rudder in rudders:
-        terms.append(Term("r", f"N_{rudder}", f"abs(u)*u*sin({rudder})"))
-        values.append(1.0 / length_m**2 / len(rudders))
-    model = VesselModel(
-        terms=tuple(terms), parameters=np.array(values), parameter_std=np.zeros(len(values)), form="continuous",
-        sample_time_s=sample_time_s, actuators=actuators,
-    )  # fmt: skip
-    return Vessel(
-        name="presumed", length_m=length_m, beam_m=length_m / 5, draught_m=length_m / 15, sample_time_s=sample_time_s,
-        model=model,
-    )  # fmt: skip
-
-
-def fitted(ship: Vessel, batches: Sequence[Batch]) -> Vessel:
-    """The presumed ship with answers of the size that these data show, and the signs that she is presumed to have."""
-    parameters = np.array(ship.model.parameters)
-    for axis, output in ((0, "u"), (2, "r")):
-        rows = [k for k, term in enumerate(ship.model.terms) if term.equation == output]
-        x, y = [], []
-        for batch in batches:
-            own = dict(zip(batch.input_names, batch.inputs.T, strict=True))
-            if not set(ship.model.inputs) <= set(own):
-                return ship
-            phi = _regressors(ship, batch, [own[name] for name in ship.model.inputs])
-            good = np.isfinite(phi).all(axis=0) & np.isfinite(batch.velocity[:, axis])
-            x.append(phi[rows][:, good].T)
-            y.append(np.gradient(np.where(good, batch.velocity[:, axis], 0.0), batch.sample_time_s)[good])
-        theta = np.linalg.lstsq(np.concatenate(x), np.concatenate(y), rcond=None)[0]
-        for row, value in zip(rows, theta.tolist(), strict=True):
-            parameters[row] = math.copysign(max(abs(value), 1e-12), parameters[row])
-    return replace(ship, model=replace(ship.model, parameters=parameters))
-
-
-def _regressors(ship: Vessel, batch: Batch, inputs: Sequence[Array]) -> Array:
-    """(p, k) what each parameter multiplies."""
-    signals = dict(zip(ship.model.inputs, inputs, strict=True))
-    unit, rows = np.zeros(len(ship.model.parameters)), []
-    velocity = np.where(np.isfinite(batch.velocity), batch.velocity, 0.0)
-    for k, term in enumerate(ship.model.terms):
-        alone = replace(ship.model, parameters=np.eye(len(unit))[k])
-        axis = "uvr".index(term.equation)
-        acceleration = alone.accelerations(
-            velocity.T, velocity.T[:2], np.array([signals[name] for name in ship.model.inputs])
-        )
-        rows.append(np.broadcast_to(np.asarray(acceleration[axis], dtype=float), (len(batch),)))
-    return np.array(rows)
-
-
-def _actuators(
-    names: Sequence[str], sizes: Mapping[str, float], length_m: float, bow: Sequence[str]
-) -> tuple[Actuator, ...]:
-    found = []
-    if any(name.startswith("tau") for name in names):
-        limit = [
-            Limit(
-                low=-1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3), high=1.2 * max(sizes.get(f"tau_{axis}", 0.0), 1e-3)
-            )
-            for axis in ("x", "y", "psi")
-        ]
-        found.append(Actuator(kind="force", number=1, limits=tuple(limit)))
-    numbers = sorted({int("".join(c for c in name if c.isdigit())) for name in names if name[0] in "na"})
-    for number in numbers:
-        size = 1.2 * max(sizes.get(f"n{number}_rps", 1.0), 1e-3)
-        speed, turns = Limit(low=-size, high=size), f"a{number}_rad" in names
-        kind = "azimuth" if turns else "tunnel" if f"n{number}" in bow else "propeller"
-        place = 0.4 * length_m if kind == "tunnel" else -0.45 * length_m
-        found.append(
-            Actuator(kind=kind, number=number, forward_m=place, limits=(speed, Limit()) if turns else (speed,))
-        )
-    for name in sorted(name for name in names if name.startswith("rudder")):
-        number = int("".join(c for c in name if c.isdigit()))
-        found.append(
-            Actuator(kind="rudder", number=number, forward_m=-0.5 * length_m, limits=(Limit(low=-1.6, high=1.6),))
-        )
-    return tuple(found)
-
-
-def family(ship: Vessel, batch: Batch) -> str:
-    """What a run is, in words, as the indices read it; else which inputs change."""
-    try:
-        found = measured_trial(*_with_helm(ship, batch))
-    except (InputError, NoAnswer):  # a run that no index describes is named by its inputs
-        found = NotStandard(name=batch.name, reason="")
-    match found:
-        case ZigZag():
-            return (
-                f"zig-zag {math.degrees(found.heading_rad):.0f}/{math.degrees(found.helm_rad):.0f} {found.side}".strip()
-            )
-        case Circle():
-            return f"turning circle {math.degrees(found.helm_rad):.0f} {found.side}"
-        case Stop():
-            return "stop"
-    moved = [
-        name for name, values in zip(batch.input_names, batch.inputs.T, strict=True)
-        if np.ptp(values) > DRIVE_SHARE * max(float(np.abs(values).max()), 1e-9)
-    ]  # fmt: skip
-    helm = [name for name in moved if name.startswith(("rudder", "a", "tau_psi"))]
-    if not moved:
-        return "steady"
-    if not helm:
-        apart = np.ptp(
-            [values for name, values in zip(batch.input_names, batch.inputs.T, strict=True) if name in moved], axis=0
-        )
-        return (
-            "helm by propellers" if np.ptp(apart) > DRIVE_SHARE * max(float(apart.max()), 1e-9) else "changes of speed"
-        )
-    return "helm" if len(helm) == len(moved) else "helm and speed"
-
-
-def _with_helm(ship: Vessel, batch: Batch) -> tuple[Vessel, Batch]:
-    """The same where inputs are forces: their moment taken for a rudder of 35 degrees at most."""
-    if "tau_psi" not in batch.input_names:
-        return ship, batch
-    ahead, moment = (batch.inputs[:, batch.input_names.index(name)] for name in ("tau_x", "tau_psi"))
-    helm = math.radians(35.0) * moment / max(float(np.abs(moment).max()), 1.0)
-    names = ("n1_rps", "rudder1_rad")
-    stretch = Stretch(time_s=batch.time_s, columns=dict(zip(names, (ahead, helm), strict=True)))
-    like = presumed([stretch], length_m=ship.length_m, sample_time_s=batch.sample_time_s, bow=())
-    return like, replace(batch, input_names=("n1", "rudder1"), inputs=np.stack([ahead, helm], axis=1), reached=())
 
 
 def file_name(number: int, run: Run) -> str:

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from expdesign.errors import NoAnswer
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, Mapping
+from expdesign.kinematics import held
 from expdesign.records.file import PLANNED, REACHED, STEERED, input_name, is_input
 from expdesign.values import Array
 
@@ -29,6 +31,7 @@ PAIRS = (
 )
 PLACES = {"lat_deg", "lon_deg", "north_m", "east_m"}
 LONGEST_STEP_S, SHORTEST_STEP_S = 1.0, 0.01
+JITTER = 0.02  # share by which a usual interval may differ from the nearest round one
 SAME = 1.5  # ratio of intervals within which two rates are the same
 GAP = 3.5  # intervals without a reading that are a gap
 LEAST_GAP_S = 1.5
@@ -37,6 +40,13 @@ COVERED = 0.98  # share of a stretch that a column beside the main ones must cov
 EARLY = 0.25  # share of a step by which a stamp may be late and the reading still belongs to that step
 FAST = 20.0  # degrees between readings from which a way through north may be an average
 EARTH_M = 6.371e6  # radius, for the few metres between antenna and midships
+SENSORS_READ = (
+    ("lat_deg", "lon_deg"), ("north_m", "east_m"), ("u_mps", "v_mps"), (SOG, COG), (NORTHWARD, EASTWARD),
+    ("heading_rad",), (MAGNETIC,), ("r_radps",), ("wind_speed_mps", "wind_angle_rad"),
+)  # fmt: skip
+"""Columns of one sensor, which are read together."""
+LOOKED_AT, EVEN = 20_000, 0.95
+"""Samples from which it is told whether a log repeats readings, and share of their changes that must fit."""
 NORTH_CLOSE = 80.0  # degrees between its ends, at most
 
 
@@ -67,6 +77,7 @@ class Sampled:
     sample_time_s: float
     notes: tuple[str, ...]
     held_s: Table[str, float]  # column -> interval of a sensor that is read less often [s]
+    channels: Table[str, Channel]  # column -> the readings that it was made from
 
 
 def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
@@ -84,10 +95,9 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
         table[name], bad = _without_north(table[name])
         if bad:
             notes.append(f"{name}: {bad} readings on the way through north were averages across it, and are left out")
-    table, more = _true_heading(table, mapping)
-    notes += more
-    table, more = _ground_velocity(table)
-    notes += more
+    for step in (_own_readings, partial(_true_heading, mapping=mapping), partial(_ground_velocity, mapping=mapping)):
+        table, more = step(table)
+        notes += more
     for pair in PAIRS:
         if len(lone := set(pair) & set(table)) == 1:
             notes.append(f"{next(iter(lone))} is left out, as {next(iter(set(pair) - lone))} is missing")
@@ -107,7 +117,7 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
                 columns[name] = _resampled(name, table[name], times, step_s)
             else:
                 notes.append(f"{name} does not cover all of a stretch, and is left out of it")
-        stretches.append(Stretch(time_s=times, columns=_finished(columns, mapping, found)))
+        stretches.append(Stretch(time_s=times, columns=_finished(columns, mapping)))
     if not stretches:
         ends = {name: table[name].time_s[[0, -1]] - _origin(table) for name in main}
         spans = "; ".join(f"{name} from {first:.0f} to {last:.0f} s" for name, (first, last) in ends.items())
@@ -117,7 +127,7 @@ def sampled(found: Table[str, Channel], mapping: Mapping) -> Sampled:
         if name != VARIATION:
             notes.append(f"{name} is read every {interval_s:.4g} s; the last reading is repeated in between")
     return Sampled(
-        stretches=tuple(stretches), sample_time_s=step_s, notes=tuple(dict.fromkeys(notes)), held_s=held
+        stretches=tuple(stretches), sample_time_s=step_s, notes=tuple(dict.fromkeys(notes)), held_s=held, channels=table
     )  # fmt: skip
 
 
@@ -161,6 +171,30 @@ def _without_north(channel: Channel) -> tuple[Channel, int]:
     return replace(channel, time_s=channel.time_s[~bad], values=channel.values[~bad]), int(bad.sum())
 
 
+def _own_readings(table: dict[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
+    """Channels of sensors that a log repeats from row to row, with each reading once, at the row where it is new."""
+    notes = []
+    for pair in SENSORS_READ:
+        own = [table[name] for name in pair if name in table]
+        if not own or len({len(channel) for channel in own}) > 1:
+            continue
+        values = np.column_stack([channel.values for channel in own])
+        how = held(values[:LOOKED_AT])
+        if how is None or how.interpolated or how.interval != round(how.interval):
+            continue
+        interval = round(how.interval)
+        changes = np.flatnonzero((np.diff(values, axis=0) != 0).any(axis=1)) + 1
+        counts = np.bincount(changes % interval, minlength=interval)
+        if counts.max() < EVEN * len(changes):
+            continue
+        new = slice(int(counts.argmax()), None, interval)
+        for channel in own:
+            table[channel.name] = replace(channel, time_s=channel.time_s[new], values=channel.values[new])
+        names = " and ".join(channel.name for channel in own)
+        notes.append(f"{names}: the log repeats each reading in {interval} rows; it counts once, where it is new")
+    return table, notes
+
+
 def _true_heading(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[str, Channel], list[str]]:
     """The heading from a magnetic one."""
     variation = table.pop(VARIATION, None)
@@ -185,14 +219,14 @@ def _true_heading(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[str
     return {**table, "heading_rad": heading}, [note]
 
 
-def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
-    """Velocity north and east from speed and course, unless it is measured in the ship's axes."""
+def _ground_velocity(table: dict[str, Channel], mapping: Mapping) -> tuple[dict[str, Channel], list[str]]:
+    """Velocity of midships in the ship's axes, from speed and course, unless it is measured so."""
     speed, course = table.pop(SOG, None), table.pop(COG, None)
     if len({"u_mps", "v_mps"} & set(table)) == 1 and (NORTHWARD in table or (speed is not None and course is not None)):
         (alone,) = {"u_mps", "v_mps"} & set(table)
         del table[alone]
         table, notes = _ground_velocity(
-            {**table, **({} if speed is None or course is None else {SOG: speed, COG: course})}
+            {**table, **({} if speed is None or course is None else {SOG: speed, COG: course})}, mapping
         )
         return table, [f"{alone} alone is no velocity, and is left out", *notes]
     if {"u_mps", "v_mps"} <= set(table):
@@ -205,26 +239,41 @@ def _ground_velocity(table: dict[str, Channel]) -> tuple[dict[str, Channel], lis
         known = (speed.time_s >= course.time_s[0] - 1e-3) & (speed.time_s <= course.time_s[-1] + 1e-3)
         for name, part in ((NORTHWARD, np.cos(angle)), (EASTWARD, np.sin(angle))):
             table[name] = replace(speed, name=name, time_s=speed.time_s[known], values=(speed.values * part)[known])
-    if NORTHWARD in table and "heading_rad" not in table:
-        table.pop(NORTHWARD), table.pop(EASTWARD, None)
+    if NORTHWARD not in table or EASTWARD not in table:
+        return table, []
+    north, east = table.pop(NORTHWARD), table.pop(EASTWARD)
+    if "heading_rad" not in table:
         return table, [
             "no heading is recorded: u and v cannot be had from speed and course, and course is not taken for heading"
         ]
-    if NORTHWARD in table:
-        return table, [
-            "u_mps and v_mps are the velocity over ground, from speed and course or north and east, in the ship's axes"
-        ]
-    return table, []
+    # at the readings' own times, so that a velocity that is read less often is one of the ship's axes then
+    heading = table["heading_rad"]
+    known = (north.time_s >= heading.time_s[0] - 1e-3) & (north.time_s <= heading.time_s[-1] + 1e-3)
+    times = north.time_s[known]
+    angle = np.interp(times, heading.time_s, np.unwrap(heading.values))
+    ahead, right = north.values[known], np.interp(times, east.time_s, east.values)
+    c, s = np.cos(angle), np.sin(angle)
+    rate = np.interp(times, table["r_radps"].time_s, table["r_radps"].values) if "r_radps" in table else np.zeros(1)
+    u = c * ahead + s * right + rate * mapping.antenna_starboard_m
+    v = c * right - s * ahead - rate * mapping.antenna_forward_m
+    for name, values in (("u_mps", u), ("v_mps", v)):
+        table[name] = replace(north, name=name, time_s=times, values=values)
+    return table, [
+        "u_mps and v_mps are the velocity over ground, from speed and course or north and east, in the ship's axes"
+    ]
 
 
 def _step(table: Table[str, Channel]) -> float:
-    """The interval of the slowest main sensor of the ship's motion, at most a second."""
-    own = [channel.interval_s for name, channel in table.items() if name in MAIN]
+    """The interval of the slowest main sensor, at most a second; positions beside velocities do not count."""
+    without = PLACES if "u_mps" in table else set()
+    own = [channel.interval_s for name, channel in table.items() if name in MAIN and name not in without]
     interval_s = max((value for value in own if value < math.inf), default=LONGEST_STEP_S)
     fastest_s = min(own, default=interval_s)
     if interval_s > LONGEST_STEP_S:
         interval_s = max(LONGEST_STEP_S, fastest_s)
-    return float(f"{max(interval_s, SHORTEST_STEP_S):.4g}")
+    interval_s = max(interval_s, SHORTEST_STEP_S)
+    rate = float(f"{interval_s:.1g}")  # of which stamps at reception differ by a little
+    return rate if abs(interval_s / rate - 1.0) < JITTER else float(f"{interval_s:.4g}")
 
 
 def _covered(channels: list[Channel], step_s: float) -> list[tuple[float, float]]:
@@ -301,12 +350,8 @@ def _resampled(name: str, channel: Channel, times: Array, step_s: float) -> Arra
     return found / parts
 
 
-def _finished(columns: dict[str, Array], mapping: Mapping, found: Table[str, Channel]) -> dict[str, Array]:
-    """The columns of our CSV: velocities in the ship's axes, at the antenna's place or at midships."""
-    if NORTHWARD in columns and EASTWARD in columns:
-        north, east = columns.pop(NORTHWARD), columns.pop(EASTWARD)
-        c, s = np.cos(columns["heading_rad"]), np.sin(columns["heading_rad"])
-        columns |= {"u_mps": c * north + s * east, "v_mps": c * east - s * north}
+def _finished(columns: dict[str, Array], mapping: Mapping) -> dict[str, Array]:
+    """The columns of our CSV: all three forces, positions of midships."""
     if forces := [name for name in FORCES if name in columns]:
         columns |= {name: np.zeros(len(columns[forces[0]])) for name in FORCES if name not in columns}
     ahead, beside = mapping.antenna_forward_m, mapping.antenna_starboard_m
@@ -319,7 +364,4 @@ def _finished(columns: dict[str, Array], mapping: Mapping, found: Table[str, Cha
         columns["lat_deg"] = columns["lat_deg"] - np.degrees(north / EARTH_M)
     elif "north_m" in columns:
         columns |= {"north_m": columns["north_m"] - north, "east_m": columns["east_m"] - east}
-    if "r_radps" in columns and "u_mps" in columns and (SOG in found or NORTHWARD in found):
-        columns["u_mps"] = columns["u_mps"] + columns["r_radps"] * beside
-        columns["v_mps"] = columns["v_mps"] - columns["r_radps"] * ahead
     return columns

@@ -13,12 +13,13 @@ from expdesign.importing.channels import COMPUTER, DAY_S, GNSS, OWN
 from expdesign.values import Array
 
 STAMP = re.compile(
-    r"\s*(?:(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{8}(?=T))(?:[T ,_]+|$))?"
+    r"\s*(?:(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}/\d{1,2}/\d{2}|\d{8}(?=T))"
+    r"(?:[T ,_]+|$))?"
     r"(?:(?P<h>\d{1,2}):?(?P<m>\d{2})(?::?(?P<s>\d{2}(?:[.,]\d*)?))?\s*(?P<half>[AaPp][Mm])?)?"
     r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?\s*"
 )
 TIME_NAME = re.compile(
-    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|zeit|uhrzeit|datum|clock|t|secs?|seconds|received at)\b"
+    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|zeit|uhrzeit|datum|clock|t|secs?|seconds?|received at)\b"
 )
 SCALES = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "us"), (1e11, 1e-3, "ms"), (5e8, 1.0, "s"))
 """Least size of a number that is a time since 1970 in a unit, factor to seconds, unit."""
@@ -78,7 +79,7 @@ def read_stamps(texts: Sequence[str], *, day_first: bool = True) -> Stamps:
 
 def tells_month_first(texts: Sequence[str]) -> bool:
     """Whether dates such as 12/31/2024 show that the month comes first."""
-    parts = (re.match(r"\s*(\d{1,2})[-/.](\d{1,2})[-/.]\d{4}", text) for text in texts)
+    parts = (re.match(r"\s*(\d{1,2})[-/.](\d{1,2})[-/.]\d{2,4}", text) for text in texts)
     return any(int(found[2]) > 12 for found in parts if found)
 
 
@@ -88,6 +89,8 @@ def _day(text: str, day_first: bool) -> float:
         numbers = [numbers[0] // 10000, numbers[0] // 100 % 100, numbers[0] % 100]
     elif len(text) - max(text.rfind(c) for c in "-/.") == 5:
         numbers = [numbers[2], *(numbers[1::-1] if day_first else numbers[:2])]
+    elif len(text) - text.rfind("/") == 3 and numbers[0] < 100:  # a year of two digits
+        numbers = [2000 + numbers[2], *(numbers[1::-1] if day_first else numbers[:2])]
     try:
         return float(date(*numbers).toordinal() - date(1970, 1, 1).toordinal())
     except ValueError:

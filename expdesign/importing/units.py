@@ -39,6 +39,7 @@ def words(name: str) -> str:
 
 def split_unit(name: str) -> tuple[str, str]:
     """A name without its unit, and the unit: `Speed (kn)`, `SOG [kts]`, `rudder_deg`; "" where there is none."""
+    name = re.sub(r"_(s|min|h)_1$", r"/\1", name)  # km_h_1
     bracket = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", name)
     if bracket and bracket[1].lower() in KNOWN:
         return name[: bracket.start()].strip(), unit_word(bracket[1])

@@ -139,7 +139,16 @@ def orders(helm: Helm, names: tuple[str, ...], values: Array) -> dict[str, Array
     thrust = [column[a.signals[0]] for a in helm.vessel.actuators if KINDS[a.kind][0] == "n" and a.signals[0] in column]
     if "tau_x" in column:
         thrust = [column["tau_x"]]
-    turned = [column[a.signals[-1]] for a in helm.steering if a.kind != "force" and a.signals[-1] in column]
+    by_propellers = helm.means == "propeller"
+    turned = [
+        column[a.signals[-1]]
+        for a in helm.steering
+        if a.kind != "force" and a.signals[-1] in column and not by_propellers
+    ]
+    if by_propellers and (sides := [(a, column[a.signals[0]]) for a in helm.steering if a.signals[0] in column]):
+        port, right = ([n / a.limits[0].high for a, n in sides if side * a.starboard_m > 0] for side in (-1, 1))
+        if port and right:
+            turned = [np.arcsin(np.clip((np.mean(port, axis=0) - np.mean(right, axis=0)) / 2.0, -1.0, 1.0))]
     if not turned and {"tau_x", "tau_y"} <= column.keys():
         turned = [np.arctan2(column["tau_y"], np.abs(column["tau_x"]))]
     zero = np.zeros(len(values))

@@ -10,6 +10,7 @@ from expdesign.scenario.card_file import load_card
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.durations_file import load_repeats
+from expdesign.scenario.instruments_file import INSTRUMENTS, equipped_vessel
 from expdesign.scenario.loads_file import LoadCases, load_cases
 from expdesign.scenario.mapping_file import load_mapping
 from expdesign.scenario.scenario_file import load_scenario

@@ -12,6 +12,7 @@ from expdesign.errors import FileError
 from expdesign.importing.channels import Log, Reader
 from expdesign.importing.readers.ardupilot import is_ardupilot, read_ardupilot
 from expdesign.importing.readers.matlab import read_matlab, read_matlab73
+from expdesign.importing.readers.n2k import is_n2k, read_n2k
 from expdesign.importing.readers.px4 import read_px4
 from expdesign.importing.readers.ros import is_ros, read_ros
 from expdesign.importing.readers.sheets import read_excel, read_parquet
@@ -58,6 +59,12 @@ READERS = (
         fits=_begins(b"MATLAB 7.3", b"\x89HDF"), read=read_matlab73, extra="logs",
     ),
     Reader(
+        name="NMEA 2000",
+        meaning="as text, by nmea2000: plain and fast lines of canboat and Actisense, frames of Yacht Devices, "
+        "candump -L; JSON of canboat's analyzer",
+        fits=is_n2k, read=read_n2k, extra="logs",
+    ),
+    Reader(
         name="text",
         meaning="tables with any separator, decimal sign, header and clock; NMEA 0183, also behind times of reception, "
         "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; both in one file",
@@ -65,7 +72,19 @@ READERS = (
     ),
 )  # fmt: skip
 """All formats; what no other one begins like may be text."""
-OLD_EXCEL = b"\xd0\xcf\x11\xe0"
+NO_LOGS = {
+    b"\xd0\xcf\x11\xe0": "a spreadsheet of the old format .xls, expected it saved as .xlsx or CSV",
+    b"\x1f\x8b": "compressed by gzip, expected it unpacked",
+    b"BZh": "compressed by bzip2, expected it unpacked",
+    b"\xfd7zXZ": "compressed by xz, expected it unpacked",
+    b"7z\xbc\xaf": "a 7z archive, expected the log itself, unpacked",
+    b"Rar!": "a rar archive, expected the log itself, unpacked",
+    b"\xd4\xc3\xb2\xa1": "a capture of a network (pcap), expected NMEA 2000 as text, as by candump -L",
+    b"\n\r\r\n": "a capture of a network (pcapng), expected NMEA 2000 as text, as by candump -L",
+    b"%PDF": "a PDF, expected the log itself",
+    b"<?xml": "XML, expected a log with times, positions, speeds, headings and orders, as CSV or NMEA 0183",
+}
+"""How files begin that are no logs -> what they are, and what would be right."""
 
 
 def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
@@ -89,16 +108,16 @@ def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
         raise FileError(path, "", "is a folder without metadata.yaml, expected files, or the folder of a ROS 2 bag")
     if not head and not path.is_dir():
         raise FileError(path, "", "is empty, expected a log")
-    if head.startswith(OLD_EXCEL):
-        raise FileError(path, "", "is a spreadsheet of the old format .xls, expected it saved as .xlsx or CSV")
+    if what := next((words for magic, words in NO_LOGS.items() if head.startswith(magic)), ""):
+        raise FileError(path, "", f"is {what}")
     reader = next(one for one in READERS if one.fits(path, head))
     try:
         return reader.read(path, sample_time_s)
     except ModuleNotFoundError as error:
         hint = f"needs {error.name}: pip install 'expdesign[{reader.extra or 'logs'}]'"
-        raise FileError(path, "", f"is a {reader.name}, which {hint}") from None
+        raise FileError(path, "", f"is {reader.name}, which {hint}") from None
     except FileError:
         raise
     except Exception as error:  # libraries raise anything on broken files
         what = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-        raise FileError(path, "", f"begins like a {reader.name} but cannot be read ({what})") from None
+        raise FileError(path, "", f"begins like {reader.name} but cannot be read ({what})") from None

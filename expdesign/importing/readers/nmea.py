@@ -66,6 +66,7 @@ class Sentences:
         self.blocks = Blocks()
         self.broken = self.garbled = self.unchecked = 0
         self.unread: Counter[str] = Counter()
+        self.no_numbers = 0  # readings of transducers
         self.count = 0
 
     def add(self, lines: Sequence[tuple[int, str]]) -> None:
@@ -150,10 +151,11 @@ class Sentences:
         for place, row in zip(places.tolist(), rows, strict=True):
             for start in range(0, len(row) - 3, 4):
                 _, value, unit, label = row[start : start + 4]
-                try:
-                    found.setdefault((label, XDR_UNITS.get(unit, "")), []).append((place, float(value)))
-                except ValueError:
-                    continue
+                number = _number(value)
+                if number == number:
+                    found.setdefault((label, XDR_UNITS.get(unit, "")), []).append((place, number))
+                else:
+                    self.no_numbers += bool(value)
         for (label, unit), pairs in found.items():
             self._keep(f"{name}.{label}", unit, *np.array(pairs).T)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+import zipfile
 from datetime import datetime, time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +16,38 @@ from expdesign.importing.channels import Log
 from expdesign.importing.readers.columns import columns_log
 from expdesign.importing.readers.text import read_text
 
+MOST_ROWS = 1 << 20  # of a sheet
+MOST_UNPACKED = 1_000_000_000  # bytes of a spreadsheet; a day at 10 Hz takes about a third
+
 
 def read_excel(path: Path, sample_time_s: float) -> Log:
     """The first sheet with two rows or more, read as the text that it shows."""
     import openpyxl
 
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    _check_archive(path)
+    with path.open("rb") as file:
+        return _first_sheet(openpyxl.load_workbook(file, read_only=True, data_only=True), path, sample_time_s)
+
+
+def _check_archive(path: Path) -> None:
+    """Raise FileError where a zip archive is no spreadsheet, or would fill the memory."""
+    with zipfile.ZipFile(path) as archive:
+        if "xl/workbook.xml" not in archive.namelist():
+            inside = ", ".join(archive.namelist()[:3]) or "nothing"
+            raise FileError(path, "", f"is a zip archive with {inside}, expected the log itself, unpacked")
+        size = sum(item.file_size for item in archive.infolist())
+    if size > MOST_UNPACKED:
+        most = f"{MOST_UNPACKED / 1e9:.1f} GB: export it as CSV"
+        raise FileError(path, "", f"unpacks to {size / 1e9:.1f} GB, expected at most {most}")
+
+
+def _first_sheet(book: Any, path: Path, sample_time_s: float) -> Log:
     try:
         for sheet in book.worksheets:
-            lines = ["\t".join(map(_text, row)) for row in sheet.iter_rows(values_only=True) if any(map(_filled, row))]
+            rows = itertools.islice(sheet.iter_rows(values_only=True), MOST_ROWS + 1)
+            lines = ["\t".join(map(_text, row)) for row in rows if any(map(_filled, row))]
+            if len(lines) > MOST_ROWS:
+                raise FileError(path, "", f"has more than {MOST_ROWS} rows, which no spreadsheet has: export it as CSV")
             if len(lines) < 2:
                 continue
             with TemporaryDirectory(prefix="expdesign-") as folder:

@@ -29,12 +29,17 @@ SEPARATORS = (";", "\t", "|", ",", " ")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?\s*")
 PLACE = re.compile(
     r"\s*([+-]?\d{1,3}(?:[.,]\d+)?)\s*(?:[°ºd:\s]\s*(\d{1,2}(?:[.,]\d+)?)\s*['m:\s]?)?"
-    r"\s*(?:(\d{1,2}(?:[.,]\d+)?)\s*[\"″s]?)?\s*([NSEWO])\s*"
+    r"\s*(?:(?<=['m:\s])(\d{1,2}(?:[.,]\d+)?)\s*[\"″s]?)?\s*([NSEWO])\s*"
 )
 """A latitude or longitude with its side, as `54°30.12'N`."""
+PACKED = re.compile(r"\s*(\d{2,3})(\d{2}(?:[.,]\d+)?)\s*()([NSEWO])\s*")
+"""The same with degrees and minutes run together, as `5430.12N`."""
+DATE_NUMBERS = (19700101, 21001231)
+"""Least and greatest number that is a year, month and day run together."""
 COMMENT = "#%/"
 SHARE = 0.5  # of cells of a row of data that are numbers or times
 TEXTS_SHOWN = 3
+MOST_COLUMNS = 2000
 
 
 @dataclass(frozen=True)
@@ -66,9 +71,11 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     """
     encoding = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline=None) as file:
-        sample = [line for line, _ in zip(file, range(SNIFFED), strict=False)]
+        sample = file.readlines(BLOCK_BYTES)[:SNIFFED]
     if not any(line.strip() for line in sample):
         raise FileError(path, "", "is empty, expected a log")
+    if (wide := max(line.count(separator) for line in sample[:2] for separator in SEPARATORS[:-1])) > MOST_COLUMNS:
+        raise FileError(path, "row 1", f"has {wide + 1} columns, expected at most {MOST_COLUMNS}")
     plain = [line for line in sample if "$" not in line and not line.startswith("!") and line.strip()]
     dialect = sniffed(plain)
     table = None if dialect is None else _Table(path, dialect, plain)
@@ -136,6 +143,8 @@ def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
         yield f"left out {counted(sentences.broken, 'sentence')} with a wrong checksum"
     if sentences.garbled:
         yield f"left out {counted(sentences.garbled, 'line')} with a $ but no whole sentence"
+    if sentences.no_numbers:
+        yield f"left out {counted(sentences.no_numbers, 'reading')} of transducers (XDR) without a number"
     if sentences.unchecked:
         yield f"used {counted(sentences.unchecked, 'sentence')} without a checksum"
     if other:
@@ -199,7 +208,7 @@ def _decimal_commas(lines: Sequence[str], separator: str) -> bool:
 def _is_data(row: Sequence[str], comma: bool) -> bool:
     filled = [cell for cell in row if cell.strip()]
     known = sum(bool(NUMBER.fullmatch(cell)) for cell in filled)
-    known += sum(bool(PLACE.fullmatch(cell)) for cell in filled)
+    known += sum(_is_place(cell) for cell in filled)
     known += sum(bool(np.isfinite([*read_stamps([cell]).day, *read_stamps([cell]).second]).any()) for cell in filled)
     return len(filled) > 0 and known >= max(1.0, SHARE * len(filled)) and known > 0
 
@@ -213,7 +222,17 @@ def _header(before: Sequence[Sequence[str]], width: int) -> tuple[tuple[str, ...
     names, units = rows[-1], [""] * width
     if len(rows) > 1 and sum(bool(split_unit(f"x [{cell.strip('[]()')}]")[1]) for cell in names if cell) > width / 3:
         names, units = rows[-2], [cell.strip("[]()") for cell in rows[-1]]
-    return tuple(name or f"column {k}" for k, name in enumerate(names, start=1)), tuple(units)
+    return _once([name or f"column {k}" for k, name in enumerate(names, start=1)]), tuple(units)
+
+
+def _once(names: Sequence[str]) -> tuple[str, ...]:
+    """The same, those that come again with their count: hdg, hdg (2)."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return tuple(found)
 
 
 @dataclass
@@ -232,7 +251,9 @@ class _Table:
     def __post_init__(self) -> None:
         cells = re.split("[,;\t ]", " ".join(self.sample))
         self.month_first = tells_month_first(cells)
-        self.ambiguous = next(filter(re.compile(r"(0?\d|1[0-2])[-/](0?\d|1[0-2])[-/]\d{4}").fullmatch, cells), "")
+        self.ambiguous = next(
+            filter(re.compile(r"(0?\d|1[0-2])[-/](0?\d|1[0-2])[-/](\d{4}|\d\d)").fullmatch, cells), ""
+        )
         rows = [row for line in self.sample if (row := next(iter(self.dialect.rows([line])), []))]
         rows = [row for row in rows[self.dialect.header :] if len(row) == len(self.dialect.names)]
         self.kinds = [self._kind([row[k] for row in rows]) for k in range(len(self.dialect.names))]
@@ -247,7 +268,7 @@ class _Table:
         filled = [cell for cell in cells if cell.strip().lower() not in MISSING]
         if not filled or sum(bool(NUMBER.fullmatch(cell)) for cell in filled) > SHARE * len(filled):
             return "number"
-        if sum(bool(PLACE.fullmatch(cell)) for cell in filled) > SHARE * len(filled):
+        if sum(_is_place(cell) for cell in filled) > SHARE * len(filled):
             return "place"
         return read_stamps(filled).kind or "text"
 
@@ -337,6 +358,13 @@ class _Table:
         values |= {f"{names[k]} ({self._side(k)})": self.blocks.joined(f"{k}") for k in self._of("place")}
         return values, np.asarray(times), clock, notes
 
+    @staticmethod
+    def _is_date(values: Array) -> bool:
+        """Whether numbers are years, months and days run together."""
+        low, high = DATE_NUMBERS
+        month, day = values // 100 % 100, values % 100
+        return bool(((values > low) & (values < high) & (month <= 12) & (day <= 31) & (values % 1 == 0)).all())
+
     def _times(self) -> tuple[set[int], Array | None, str, str]:
         """Columns that are times, the times, kind of clock, and how they were read."""
         names = [words(name) for name in self.dialect.names]
@@ -350,7 +378,9 @@ class _Table:
                 clock,
                 (f"time is {self.time_name}, date and time"),
             )
-        if clocks := self._of("clock"):
+        # one that stands still, as a count-down that has not begun, is no clock
+        clocks = [k for k in self._of("clock") if np.unique(self.blocks.joined(f"{k}|second"))[1:2] >= 0]
+        if clocks:
             second = over_midnight(self.blocks.joined(f"{clocks[0]}|second"))
             self.time_name = self.dialect.names[clocks[0]]
             if dates := self._of("date"):
@@ -367,18 +397,29 @@ class _Table:
         for k in numbers:
             values = self.blocks.joined(f"{k}")
             known = values[np.isfinite(values)]
-            if len(known) < 2 or (np.diff(known) != 0).mean() < 0.05 or np.ptp(known) == 0:
+            if self._is_date(values) or len(known) < 2 or (np.diff(known) != 0).mean() < 0.05 or np.ptp(known) == 0:
                 continue
             unit = self.dialect.units[k] or split_unit(self.dialect.names[k])[1]
             times, clock, how = read_numbers(values, names[k], unit=unit)
             self.time_name = self.dialect.names[k]
-            return {k}, times, clock, f"time is {self.time_name}, {how}"
+            date = next((d for d in numbers if how == "hhmmss" and self._is_date(self.blocks.joined(f"{d}"))), None)
+            if date is None:
+                return {k}, times, clock, f"time is {self.time_name}, {how}"
+            texts = [
+                f"{d // 10000:04.0f}-{d // 100 % 100:02.0f}-{d % 100:02.0f}" for d in self.blocks.joined(f"{date}")
+            ]
+            whole = read_stamps(texts).day * DAY_S + times % DAY_S
+            return {k, date}, whole, COMPUTER, f"time is {self.dialect.names[date]} and {self.time_name}, {how}"
         return set(), None, NONE, ""
+
+
+def _is_place(text: str) -> bool:
+    return bool(PLACE.fullmatch(text) or PACKED.fullmatch(text))
 
 
 def _degrees(text: str) -> float:
     """Of a latitude or longitude with its side, nan where it is none."""
-    found = PLACE.fullmatch(text)
+    found = PACKED.fullmatch(text) or PLACE.fullmatch(text)
     if found is None:
         return float("nan")
     parts = [float((part or "0").replace(",", ".")) for part in found.groups()[:3]]

@@ -64,7 +64,12 @@ def load_vessel(path: Path | str) -> Vessel:
         FileError: unreadable, or something in it is wrong, missing or unknown.
     """
     entry = Entry(Path(path))
-    file = check_table(VesselTable, read_toml(entry.path), entry)
+    return vessel_of(read_toml(entry.path), entry)
+
+
+def vessel_of(tables: Mapping[str, Any], entry: Entry) -> Vessel:
+    """The vessel of the tables of a vessel file; errors as of `load_vessel`."""
+    file = check_table(VesselTable, tables, entry)
     actuators = _actuators(file.actuators, file.vessel, entry.at("actuators"))
     model = _model(file.model, actuators, file.vessel.sample_time_s, entry.at("model"))
     return Vessel(

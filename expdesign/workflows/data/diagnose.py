@@ -33,13 +33,13 @@ from expdesign.export.document import Table
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
-from expdesign.scenario import load_scenario, load_vessel
+from expdesign.scenario import load_scenario
 from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 from expdesign.workflows.outcome import Outcome, command_text, document_of
-from expdesign.workflows.steps.measured import doubted, measured
+from expdesign.workflows.steps.measured import doubted, equipped, measured
 from expdesign.workflows.steps.workers import workers
 
 SINCE_CHANGE = "since-change.csv"
@@ -74,8 +74,9 @@ def diagnose(
     if not data:
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.0)
-    ship, handed_over = with_alarms(load_vessel(vessel), data)
-    record = in_stated_time(measured(data, ship, velocity=velocity), ship.sensors)
+    ship, told = equipped(vessel, data)
+    ship, handed_over = with_alarms(ship, data)
+    record = in_stated_time(measured(data, ship, velocity=velocity, told=told), ship.sensors)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)

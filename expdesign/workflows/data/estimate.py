@@ -13,9 +13,8 @@ from expdesign.export import Content, estimate_json, estimated_vessel, write_fil
 from expdesign.export.estimate_page import EstimateContent, estimate_document
 from expdesign.export.pages import document_html
 from expdesign.progress import Progress, silent, within
-from expdesign.scenario import load_vessel
 from expdesign.workflows.outcome import Outcome, command_text
-from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
+from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
 
@@ -48,7 +47,7 @@ def estimate(
         if path in used:
             raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
     progress("reading the data", 0.0)
-    ship = load_vessel(vessel)
+    ship, told = equipped(vessel, [*data, *tests])
     options = EstimateOptions(
         methods=tuple(methods),
         fixed=tuple(fixed),
@@ -63,7 +62,7 @@ def estimate(
         offset_mps=offset_mps,
         prior=prior,
     )
-    raw = measured(data, ship, velocity=velocity)
+    raw = measured(data, ship, velocity=velocity, told=told)
     with workers(0, load=None), doubted(raw):
         now, record = settled(ship, raw, options, smoothed=velocity == "smoothed", progress=within(progress, 0.01, 0.4))
         apart = reduced_data(tests, now, velocity=velocity) if tests else NO_TESTS

@@ -21,8 +21,8 @@ from expdesign.export.import_page import (
     earlier_files,
     import_document,
     import_json,
+    instruments_toml,
     mapping_toml,
-    vessel_lines,
 )
 from expdesign.export.pages import document_html
 from expdesign.importing import (
@@ -50,13 +50,14 @@ from expdesign.importing import (
     read_log,
     sampled,
     sensor_keys,
+    sides,
     typical_length_m,
 )
 from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
-from expdesign.scenario import load_mapping, load_vessel
+from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
@@ -153,7 +154,7 @@ def import_logs(
     content = ImportContent(
         logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts),
         rejected=tuple(rejected),
-        followed=followed(table), sensors=sensor_keys(table, found.held_s), notes=tuple(notes),
+        followed=followed(table), sensors=sensor_keys(found), notes=tuple(notes),
         origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
         version=__version__,
     )  # fmt: skip
@@ -162,7 +163,7 @@ def import_logs(
     files: dict[str, Content] = {
         **texts,
         "mapping.toml": mapping_toml(mapping, read, command=command),
-        "vessel-lines.toml": vessel_lines(content),
+        INSTRUMENTS: instruments_toml(content),
         "import.json": import_json(content),
         "import.html": partial(document_html, document),
     }
@@ -313,7 +314,10 @@ def _tried(
     taken = ship
     if ship is None:
         bow = bow_signals(mapping)
-        taken = presumed([run.stretch for run in runs], length_m=length_m, sample_time_s=found.sample_time_s, bow=bow)
+        taken = presumed(
+            [run.stretch for run in runs], length_m=length_m, sample_time_s=found.sample_time_s, bow=bow,
+            sides=sides(mapping),
+        )  # fmt: skip
     assert taken is not None
     batches, kept, refused = [], [], []
     texts: dict[str, str] = {}

@@ -22,10 +22,9 @@ from expdesign.indices import NotStandard, StandardResults, measured_trial, stan
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
-from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, command_text, document_of
-from expdesign.workflows.steps.measured import data_files, measured
+from expdesign.workflows.steps.measured import data_files, equipped, measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
 
@@ -51,7 +50,7 @@ def indices(
     if not scale >= 1:
         raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
     progress("reading the vessel", 0.0)
-    ship = load_vessel(vessel)
+    ship, told = equipped(vessel, data)
     _check_place(ship, antenna_forward_m)
     seen, notes = _measured(data, ship, antenna_forward_m, progress)
     progress("simulating the model's standard trials", 0.6)
@@ -62,7 +61,7 @@ def indices(
         simulated=found,
         simulated_why_not=why_not,
         measured=seen,
-        notes=notes,
+        notes=(*told, *notes),
         command=command_text(
             "indices",
             data,

@@ -20,7 +20,6 @@ from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
-from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
 from expdesign.workflows.data.labelled import (
@@ -32,7 +31,7 @@ from expdesign.workflows.data.labelled import (
     piece_of,
 )
 from expdesign.workflows.outcome import Outcome, command_text, document_of
-from expdesign.workflows.steps.measured import data_files, doubted, measured, reduced_data
+from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
 
 def mine(
@@ -76,7 +75,7 @@ def mine(
     if mean not in MEAN_SUBTRACTIONS:
         raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
     progress("reading the data", 0.02)
-    ship, paths = load_vessel(vessel), data_files(data)
+    (ship, told), paths = equipped(vessel, data), data_files(data)
     command = command_text(
         "mine",
         data,
@@ -95,10 +94,10 @@ def mine(
     folder = out or Path("runs") / data[0].stem
     if labels is not None:
         asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)
-        record = reduced_data(paths, ship, velocity=velocity)
+        record = reduced_data(paths, ship, velocity=velocity, told=told)
         with doubted(record):
             return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
-    record = in_pieces(measured(paths, ship, velocity=velocity), piece_s)
+    record = in_pieces(measured(paths, ship, velocity=velocity, told=told), piece_s)
     with doubted(record):
         return _mined(record, folder, ship, fixed, keep, mean, velocity, command, progress)
 

@@ -32,7 +32,6 @@ from expdesign.monitoring import (
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
-from expdesign.scenario import load_vessel
 from expdesign.workflows.data.watched_ship import VESSEL, Asked, Read, check_model, prepared
 from expdesign.workflows.data.watching import (
     HOUR,
@@ -49,6 +48,7 @@ from expdesign.workflows.data.watching import (
     with_reference,
 )
 from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.workers import workers
 
 
@@ -154,8 +154,10 @@ def monitor(
     if not port_h > 0:
         raise InputError(f"--port-h is {port_h:g}, expected more than 0; inf for a ship whose load never changes")
     folder = out or Path("runs") / (Path(data[0]).stem if data[0] != STREAM else "monitor")
+    data, reference = data_files(data), data_files(reference)
+    ship, told = equipped(vessel, [source for source in (*reference, *data) if source != STREAM])
     asked = Asked(
-        vessel=load_vessel(vessel), size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
+        vessel=ship, told=told, size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
         port_s=HOUR * port_h, velocity=velocity, model=model,
     )  # fmt: skip
     options = {
@@ -271,7 +273,7 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
         moments=phase.moments,
         left_out_rows=now.reading.left_out_rows,
         unread_rows=now.reading.unread_rows,
-        notes=now.reading.notes,
+        notes=(*asked.told, *now.reading.notes),
         command=command,
         version=__version__,
         roll=None if asked.vessel.pendulum is None else now.roll,

@@ -107,6 +107,7 @@ class Asked:
     port_s: float  # time in port after which the ship may carry another load [s]
     velocity: str  # where velocities come from, as in `estimate`
     model: str = VESSEL  # one of `watched_ship.MODELS`
+    told: tuple[str, ...] = ()  # notes on the vessel, as of `equipped`
 
     @property
     def unread(self) -> tuple[str, ...]:

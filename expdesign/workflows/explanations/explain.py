@@ -21,6 +21,7 @@ TOPICS: dict[str, tuple[str, Callable[[], Topic]]] = {
     "loads": ("keys of a file of load cases, which expdesign roll reads", files.loads_topic),
     "data": ("columns of measured data", plug_ins.data_topic),
     "import": ("formats of logs that expdesign import reads", plug_ins.import_topic),
+    "instruments": ("keys of instruments.toml, in which an import says what logs tell", files.instruments_topic),
     "mapping": ("keys of a mapping file, which says what the channels of logs are", files.mapping_topic),
     "structures": ("built-in model structures and their parameters", plug_ins.structures_topic),
     "criteria": ("design criteria", plug_ins.criteria_topic),

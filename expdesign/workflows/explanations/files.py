@@ -9,6 +9,7 @@ from itertools import groupby
 from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
+from expdesign.scenario.instruments_file import InstrumentsFile
 from expdesign.scenario.keys import Key, keys_of
 from expdesign.scenario.loads_file import LoadsFile
 from expdesign.scenario.mapping_file import COLUMNS_BESIDE, MappingFile
@@ -51,6 +52,11 @@ MAPPINGS = (
     "expdesign import writes one, mapping.toml, with what it guessed from names, units and readings; changed, it is "
     "given as --map. column = (readings in the unit) scale + offset. A channel that the file does not name is not "
     "used. Of percent, share and pwm (1000 to 2000 us, 1500 in the middle) scale is what the largest order is."
+)
+INSTRUMENTS_TEXT = (
+    "expdesign import leaves it beside its runs, with what the logs tell. estimate, diagnose, mine, monitor and "
+    "indices use it where the vessel file says nothing, and say so; what the vessel file states counts, and a "
+    "difference is told. Change or delete what is wrong."
 )
 REFUSED = (
     "A plan that is refused ends with exit status 3 and leaves a draft, refused.html and refused.json: what stands in "
@@ -95,6 +101,13 @@ def mapping_topic() -> Topic:
     )
     more = Section(name="columns", title="columns beside those of expdesign explain data", entries=beside)
     return Topic(name="mapping", title="Mapping files", text=MAPPINGS, sections=(*_by_table(MappingFile), more))
+
+
+def instruments_topic() -> Topic:
+    """Keys of what an import leaves beside its runs."""
+    return Topic(
+        name="instruments", title="instruments.toml", text=INSTRUMENTS_TEXT, sections=_by_table(InstrumentsFile)
+    )
 
 
 def dictionary_topic() -> Topic:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from expdesign.errors import FileError, NoAnswer
@@ -13,6 +14,7 @@ from expdesign.input_files import check_ends
 from expdesign.kinematics import checked
 from expdesign.records import load_records
 from expdesign.reduction import reduced
+from expdesign.scenario import equipped_vessel
 from expdesign.signals import Record
 from expdesign.vessel import Vessel, column_name
 from expdesign.vessel.structures import FORCE_SIGNALS
@@ -33,13 +35,23 @@ def data_files(data: Sequence[Path]) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", undo: bool = True) -> Record:
+def equipped(vessel: Path, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
+    """The vessel of a file, with what imports beside the data tell of sensors and actuators, and notes on that.
+
+    Errors as of `equipped_vessel`.
+    """
+    return equipped_vessel(vessel, list(dict.fromkeys(path.parent for path in data_files(data))))
+
+
+def measured(
+    data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", undo: bool = True, told: Sequence[str] = ()
+) -> Record:
     """Measured data of a vessel: its own actuators' signals, or generalised forces where the first file has those.
 
     A folder stands for the CSV files in it.
 
     A model in discrete form holds for one sample time, which the data must have; in continuous form any will do. Faults
-    of instruments that are certain are told, and undone if asked for.
+    of instruments that are certain are told, and undone if asked for. `told` are notes on the vessel of `equipped`.
     """
     data = data_files(data)
     inputs, header = vessel.model.inputs, _header(data[0])
@@ -55,12 +67,13 @@ def measured(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", un
         actuators=vessel.model.actuators,
     )
     record = with_depth(record, vessel.draught_m) if vessel.model.reads_depth else record
+    record = replace(record, notes=(*told, *record.notes))
     return checked(record, vessel, smoothed=velocity == "smoothed", undo=undo)
 
 
-def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto") -> Record:
+def reduced_data(data: Sequence[Path], vessel: Vessel, *, velocity: str = "auto", told: Sequence[str] = ()) -> Record:
     """Measured data of a vessel, reduced by what its file states of actuators and sensors."""
-    return reduced(measured(data, vessel, velocity=velocity), vessel, smoothed=velocity == "smoothed")
+    return reduced(measured(data, vessel, velocity=velocity, told=told), vessel, smoothed=velocity == "smoothed")
 
 
 @contextmanager
