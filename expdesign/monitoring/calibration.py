@@ -48,6 +48,7 @@ class Calibration:
     # (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured
     std: Array
     force: Force  # the unmeasured force
+    ramp: Array  # (o,) variances of what its accelerations grow by within a stretch
     baseline: Array  # (m,) differences of the ship from its model in the reference, in sizes of the changes
     baseline_std: Array  # (m,) their standard errors, all free at once, with a prior of one size
     inflation: Array  # (m,) variance of sums of scores over that of independent stretches, at least one
@@ -65,6 +66,7 @@ class Calibration:
         seal(
             self,
             std="4",
+            ramp="o",
             baseline="m",
             baseline_std="m",
             inflation="m",
@@ -118,8 +120,8 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
             f"least {FEWEST_STRETCHES}, {FEWEST_STRETCHES * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
-    std, variance, change = _independent(grams)
-    stretches = stretches_of(grams, std)
+    std, ramp, variance, change = _independent(grams)
+    stretches = stretches_of(grams, std, ramp)
     force = _spared(_varying(stretches.less(change), variance, grams.stretch_s), grams.time_s)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
@@ -133,6 +135,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
     return Calibration(
         std=std,
+        ramp=ramp,
         force=force,
         baseline=baseline,
         baseline_std=np.sqrt(np.diag(np.linalg.inv(whole + np.eye(m)))),
@@ -155,18 +158,18 @@ def misfit_of(quadratic: float, score: Array, information: Array, count: float) 
     return float((quadratic - score @ explained) / max(count, 1.0))
 
 
-def _independent(grams: Grams) -> tuple[Array, Array, Array]:
-    """(4,) noise, (q,) variances of the force and (m,) changes, with a force of its own in every stretch."""
+def _independent(grams: Grams) -> tuple[Array, Array, Array, Array]:
+    """(4,) noise, (o,) and (q,) variances of ramps and the force, (m,) changes, with a force of its own in each."""
     total = grams.counts.sum(axis=1)
     error = grams.products[:, :, -1, -1].sum(axis=1)
     std = np.where(total > 0, np.sqrt(np.maximum(error, 1e-24) / np.maximum(total, 1)), np.inf)
-    m, q = grams.changes, grams.forces
+    m, q = grams.changes, grams.ramps + grams.forces
     own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
     variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
     change = np.zeros(m)
     for _ in range(ITERATIONS):
         std, variance, change = _improved(grams, total, std, variance)
-    return std, variance, change
+    return std, variance[: grams.ramps], variance[grams.ramps :], change
 
 
 def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array, Array]:

@@ -217,7 +217,8 @@ def watch(
     """
     alarms: list[Alarm] = []
     steps: list[Step] = []
-    stretches, nuisance, ship = stretches_of(grams, calibration.std), calibration.nuisance, state.shift
+    stretches = stretches_of(grams, calibration.std, calibration.ramp)
+    nuisance, ship = calibration.nuisance, state.shift
     for index, products in enumerate(stretches.products):
         begin_s, count = float(stretches.time_s[index]), float(stretches.counts[index])
         duration_s = float(grams.duration_s[index])
