@@ -33,6 +33,8 @@ SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gai
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
+ROUGHER = (2.0, 5.0)
+"""Standard deviations of the force in other weathers, in those of the reference."""
 PUSHES = 3
 """Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
@@ -57,6 +59,7 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
+    seas: Array  # (a, 2 q) variances of the force in other weathers, see `_seas`
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
@@ -73,6 +76,7 @@ class Calibration:
             rate="m",
             alike="m m",
             load="m",
+            seas="a n",
             weights="m q",
             surprise="m",
         )
@@ -86,6 +90,12 @@ class Calibration:
     def nuisance(self) -> Force:
         """The unmeasured force and the load."""
         return self.force.with_load(len(self.loads))
+
+    @property
+    def others(self) -> Force:
+        """`nuisance` in each of the other weathers."""
+        times = np.broadcast_to(self.force.time_s, self.seas.shape)
+        return Force(variance=self.seas, time_s=times).with_load(len(self.loads))
 
     @property
     def watched(self) -> NDArray[np.bool_]:
@@ -145,6 +155,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + MISFIT_DEVIATIONS * spread,
+        seas=_seas(force, stretches),
         weights=weights,
         surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
@@ -276,9 +287,23 @@ def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
-        surprises[index] = surprise(products, stretches.changes, known).squared
+        surprises[index] = surprise(products, stretches.changes, known)
         known = after_stretch(known, one)
     return found, surprises
+
+
+def _seas(force: Force, stretches: Stretches) -> Array:
+    """(a, 2 q) variances of the force where one of its accelerations, or all currents, vary more than in the reference.
+
+    Multiples of the variance of the quick part, or of what a stretch can tell of it, where it shows less.
+    """
+    q = len(force.variance) // 2
+    told = np.einsum("wqq->q", stretches.products[:, -1 - q : -1, -1 - q : -1]) / len(stretches)
+    quick = np.maximum(force.variance[:q], 1.0 / np.maximum(told, 1e-300))
+    first = max(q - PUSHES, 0)
+    groups = [*(np.arange(q) == axis for axis in range(first, q)), *[np.arange(q) < first] * (first > 0)]
+    rougher = [np.where(group, factor**2 * quick, force.variance[:q]) for group in groups for factor in ROUGHER]
+    return np.hstack([np.array(rougher), np.tile(force.variance[q:], (len(rougher), 1))])
 
 
 def _weights(stretches: Stretches) -> Array:

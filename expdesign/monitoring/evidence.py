@@ -275,8 +275,10 @@ def _ramps(linear: LinearisedMotion) -> int:
 
 
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:
-    """Accelerations of the modelled velocities that grow within the stretch and have variance one in it; a steady
-    current where a heading is measured; steady accelerations."""
+    """Ramps, a steady current where a heading is measured, and steady accelerations of the modelled velocities.
+
+    Ramps are accelerations that grow within the stretch, with variance one in it.
+    """
     motion = linear.motion
     flows = [
         disturbance_of(linear, motion.ship.with_effects({key: motion.ship.get(key) + PER_CURRENT}), PER_CURRENT)

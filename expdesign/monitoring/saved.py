@@ -48,6 +48,8 @@ def restored_state(table: dict[str, Any]) -> State:
         whole=Sums(**_arrays(table["whole"])),
         load=Load(**{**table["load"], "taken": _array(table["load"]["taken"])}),
         budget=Budget(**_arrays(table["budget"])),
+        rough=Known(**_arrays(table["rough"])),
+        rougher=_array(table["rougher"]),
         weather=_array(table["weather"]),
         beyond_of_s=_array(table["beyond_of_s"]),
         calls=tuple(
