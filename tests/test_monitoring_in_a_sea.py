@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.diagnosis.motion import stable_windows
+from expdesign.diagnosis.select import Suspected, suspected_tests
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.monitoring import (
     WHITE,
@@ -182,9 +185,27 @@ def test_shallower_water_than_the_references_is_told_and_not_judged(tmp_path: Pa
 def test_a_diagnosis_takes_over_what_the_alarm_named(vessel: Vessel, tmp_path: Path) -> None:
     alarm = {"effect": "theta:X_uu", "value": -0.0006, "std": 0.0008, "in_words": "parameter X_uu by +15 ± 20 %"}
     (tmp_path / "monitor.json").write_text(json.dumps({"alarms": [alarm]}))
-    ship, notes = with_alarms(vessel, [tmp_path / "since-change.csv"])
+    ship, named = with_alarms(vessel, [tmp_path / "since-change.csv"])
     place = vessel.model.names.index("X_uu")
     assert ship.model.parameter_std[place] == pytest.approx(0.001)
     assert np.delete(ship.model.parameter_std, place) == pytest.approx(np.delete(vessel.model.parameter_std, place))
-    assert "X_uu" in notes[0]
-    assert with_alarms(vessel, [tmp_path / "other.csv"]) == (vessel, ())
+    assert [*named] == ["theta:X_uu"]
+    assert alarm["in_words"] in named["theta:X_uu"]
+    assert with_alarms(vessel, [tmp_path / "other.csv"])[1] == {}
+
+
+def test_what_an_alarm_named_is_tested_first_and_alone(vessel: Vessel) -> None:
+    """The right effect is shown at its size, and one that does nothing is not: one question among no others."""
+    still = replace(CALM, surge_mps2=2e-4, yaw_radps2=2e-6)
+    weaker, same = sailed([Ship(thrust=0.9), Ship()], HOUR // 4, seeds=[1, 2], sea=still)
+    told = dict[bool, Suspected]()
+    for changed, table in ((True, weaker), (False, same)):
+        record = as_record(vessel, table)
+        ship = extended_model(vessel, record)
+        (told[changed],) = suspected_tests(ship, stable_windows(ship, record), ["gain"])
+    assert told[True].confirmed
+    assert abs(told[True].value + 0.1) < 0.02
+    assert "tested first and alone, the data show it: gain" in told[True].in_words
+    assert told[False].p_value > 1e-3
+    assert abs(told[False].value) < 0.02
+    assert suspected_tests(ship, stable_windows(ship, record), []) == ()

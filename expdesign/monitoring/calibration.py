@@ -33,8 +33,9 @@ SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gai
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
-ROUGHER = (2.0, 5.0)
-"""Standard deviations of the force in other weathers, in those of the reference."""
+ROUGHER = ((2.0, False), (5.0, False), (3.0, True))
+"""Standard deviations of the force in other weathers, in those of the reference, and whether it lasts `LASTING_S`."""
+LASTING_S = 900.0
 PUSHES = 3
 """Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
@@ -59,7 +60,7 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
-    seas: Array  # (a, 2 q) variances of the force in other weathers, see `_seas`
+    seas: Force  # (a, 2 q) the force in other weathers, see `_seas`
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
@@ -76,7 +77,6 @@ class Calibration:
             rate="m",
             alike="m m",
             load="m",
-            seas="a n",
             weights="m q",
             surprise="m",
         )
@@ -94,8 +94,7 @@ class Calibration:
     @property
     def others(self) -> Force:
         """`nuisance` in each of the other weathers."""
-        times = np.broadcast_to(self.force.time_s, self.seas.shape)
-        return Force(variance=self.seas, time_s=times).with_load(len(self.loads))
+        return self.seas.with_load(len(self.loads))
 
     @property
     def watched(self) -> NDArray[np.bool_]:
@@ -292,18 +291,24 @@ def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     return found, surprises
 
 
-def _seas(force: Force, stretches: Stretches) -> Array:
-    """(a, 2 q) variances of the force where one of its accelerations, or all currents, vary more than in the reference.
+def _seas(force: Force, stretches: Stretches) -> Force:
+    """(a, 2 q) forces of which one acceleration, or all currents, vary more than in the reference.
 
-    Multiples of the variance of the quick part, or of what a stretch can tell of it, where it shows less.
+    The quick part does, or what a stretch can tell of it, where it shows less; or, of an acceleration, a part of
+    minutes takes the place of that of hours: a wind that comes and goes lasts as a change of the ship does for a while.
     """
     q = len(force.variance) // 2
     told = np.einsum("wqq->q", stretches.products[:, -1 - q : -1, -1 - q : -1]) / len(stretches)
     quick = np.maximum(force.variance[:q], 1.0 / np.maximum(told, 1e-300))
-    first = max(q - PUSHES, 0)
-    groups = [*(np.arange(q) == axis for axis in range(first, q)), *[np.arange(q) < first] * (first > 0)]
-    rougher = [np.where(group, factor**2 * quick, force.variance[:q]) for group in groups for factor in ROUGHER]
-    return np.hstack([np.array(rougher), np.tile(force.variance[q:], (len(rougher), 1))])
+    first, axes = max(q - PUSHES, 0), np.arange(q)
+    groups = [*(axes == axis for axis in range(first, q)), *[axes < first] * (first > 0)]
+    variances, times = list[Array](), list[Array]()
+    for group in groups:
+        for factor, lasts in ROUGHER:
+            place = np.concatenate([group & (not lasts), group & lasts & (axes >= first)])
+            variances.append(np.where(place, factor**2 * np.tile(quick, 2), force.variance))
+            times.append(np.where(place & (np.arange(2 * q) >= q), LASTING_S, force.time_s))
+    return Force(variance=np.array(variances), time_s=np.array(times))
 
 
 def _weights(stretches: Stretches) -> Array:

@@ -163,7 +163,8 @@ def noise_of(
     """The noise within the stretches of a record, the known one where it fits; arguments as of `grams_of`."""
     linear, acting, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
     keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
-    windows = linear.motion.windows
+    windows, first = linear.motion.windows, len(changes) + STARTS
+    columns = np.delete(columns, np.s_[first : first + _ramps(linear)], axis=0)  # they are noise themselves
     return learnt_noise(
         columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
         known=known,

@@ -201,7 +201,7 @@ class State:
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
         """The state at the beginning of a watch."""
         m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
-        rough, rougher = Known.nothing(calibration.others), np.zeros(len(calibration.seas))
+        rough, rougher = Known.nothing(calibration.others), np.zeros(len(calibration.seas.variance))
         return cls(
             until_s=time_s,
             known=known,
