@@ -33,6 +33,7 @@ WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond w
 # stretches of a sum from which a change of the ship is told from weather beyond the reference, and from which weather
 # is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
+WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
 APART = 0.02  # common weight below which a change cannot have raised the alarm of another
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
 UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
@@ -308,7 +309,7 @@ def _noticed(
         few, many = TOLD_APART
         if rougher > 0.0 and state.sums.stretches[place] >= many:
             explained |= alike
-        elif rougher > -AS_LIKELY or state.sums.stretches[place] < few:
+        elif rougher > -WEATHER_ODDS or state.sums.stretches[place] < few:
             doubtful |= alike
         else:
             step = replace(step, statistic=float(state.ratios[place]), change=one)
