@@ -185,7 +185,8 @@ def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibratio
 
 
 def test_what_a_force_surprises_by_is_one_on_average_per_component(calibration: Calibration) -> None:
-    stretches, known, found = stretches_of(drawn_grams(2000, seed=5), NOISE, np.zeros(0)), Known.nothing(FORCE), list[np.ndarray]()
+    stretches = stretches_of(drawn_grams(2000, seed=5), NOISE, np.zeros(0))
+    known, found = Known.nothing(FORCE), list[np.ndarray]()
     for products in stretches.products:
         known = after_gap(known, FORCE, STRETCH_S)
         one = judged(products, CHANGES, known)
