@@ -126,13 +126,10 @@ def _drawn(seconds: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray
             points[sample : sample + held] = heading if points is wanted else rng.choice([2.4, 2.7, 3.0, 3.2])
             sample += held
     wanted -= wanted[0]
-    one = _wave(samples, rng, sea)
-    parts = [one.real, one.imag, one.real] if sea.together else [_wave(samples, rng, sea).real for _ in range(3)]
-    waves = np.stack(parts, axis=-1)
-    waves *= np.array([0.5 * sea.wave_mps, sea.wave_mps, sea.wave_radps * (not sea.pushed_s)])
-    waves = np.concatenate([waves, np.cumsum(waves[:, 2:], axis=0) / sea.hz], axis=1)
-    window = 60 * sea.hz + 1
-    waves[:, 3] -= np.convolve(waves[:, 3], np.full(window, 1 / window), mode="same")
+    moved = [_wave(samples, rng, sea)] * 3 if sea.together else [_wave(samples, rng, sea) for _ in range(3)]
+    (surge, _), (sway, _), (yaw, turned) = moved
+    waves = np.stack([surge.real, sway.imag, yaw.real, turned.real], axis=-1)
+    waves *= np.array([0.5 * sea.wave_mps, sea.wave_mps, *[sea.wave_radps * (not sea.pushed_s)] * 2])
     slow = np.stack([_slow(samples, rng, sea.hz) for _ in range(3)], axis=-1)
     slow *= np.array([sea.surge_mps2, 0.5 * sea.surge_mps2, sea.yaw_radps2])
     if sea.pushed_s:
@@ -144,8 +141,8 @@ def _drawn(seconds: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray
     return wanted, speed, waves, slow, noise
 
 
-def _wave(samples: int, rng: np.random.Generator, sea: Sea) -> np.ndarray:
-    """(s,) a motion of standard deviation one, of many waves, as its real part; a quarter of a period behind beside it.
+def _wave(samples: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray, np.ndarray]:
+    """(s,) a rate of standard deviation one, of many waves, and its integral; as real and as imaginary part.
 
     Source: W. J. Pierson and L. Moskowitz, Journal of Geophysical Research 69 (1964), 5181-5190, for the broad one.
     """
@@ -156,8 +153,8 @@ def _wave(samples: int, rng: np.random.Generator, sea: Sea) -> np.ndarray:
         sizes = np.sqrt(rates**-5.0 * np.exp(-1.25 * (peak / rates) ** 4))
     else:
         rates, sizes = peak * rng.normal(1.0, 0.12, 60), rng.rayleigh(1.0, 60)
-    motion = sum(a * np.exp(1j * (w * time + p)) for a, w, p in zip(sizes, rates, phases, strict=True))
-    return np.asarray(motion / np.sqrt((sizes**2).sum() / 2))
+    each = sizes[:, None] * np.exp(1j * (rates[:, None] * time + phases[:, None])) / np.sqrt((sizes**2).sum() / 2)
+    return each.sum(axis=0), (each / (1j * rates[:, None])).sum(axis=0)
 
 
 def _slow(samples: int, rng: np.random.Generator, hz: int, time_s: float = 600.0) -> np.ndarray:
