@@ -32,8 +32,8 @@ def restored_calibration(table: dict[str, Any]) -> Calibration:
     """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
     rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "shoal_limit")}
-    forces = {name: Force(**_arrays(table[name])) for name in ("force", "seas")}
-    return Calibration(**forces, **arrays, **rest)
+    force, seas = (Force(**_arrays(table[name])) for name in ("force", "seas"))
+    return Calibration(force=force, seas=seas, **arrays, **rest)
 
 
 def restored_state(table: dict[str, Any]) -> State:
