@@ -47,8 +47,19 @@ class Sea:
     surge_mps2: float = 2e-3  # slow forces, with a correlation time of ten minutes
     yaw_radps2: float = 2e-5
     pushed_s: float = 0.0  # correlation time of a force in yaw that moves her by `wave_radps`; zero for waves as above
+    broad: bool = False  # waves of a Pierson-Moskowitz spectrum, whose peak is at `period_s`, in place of a narrow one
+    together: bool = False  # one wave moves surge, sway and yaw, a quarter of a period apart, as a quartering sea does
+    helm: tuple[float, float] = (0.8, 5.0)  # rudder per heading error, and per yaw rate [s]
+    hz: int = 1  # samples in a second
 
 
+OTHER_SEAS = {
+    "broad spectrum": Sea(broad=True, period_s=8.0),
+    "quartering": Sea(together=True, period_s=18.0, wave_radps=np.deg2rad(0.3), wave_mps=0.15),
+    "stiff helm": Sea(pushed_s=5.0, helm=(2.0, 12.0)),
+    "soft helm": Sea(pushed_s=20.0, helm=(0.4, 1.0)),
+    "5 Hz": Sea(broad=True, hz=5),
+}
 CALM = Sea(wave_radps=0.0, wave_mps=0.0)
 CASES = {
     "unchanged": Ship(),
@@ -63,7 +74,7 @@ CASES = {
 def sailed(
     ships: Sequence[Ship], seconds: int, *, seeds: Sequence[int], sea: Sea = Sea(), since_s: int = 0
 ) -> np.ndarray:
-    """(voyages, seconds, 9) measured columns `NAMES` of voyages at 1 Hz.
+    """(voyages, samples, 9) measured columns `NAMES` of voyages.
 
     Args:
         ships: of each voyage, as they are from `since_s` on.
@@ -76,73 +87,81 @@ def sailed(
     wanted, speed, waves, slow, noise = (np.stack(part, axis=-1) for part in zip(*drawn, strict=True))
     later = {name: np.array([getattr(ship, name) for ship in ships]) for name in vars(ships[0])}
     before = {name: np.full(len(ships), value) for name, value in vars(Ship()).items()}
-    v, table = len(ships), np.empty((seconds, len(NAMES), len(ships)))
+    v, step_s, samples = len(ships), 1.0 / sea.hz, seconds * sea.hz
+    table = np.empty((samples, len(NAMES), v))
     state = np.zeros((6, v))  # u, v, r, north, east, heading
     state[0] = 4.0
     rudder, felt, n = np.zeros(v), np.zeros((2, v)), speed[0]
-    for second in range(seconds):
-        ship = later if second >= since_s else before
-        moved = waves[second]  # of surge, sway, yaw rate and heading
+    for sample in range(samples):
+        ship = later if sample >= since_s * sea.hz else before
+        moved = waves[sample]  # of surge, sway, yaw rate and heading
         told = state[[3, 4, 5, 0, 1, 2]].copy()
         told[2:] += moved[[3, 0, 1, 2]]
         told[5] *= ship["gyro"]
-        told += noise[second]
+        told += noise[sample]
         felt = told[[2, 5]]
-        turn = np.clip(wanted[second] - felt[0], -0.5, 0.5)
-        order = np.clip(0.8 * turn - 5.0 * felt[1], -0.5, 0.5)
+        turn = np.clip(wanted[sample] - felt[0], -0.5, 0.5)
+        order = np.clip(sea.helm[0] * turn - sea.helm[1] * felt[1], -0.5, 0.5)
         begun = rudder
-        rudder = rudder + np.clip(order - rudder, -0.05, 0.05)
-        n = n + np.clip(speed[second] - n, -0.05, 0.05)
-        table[second] = np.stack([np.full(v, float(second)), *told, n, (begun + rudder) / 2])
+        rudder = rudder + np.clip(order - rudder, -0.05 * step_s, 0.05 * step_s)
+        n = n + np.clip(speed[sample] - n, -0.05 * step_s, 0.05 * step_s)
+        table[sample] = np.stack([np.full(v, sample * step_s), *told, n, (begun + rudder) / 2])
         for part in range(INSIDE):
             angle = begun + (rudder - begun) * (part + 0.5) / INSIDE + ship["rudder_rad"]
-            state = _stepped(state, angle, n, slow[second], ship, 1.0 / INSIDE)
+            state = _stepped(state, angle, n, slow[sample], ship, step_s / INSIDE)
     return np.moveaxis(table, 2, 0)
 
 
 def _drawn(seconds: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray, ...]:
     """Set points of heading (s,) and speed of the propeller (s,), waves (s, 4), slow forces (s, 3), noise (s, 6)."""
-    wanted, speed = np.zeros(seconds), np.zeros(seconds)
+    samples = seconds * sea.hz
+    wanted, speed = np.zeros(samples), np.zeros(samples)
     heading = rng.uniform(-np.pi, np.pi)
     for points in (wanted, speed):
-        second = 0
-        while second < seconds:
-            held = int(rng.uniform(300, 1200))
+        sample = 0
+        while sample < samples:
+            held = int(rng.uniform(300, 1200) * sea.hz)
             if points is wanted:
                 heading = heading + rng.choice([-1, 1]) * rng.uniform(0.2, 1.0)
-            points[second : second + held] = heading if points is wanted else rng.choice([2.4, 2.7, 3.0, 3.2])
-            second += held
+            points[sample : sample + held] = heading if points is wanted else rng.choice([2.4, 2.7, 3.0, 3.2])
+            sample += held
     wanted -= wanted[0]
-    waves = np.stack([_wave(seconds, rng, sea.period_s) for _ in range(3)], axis=-1)
-    waves *= np.array([0.5 * sea.wave_mps, sea.wave_mps, sea.wave_radps * (not sea.pushed_s)])
-    waves = np.concatenate([waves, np.cumsum(waves[:, 2:], axis=0)], axis=1)
-    waves[:, 3] -= np.convolve(waves[:, 3], np.full(61, 1 / 61), mode="same")
-    slow = np.stack([_slow(seconds, rng) for _ in range(3)], axis=-1)
+    moved = [_wave(samples, rng, sea)] * 3 if sea.together else [_wave(samples, rng, sea) for _ in range(3)]
+    (surge, _), (sway, _), (yaw, turned) = moved
+    waves = np.stack([surge.real, sway.imag, yaw.real, turned.real], axis=-1)
+    waves *= np.array([0.5 * sea.wave_mps, sea.wave_mps, *[sea.wave_radps * (not sea.pushed_s)] * 2])
+    slow = np.stack([_slow(samples, rng, sea.hz) for _ in range(3)], axis=-1)
     slow *= np.array([sea.surge_mps2, 0.5 * sea.surge_mps2, sea.yaw_radps2])
     if sea.pushed_s:
         # acceleration for which a ship with damping N_ur u has this yaw rate, were there no autopilot
         damping = -VALUES["N_ur"] * 4.0
-        slow[:, 2] += (
-            _slow(seconds, rng, sea.pushed_s) * sea.wave_radps * np.sqrt(damping * (damping + 1.0 / sea.pushed_s))
-        )
-    noise = rng.standard_normal((seconds, 6)) * np.array([0.3, 0.3, 0.003, 0.02, 0.02, sea.gyro_radps])
+        push = _slow(samples, rng, sea.hz, sea.pushed_s) * np.sqrt(damping * (damping + 1.0 / sea.pushed_s))
+        slow[:, 2] += sea.wave_radps * push
+    noise = rng.standard_normal((samples, 6)) * np.array([0.3, 0.3, 0.003, 0.02, 0.02, sea.gyro_radps])
     return wanted, speed, waves, slow, noise
 
 
-def _wave(seconds: int, rng: np.random.Generator, period_s: float) -> np.ndarray:
-    """(s,) a narrow-banded motion of standard deviation one: many waves of periods about one."""
-    rates = 2 * np.pi / period_s * rng.normal(1.0, 0.12, 60)
-    phases, time = rng.uniform(0, 2 * np.pi, 60), np.arange(seconds)
-    sizes = rng.rayleigh(1.0, 60)
-    motion = sum(a * np.cos(w * time + p) for a, w, p in zip(sizes, rates, phases, strict=True))
-    return np.asarray(motion / np.sqrt((sizes**2).sum() / 2))
+def _wave(samples: int, rng: np.random.Generator, sea: Sea) -> tuple[np.ndarray, np.ndarray]:
+    """(s,) a rate of standard deviation one, of many waves, and its integral; as real and as imaginary part.
+
+    Source: W. J. Pierson and L. Moskowitz, Journal of Geophysical Research 69 (1964), 5181-5190, for the broad one.
+    """
+    time, peak = np.arange(samples) / sea.hz, 2 * np.pi / sea.period_s
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    if sea.broad:
+        rates = peak * rng.uniform(0.6, 3.0, 60)
+        sizes = np.sqrt(rates**-5.0 * np.exp(-1.25 * (peak / rates) ** 4))
+    else:
+        rates, sizes = peak * rng.normal(1.0, 0.12, 60), rng.rayleigh(1.0, 60)
+    each = sizes[:, None] * np.exp(1j * (rates[:, None] * time + phases[:, None])) / np.sqrt((sizes**2).sum() / 2)
+    return each.sum(axis=0), (each / (1j * rates[:, None])).sum(axis=0)
 
 
-def _slow(seconds: int, rng: np.random.Generator, time_s: float = 600.0) -> np.ndarray:
+def _slow(samples: int, rng: np.random.Generator, hz: int, time_s: float = 600.0) -> np.ndarray:
     """(s,) a first-order process of standard deviation one."""
-    keep, value, values = np.exp(-1.0 / time_s), rng.standard_normal(), np.empty(seconds)
-    for second, fresh in enumerate(np.sqrt(1 - keep**2) * rng.standard_normal(seconds)):
-        values[second] = value = keep * value + fresh
+    keep, value, values = np.exp(-1.0 / time_s / hz), rng.standard_normal(), np.empty(samples)
+    for sample, fresh in enumerate(np.sqrt(1 - keep**2) * rng.standard_normal(samples)):
+        values[sample] = value = keep * value + fresh
     return values
 
 

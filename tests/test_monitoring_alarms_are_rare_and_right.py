@@ -76,7 +76,7 @@ def test_the_likelihood_and_the_scores_are_those_of_all_stretches_together() -> 
     columns = drawn_columns(6, seed=1, change=np.array([0.5, 0.0, -0.3, 0.0]))
     R = dense_covariance(columns)
     e, X = columns[:, :, -1].ravel(), columns[:, :, :CHANGES].reshape(-1, CHANGES)
-    stretches = stretches_of(grams_from(columns), NOISE)
+    stretches = stretches_of(grams_from(columns), NOISE, np.zeros(0))
     known, taken = Known.nothing(FORCE), np.zeros((2 * FORCES, CHANGES))
     score, information, quadratic = np.zeros(CHANGES), np.zeros((CHANGES, CHANGES)), 0.0
     for index, products in enumerate(stretches.products):
@@ -95,7 +95,7 @@ def test_the_likelihood_and_the_scores_are_those_of_all_stretches_together() -> 
 
 def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
     columns = drawn_columns(6, seed=2)
-    stretches = stretches_of(grams_from(columns), NOISE)
+    stretches = stretches_of(grams_from(columns), NOISE, np.zeros(0))
     other = Force(variance=4.0 * FORCE.variance, time_s=FORCE.time_s)
     both = Force(variance=np.stack([FORCE.variance, other.variance]), time_s=FORCE.time_s)
     one, two = likelihood(stretches, FORCE), likelihood(stretches, other)
@@ -185,11 +185,12 @@ def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibratio
 
 
 def test_what_a_force_surprises_by_is_one_on_average_per_component(calibration: Calibration) -> None:
-    stretches, known, found = stretches_of(drawn_grams(2000, seed=5), NOISE), Known.nothing(FORCE), list[np.ndarray]()
+    stretches = stretches_of(drawn_grams(2000, seed=5), NOISE, np.zeros(0))
+    known, found = Known.nothing(FORCE), list[np.ndarray]()
     for products in stretches.products:
         known = after_gap(known, FORCE, STRETCH_S)
         one = judged(products, CHANGES, known)
-        found.append(surprise(products, CHANGES, known).squared)
+        found.append(surprise(products, CHANGES, known))
         known = after_stretch(known, one)
     assert np.abs(np.mean(found, axis=0) - 1.0).max() < 3.0 * np.std(found) / np.sqrt(len(found))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
@@ -66,10 +66,12 @@ from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
+    Suspected,
     compared_with,
     eliminate_backward,
     leading_candidates,
     select_forward,
+    suspected_tests,
 )
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
@@ -104,6 +106,7 @@ class Selected:
     # causes by their predictions; None where the search found what predicts as well, or explains much
     compared: Compared | None
     replaced: tuple[Step, ...]  # causes that the search found, in whose place one stands that predicts better
+    suspected: tuple[Suspected, ...]  # tests of what was named before
 
     @property
     def refused(self) -> tuple[Step, ...]:
@@ -126,11 +129,13 @@ def select_causes(
     data: tuple[Windows, Record],
     seed: int,
     reported: Estimated,
+    suspected: Sequence[str] = (),
 ) -> Selected:
     """Causes beside the model in use; the search begins at `begun`, the same re-estimated where it diverges."""
     rng, (windows, _), (ship, before) = np.random.default_rng(seed), data, in_use
     validation = CrossValidation(*data)
-    found = select_forward(begun, windows, fitted_start(begun, windows), rng, reported, validation)
+    first = suspected_tests(begun, windows, suspected)
+    found = select_forward(begun, windows, fitted_start(begun, windows), rng, reported, validation, suspected)
     as_stated = validation.without(None, ship)
 
     def cross_validated(found: Selection) -> tuple[Selection, list[HeldOut]]:
@@ -162,6 +167,7 @@ def select_causes(
         rest=rest,
         compared=compared,
         replaced=() if compared is None else searched.steps,
+        suspected=first,
     )
 
 
@@ -198,6 +204,7 @@ def diagnose(
     *,
     seed: int = 0,
     proposals: Sequence[Proposal] = (),
+    suspected: Mapping[str, str] | None = None,
     progress: Estimated | None = None,
 ) -> Diagnosis:
     """Find the causes of the simulation error, extend the model by them, and measure the gain.
@@ -207,6 +214,7 @@ def diagnose(
         record: measured data; velocities over ground, inputs, perhaps pose, wind and depth.
         seed: of the draws behind adjusted p-values and gain intervals.
         proposals: manoeuvres that may distinguish causes; standard ones when empty.
+        suspected: effects that were named before, and by whom, in words; they are tested first.
         progress: of the diagnosis and of what follows it, in simulations of all data.
 
     Raises:
@@ -235,7 +243,7 @@ def diagnose(
     few = windows.measured[..., 0].size <= FEW_SAMPLES
     try:
         with local_processes(1) if few else nullcontext():
-            chosen = select_causes((ship, before), begun, (windows, record), seed, reported)
+            chosen = select_causes((ship, before), begun, (windows, record), seed, reported, [*(suspected or {})])
     except FloatingPointError:  # what the model's parameters do to its motion diverges
         raise unstable from None
     concluding = reported.part(CONCLUDED, 0.0)
@@ -279,6 +287,7 @@ def diagnose(
         residuals=one_step_residuals(ship, windows),
         step_residuals=tuple(one_step_residuals(step.before.ship, windows) for step in steps),
         notes=(
+            *(f"{suspected[test.effect]}; {test.in_words}" for test in chosen.suspected if suspected),
             *notes_on_data(vessel, record, windows, constant_inputs(ship, windows)),
             *note_on_divergence(before, windows, re_estimated=begun is not ship, uncertain=bool(uncertain_keys(ship))),
             *remarks(unit, unexplained, signs, refused, instead, kinds if ranked else ()),

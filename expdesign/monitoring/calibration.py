@@ -33,6 +33,9 @@ SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gai
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
+ROUGHER = ((2.0, False), (5.0, False), (3.0, True))
+"""Standard deviations of the force in other weathers, in those of the reference, and whether it lasts `LASTING_S`."""
+LASTING_S = 900.0
 PUSHES = 3
 """Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
@@ -48,6 +51,7 @@ class Calibration:
     # (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured
     std: Array
     force: Force  # the unmeasured force
+    ramp: Array  # (o,) variances of what its accelerations grow by within a stretch
     baseline: Array  # (m,) differences of the ship from its model in the reference, in sizes of the changes
     baseline_std: Array  # (m,) their standard errors, all free at once, with a prior of one size
     inflation: Array  # (m,) variance of sums of scores over that of independent stretches, at least one
@@ -56,6 +60,7 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
+    seas: Force  # (a, 2 q) the force in other weathers, see `_seas`
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
@@ -65,6 +70,7 @@ class Calibration:
         seal(
             self,
             std="4",
+            ramp="o",
             baseline="m",
             baseline_std="m",
             inflation="m",
@@ -84,6 +90,11 @@ class Calibration:
     def nuisance(self) -> Force:
         """The unmeasured force and the load."""
         return self.force.with_load(len(self.loads))
+
+    @property
+    def others(self) -> Force:
+        """`nuisance` in each of the other weathers."""
+        return self.seas.with_load(len(self.loads))
 
     @property
     def watched(self) -> NDArray[np.bool_]:
@@ -118,8 +129,8 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
             f"least {FEWEST_STRETCHES}, {FEWEST_STRETCHES * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
-    std, variance, change = _independent(grams)
-    stretches = stretches_of(grams, std)
+    std, ramp, variance, change = _independent(grams)
+    stretches = stretches_of(grams, std, ramp)
     force = _spared(_varying(stretches.less(change), variance, grams.stretch_s), grams.time_s)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
@@ -133,6 +144,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
     spread = 1.4826 * float(np.median(np.abs(misfit - middle)))
     return Calibration(
         std=std,
+        ramp=ramp,
         force=force,
         baseline=baseline,
         baseline_std=np.sqrt(np.diag(np.linalg.inv(whole + np.eye(m)))),
@@ -142,6 +154,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         stretches=len(grams),
         stretch_s=grams.stretch_s,
         misfit_limit=middle + MISFIT_DEVIATIONS * spread,
+        seas=_seas(force, stretches),
         weights=weights,
         surprise=np.maximum(weights @ surprises.mean(axis=0), LEAST_SURPRISE),
         load=np.zeros(m) if load is None else load,
@@ -155,18 +168,18 @@ def misfit_of(quadratic: float, score: Array, information: Array, count: float) 
     return float((quadratic - score @ explained) / max(count, 1.0))
 
 
-def _independent(grams: Grams) -> tuple[Array, Array, Array]:
-    """(4,) noise, (q,) variances of the force and (m,) changes, with a force of its own in every stretch."""
+def _independent(grams: Grams) -> tuple[Array, Array, Array, Array]:
+    """(4,) noise, (o,) and (q,) variances of ramps and the force, (m,) changes, with a force of its own in each."""
     total = grams.counts.sum(axis=1)
     error = grams.products[:, :, -1, -1].sum(axis=1)
     std = np.where(total > 0, np.sqrt(np.maximum(error, 1e-24) / np.maximum(total, 1)), np.inf)
-    m, q = grams.changes, grams.forces
+    m, q = grams.changes, grams.ramps + grams.forces
     own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
     variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
     change = np.zeros(m)
     for _ in range(ITERATIONS):
         std, variance, change = _improved(grams, total, std, variance)
-    return std, variance, change
+    return std, variance[: grams.ramps], variance[grams.ramps :], change
 
 
 def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array, Array]:
@@ -273,9 +286,29 @@ def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
-        surprises[index] = surprise(products, stretches.changes, known).squared
+        surprises[index] = surprise(products, stretches.changes, known)
         known = after_stretch(known, one)
     return found, surprises
+
+
+def _seas(force: Force, stretches: Stretches) -> Force:
+    """(a, 2 q) forces of which one acceleration, or all currents, vary more than in the reference.
+
+    The quick part does, or what a stretch can tell of it, where it shows less; or, of an acceleration, a part of
+    minutes takes the place of that of hours: a wind that comes and goes lasts as a change of the ship does for a while.
+    """
+    q = len(force.variance) // 2
+    told = np.einsum("wqq->q", stretches.products[:, -1 - q : -1, -1 - q : -1]) / len(stretches)
+    quick = np.maximum(force.variance[:q], 1.0 / np.maximum(told, 1e-300))
+    first, axes = max(q - PUSHES, 0), np.arange(q)
+    groups = [*(axes == axis for axis in range(first, q)), *[axes < first] * (first > 0)]
+    variances, times = list[Array](), list[Array]()
+    for group in groups:
+        for factor, lasts in ROUGHER:
+            place = np.concatenate([group & (not lasts), group & lasts & (axes >= first)])
+            variances.append(np.where(place, factor**2 * np.tile(quick, 2), force.variance))
+            times.append(np.where(place & (np.arange(2 * q) >= q), LASTING_S, force.time_s))
+    return Force(variance=np.array(variances), time_s=np.array(times))
 
 
 def _weights(stretches: Stretches) -> Array:

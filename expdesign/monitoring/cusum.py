@@ -19,20 +19,21 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from expdesign.monitoring.calibration import LARGEST_SIZE, Calibration, misfit_of
+from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration, misfit_of
 from expdesign.monitoring.evidence import Grams, stretches_of
-from expdesign.monitoring.force import Force, Judged, Surprise, after_gap, after_stretch, judged, surprise
+from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step, Sums
 from expdesign.values import Array
 
 AS_LIKELY = 3.0  # difference of log-likelihood up to which another change explains the data as well
 WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
 WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond which the weather is unlike it
-# stretches of a sum from which weather beyond the reference is told from a change of the ship, and the same where the
-# sum began in such weather
+# stretches of a sum from which a change of the ship is told from weather beyond the reference, and from which weather
+# is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
-CHANCE = 3.0  # standard deviations by which what is left of the surprises has to be beyond chance, too
+WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
 APART = 0.02  # common weight below which a change cannot have raised the alarm of another
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
 UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
@@ -60,7 +61,7 @@ def called(state: State, calibration: Calibration, until_s: float) -> State:
     taken[loads] = -state.known.mean[first:]
     load = Load(since_s=until_s, stay_s=until_s - state.until_s, judged=0, rounds=0, taken=taken)
     known = replace(state.known, covariance=state.known.covariance + np.diag(more))
-    return replace(state, known=known, load=load, calls=calls_of(state, calibration))
+    return replace(state.with_known(known), load=load, calls=calls_of(state, calibration))
 
 
 def with_load(state: State, calibration: Calibration) -> State:
@@ -76,7 +77,7 @@ def with_load(state: State, calibration: Calibration) -> State:
     mean = state.known.mean.copy()
     mean[len(mean) - len(loads) :] = 0.0
     known = replace(state.known, mean=mean)
-    return replace(state, known=known, shift=state.shift + more, load=replace(load, taken=found))
+    return replace(state.with_known(known), shift=state.shift + more, load=replace(load, taken=found))
 
 
 def load_of(state: State, calibration: Calibration) -> tuple[Array, Array]:
@@ -117,10 +118,10 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
     """
     assert state.pending is not None
     pending = state.pending.added(one)[0]
-    known, before = after_stretch(state.known, one), alarm
+    known, before = state.known, alarm
     named = alarm.change if alarm.named else None
     alarm = _attributed(alarm, pending, calibration, state.until_s, named=named, so_far=state.shift - state.before)
-    state = replace(state, alarm=alarm, pending=pending, known=known)
+    state = replace(state, alarm=alarm, pending=pending)
     enough = pending.information[0][alarm.change, alarm.change] / calibration.common >= SETTLED * (
         PATIENCE if alarm.as_likely else 1.0
     )
@@ -136,14 +137,13 @@ def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) 
     m = len(shift)
     every = np.ones(2 * m, dtype=bool)
     return replace(
-        state,
-        known=replace(known, mean=known.mean - pending.taken[0][:, together] @ found),
+        state.with_known(replace(known, mean=known.mean - pending.taken[0][:, together] @ found)),
         ratios=np.zeros(2 * m),
-        sums=state.sums.again(every, state.until_s),
-        whole=state.whole.again(every[:1], state.until_s),
+        sums=state.sums.again(every, state.until_s, state.rougher),
+        whole=state.whole.again(every[:1], state.until_s, state.rougher),
         shift=shift,
         alarm=replace(alarm, named=True, settled=bool(np.abs(found).max() < REFINED)),
-        pending=pending.again(every[:1], state.until_s),
+        pending=pending.again(every[:1], state.until_s, state.rougher),
     )
 
 
@@ -217,13 +217,14 @@ def watch(
     """
     alarms: list[Alarm] = []
     steps: list[Step] = []
-    stretches, nuisance, ship = stretches_of(grams, calibration.std), calibration.nuisance, state.shift
+    stretches = stretches_of(grams, calibration.std, calibration.ramp)
+    ship = state.shift
     for index, products in enumerate(stretches.products):
         begin_s, count = float(stretches.time_s[index]), float(stretches.counts[index])
         duration_s = float(grams.duration_s[index])
         if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
-        state = _waited(state, nuisance, begin_s + duration_s)
+        state = _waited(state, calibration, begin_s + duration_s)
         if (shoal := float(grams.shoal[index])) > calibration.shoal_limit:
             shoalest, shoal_s = max(state.shoalest, shoal), state.shoal_s + duration_s
             state = replace(state, left_out_s=state.left_out_s + duration_s, shoal_s=shoal_s, shoalest=shoalest)
@@ -235,9 +236,9 @@ def watch(
         if misfit > calibration.misfit_limit + unlinear:
             state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
-        surprised = surprise(own, stretches.changes, state.known, loads)
-        before = state.weather
-        weather = before + (calibration.weights @ surprised.squared / calibration.surprise - before) / WEATHER_STRETCHES
+        surprised = calibration.weights @ surprise(own, stretches.changes, state.known, loads)
+        weather = state.weather + (surprised / calibration.surprise - state.weather) / WEATHER_STRETCHES
+        before, state = state.rougher, _rougher(state, own, one, loads)
         state = _counted(state, one, weather, calibration, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
             state = settling(state, state.alarm, one, calibration)
@@ -245,13 +246,22 @@ def watch(
                 alarms.append(state.alarm)
                 state = replace(state, alarm=None, pending=None, weather=np.ones(len(weather)))
         else:
-            state, step = _summed(state, one, surprised, before, begin_s, calibration)
+            state, step = _summed(state, one, before, begin_s, calibration)
             state, alarm, step = _noticed(state, step, calibration, rules.limit, duration_s)
             steps.append(step)
             alarms += [] if alarm is None else [alarm]
         if state.shift is not ship:
             return state, tuple(alarms), tuple(steps), index + 1
     return state, tuple(alarms), tuple(steps), len(grams)
+
+
+def _rougher(state: State, products: Array, one: Judged, loads: NDArray[np.int64]) -> State:
+    """The state after a stretch, in the reference's weather and in the others, with how likely these have become."""
+    other = judged(products, len(state.shift), state.rough, loads)
+    rougher = state.rougher + (one.deviance - other.deviance) / 2.0
+    return replace(
+        state, known=after_stretch(state.known, one), rough=after_stretch(state.rough, other), rougher=rougher
+    )
 
 
 def _counted(
@@ -295,10 +305,12 @@ def _noticed(
         if explained[one] or doubtful[one]:
             continue
         alike = calibration.weights @ calibration.weights[one] > ALIKE * (calibration.weights[one] ** 2).sum()
-        if _doubtful(state, place):
-            doubtful |= alike
-        elif _by_weather(state, place, calibration):
+        rougher = _rougher_by(state, place, calibration)
+        few, many = TOLD_APART
+        if rougher > 0.0 and state.sums.stretches[place] >= many:
             explained |= alike
+        elif rougher > -WEATHER_ODDS or state.sums.stretches[place] < few:
+            doubtful |= alike
         else:
             step = replace(step, statistic=float(state.ratios[place]), change=one)
             state, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration)
@@ -309,30 +321,25 @@ def _noticed(
     state = replace(state, undecided_s=undecided_s, by_weather=state.by_weather + bool(explained.any()))
     if explained.any():
         both = np.tile(explained, 2)
-        sums = state.sums.again(both, state.until_s, np.tile(state.weather, 2))
+        sums = state.sums.again(both, state.until_s, state.rougher)
         state = replace(state, ratios=np.where(both, 0.0, state.ratios), sums=sums)
     else:
         state = with_load(state, calibration)
     return state, None, replace(step, compared=False)
 
 
-def _doubtful(state: State, place: int) -> bool:
-    """Whether a sum has too few stretches to tell a change of the ship from unusual weather."""
-    return bool(state.sums.stretches[place] < TOLD_APART[int(state.sums.weather[place] > WEATHER_LIMIT)])
+def _rougher_by(state: State, place: int, calibration: Calibration) -> float:
+    """Log-likelihood by which a rougher weather explains the data of a sum better than the change does.
 
-
-def _by_weather(state: State, place: int, calibration: Calibration) -> bool:
-    """Whether no change that lasts explains how far the force has been from its prediction since a sum began.
-
-    Of large changes, whose effects are not linear, most of it is explained, and the rest may still be large.
+    Of weathers count those in which a component varies more that the change resembles, and currents.
     """
-    sums, own = state.sums, calibration.surprise[place % len(state.shift)]
-    inner = sums.by_lasting[place] + np.eye(len(state.shift)) / LARGEST_SIZE**2
-    surprised = float(sums.surprise[place]) / own
-    left = surprised - float(sums.lasting[place] @ np.linalg.solve(inner, sums.lasting[place])) / own
-    freedom = float(sums.stretches[place] - np.trace(np.linalg.solve(inner, sums.by_lasting[place])))
-    chance = freedom + CHANCE * math.sqrt(2.0 * max(freedom, 0.0))
-    return freedom > 1.0 and left > max(WEATHER_LIMIT * freedom, chance, UNEXPLAINED_SHARE * surprised)
+    change, sums = place % len(state.shift), state.sums
+    known = max(float(sums.information[place, change, change]), 1e-300)
+    gain = float(sums.score[place, change]) ** 2 / known / 2.0
+    pushes = calibration.weights[change][-PUSHES:]
+    alike = np.append(pushes > ALIKE * pushes.max(), True)
+    others = np.repeat(alike, len(ROUGHER))[: len(state.rougher)]
+    return float((state.rougher - sums.rougher[place])[others].max()) - gain
 
 
 def _less(products: Array, change: Array) -> Array:
@@ -342,29 +349,28 @@ def _less(products: Array, change: Array) -> Array:
     return np.asarray(after.T @ products @ after)
 
 
-def _waited(state: State, nuisance: Force, until_s: float) -> State:
+def _waited(state: State, calibration: Calibration, until_s: float) -> State:
     """The state at the beginning of the stretch that ends then, with the force's memory faded over the gap."""
-    gap_s = until_s - state.until_s
+    gap_s, nuisance = until_s - state.until_s, calibration.nuisance
     keep = nuisance.memory(gap_s)
     return replace(
         state,
         until_s=until_s,
         known=after_gap(state.known, nuisance, gap_s),
+        rough=after_gap(state.rough, calibration.others, gap_s),
         sums=state.sums.later(keep),
         whole=state.whole.later(keep),
         pending=None if state.pending is None else state.pending.later(keep),
     )
 
 
-def _summed(
-    state: State, one: Judged, surprised: Surprise, before: Array, begin_s: float, calibration: Calibration
-) -> tuple[State, Step]:
+def _summed(state: State, one: Judged, before: Array, begin_s: float, calibration: Calibration) -> tuple[State, Step]:
     """Add a stretch to all sums, or begin a sum with it where that is larger; sums below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
+    `before` is `State.rougher` before the stretch.
     """
-    weights = np.tile(calibration.weights, (2, 1))
-    sums, score, information = state.sums.added(one, surprised, weights)
+    sums, score, information = state.sums.added(one)
     m = score.shape[1]
     own, number = np.arange(2 * m), np.arange(2 * m) % m
     sign, inflation = np.repeat([1.0, -1.0], m), np.tile(calibration.inflation, 2)
@@ -377,8 +383,5 @@ def _summed(
     place = int(np.argmax(ratios))
     step = Step(time_s=state.until_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
-        sums = sums.first(late & ~ended, one, begin_s, surprised, weights, np.tile(before, 2))
-    known = after_stretch(state.known, one)
-    return replace(
-        state, known=known, ratios=ratios, sums=sums.again(ended, state.until_s, np.tile(state.weather, 2))
-    ), step
+        sums = sums.first(late & ~ended, one, begin_s, before)
+    return replace(state, ratios=ratios, sums=sums.again(ended, state.until_s, state.rougher)), step

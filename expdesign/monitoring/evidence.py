@@ -1,8 +1,8 @@
 """What stretches of data hold: inner products of the sensitivities and the error of their simulations.
 
-A stretch has the error e = X d + S a + F f + noise: of the measured velocities from a simulation of the model, with the
-changes d, the error a of the initial velocities, of which nothing is known, and the unmeasured force f: a steady
-current and steady accelerations.
+A stretch has the error e = X d + S a + R g + F f + noise: of the measured velocities from a simulation of the model,
+with the changes d, the error a of the initial velocities, of which nothing is known, the unmeasured force f, a steady
+current and steady accelerations, and how much these accelerations grow within the stretch, g.
 """
 
 from __future__ import annotations
@@ -55,13 +55,14 @@ class Grams:
 
     time_s: Array  # (w,) beginning of each stretch, since the data began [s]
     duration_s: Array  # (w,) measured time in it [s]: `stretch_s`, or less where the data end or pause
-    products: Array  # (4, w, c, c) of the columns X (m), S (3), F and e, for u, v, r and the rate of the heading
+    products: Array  # (4, w, c, c) of the columns X (m), S (3), R, F and e, for u, v, r and the rate of the heading
     counts: Array  # (4, w) measured samples
     # (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of inertia, the
     # acceleration itself; zero for changes that are no term
     budget: Array
     kind: NDArray[np.int64]  # (w,) number in `KINDS`
     stretch_s: float  # length of a whole one [s]
+    ramps: int = 0  # columns R
     # (w,) draught over depth, where it is measured and the model does not read it; else zero
     shoal: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -94,7 +95,7 @@ class Grams:
     @property
     def forces(self) -> int:
         """Number of components of the unmeasured force."""
-        return int(self.products.shape[-1] - self.changes - STARTS - 1)
+        return int(self.products.shape[-1] - self.changes - STARTS - self.ramps - 1)
 
 
 def grams_of(
@@ -137,6 +138,7 @@ def grams_of(
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
         shoal=_shoal(linear)[keep],
+        ramps=_ramps(linear),
     )
 
 
@@ -161,7 +163,8 @@ def noise_of(
     """The noise within the stretches of a record, the known one where it fits; arguments as of `grams_of`."""
     linear, acting, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
     keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
-    windows = linear.motion.windows
+    windows, first = linear.motion.windows, len(changes) + STARTS
+    columns = np.delete(columns, np.s_[first : first + _ramps(linear)], axis=0)  # they are noise themselves
     return learnt_noise(
         columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
         known=known,
@@ -203,7 +206,7 @@ def _durations(seen: NDArray[np.bool_], sample_s: float) -> Array:
 
 
 def _columns(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Sequence[Change]) -> Array:
-    """(m + 3 + q, w, s, 4) responses to changes of their sizes, to initial velocities and to the force."""
+    """(m + 3 + o + q, w, s, 4) responses to changes of their sizes, initial velocities, ramps and the force."""
     moved = responses(linear, [*known, *_forces(linear)])
     moved[: len(changes)] *= np.array([change.size for change in changes])[:, None, None, None]
     return np.concatenate(
@@ -258,6 +261,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         kind=np.concatenate([part.kind for part in parts]),
         shoal=np.concatenate([part.shoal for part in parts]),
         stretch_s=parts[0].stretch_s,
+        ramps=parts[0].ramps,
     )
 
 
@@ -266,21 +270,31 @@ def stretch_length(length_m: float) -> float:
     return max(5.0, 5.0 * float(round(STRETCH_S * (length_m / LENGTH_M) ** 0.5 / 5.0)))
 
 
+def _ramps(linear: LinearisedMotion) -> int:
+    """Number of accelerations that may grow within a stretch."""
+    return sum(name in linear.motion.ship.model.outputs for name in "uvr")
+
+
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:
-    """A steady current where a heading is measured, and steady accelerations of the modelled velocities."""
+    """Ramps, a steady current where a heading is measured, and steady accelerations of the modelled velocities.
+
+    Ramps are accelerations that grow within the stretch, with variance one in it.
+    """
     motion = linear.motion
     flows = [
         disturbance_of(linear, motion.ship.with_effects({key: motion.ship.get(key) + PER_CURRENT}), PER_CURRENT)
         for key in CURRENT * motion.windows.has_heading
     ]
     w, k, n = motion.states.shape
-    pushes = []
-    for axis, name in enumerate("uvr"):
-        if name in motion.ship.model.outputs:
-            force = np.zeros((w, k - 1, n))
-            force[..., axis] = 1.0
-            pushes.append(Disturbance(force=force, sensor=None))
-    return [*flows, *pushes]
+    axes = [axis for axis, name in enumerate("uvr") if name in motion.ship.model.outputs]
+
+    def pushes(over: Array) -> list[Disturbance]:
+        """Of every axis, as it goes over the steps (k - 1,)."""
+        return [
+            Disturbance(force=over[:, None] * (np.arange(n) == axis) * np.ones((w, 1, 1)), sensor=None) for axis in axes
+        ]
+
+    return [*pushes(np.sqrt(3.0) * np.linspace(-1.0, 1.0, k - 1)), *flows, *pushes(np.ones(k - 1))]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -305,16 +319,17 @@ class Stretches:
         return replace(self, products=after.T @ self.products @ after)
 
 
-def stretches_of(grams: Grams, std: Array) -> Stretches:
+def stretches_of(grams: Grams, std: Array, ramp: Array) -> Stretches:
     """The stretches for noise with standard deviations (4,) of the channels, infinite where there is none.
+
+    Ramps of the force with variances (o,) are noise, too.
 
     Source: C. R. Rao, Linear Statistical Inference (1973), section 4a, for mixed linear models.
     """
-    m = grams.changes
+    m, first = grams.changes, grams.changes + STARTS + grams.ramps
     whole = np.einsum("c,cwij->wij", 1.0 / std**2, grams.products)
-    starts = slice(m, m + STARTS)
-    kept = np.r_[:m, m + STARTS : whole.shape[1]]
-    inner = whole[:, starts, starts] + 1e-9 * np.eye(STARTS)
-    across = whole[:, starts][:, :, kept]
+    kept = np.r_[:m, first : whole.shape[1]]
+    inner = whole[:, m:first, m:first] + np.diag(np.concatenate([np.full(STARTS, 1e-9), 1.0 / ramp]))
+    across = whole[:, m:first][:, :, kept]
     left = whole[:, kept][:, :, kept] - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across)
     return Stretches(time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m)

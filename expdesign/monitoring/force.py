@@ -34,9 +34,10 @@ class Force:
 
     def with_load(self, count: int) -> Force:
         """The force with so many components of a load, known to be zero."""
+        shape = (*self.variance.shape[:-1], count)
         return Force(
-            variance=np.concatenate([self.variance, np.zeros(count)]),
-            time_s=np.concatenate([self.time_s, np.full(count, np.inf)]),
+            variance=np.concatenate([self.variance, np.zeros(shape)], axis=-1),
+            time_s=np.concatenate([self.time_s, np.full(shape, np.inf)], axis=-1),
         )
 
 
@@ -52,6 +53,10 @@ class Known:
         """What is known of the force before the first stretch."""
         covariance = force.variance[..., :, None] * np.eye(force.variance.shape[-1])
         return cls(mean=np.zeros(force.variance.shape), covariance=covariance)
+
+    def repeated(self, count: int) -> Known:
+        """The same so many times."""
+        return Known(mean=np.tile(self.mean, (count, 1)), covariance=np.tile(self.covariance, (count, 1, 1)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,6 +76,11 @@ class Judged:
     gain: Array  # (..., n, n) covariance of the force after the stretch
     towards: Array  # (..., n) by which its mean moves
     seen: tuple[Array, Array]  # (n, m) and (n, n), the products of the data alone
+
+    @property
+    def deviance(self) -> Array:
+        """(...) twice the negative log-likelihood of the stretch without a change, but for a constant."""
+        return np.asarray(self.quadratic + np.linalg.slogdet(self.grown)[1])
 
 
 def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Judged:
@@ -104,18 +114,8 @@ def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64]
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Surprise:
-    """How far the force of a stretch is from its prediction, by component."""
-
-    squared: Array  # (q,) squared error, in standard deviations: one on average
-    share: Array  # (q,) error over its variance
-    variance: Array  # (q,)
-    seen: tuple[Array, Array]  # (q, m) and (q, n), products of the components with the changes and the force
-
-
-def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Surprise:
-    """The surprise of a stretch.
+def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Array:
+    """(q,) squared errors of the prediction of a stretch's force, in standard deviations: one on average.
 
     Args:
         products: (c, c) of the stretch.
@@ -127,8 +127,7 @@ def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int6
     across = products[own, columns]
     missed = products[own, -1] - across @ known.mean
     variance = np.diag(products[own, own]) + np.einsum("qi,ij,qj->q", across, known.covariance, across)
-    share = missed / np.maximum(variance, 1e-300)
-    return Surprise(squared=missed * share, share=share, variance=variance, seen=(products[own, :changes], across))
+    return np.asarray(missed**2 / np.maximum(variance, 1e-300))
 
 
 def after_gap(known: Known, force: Force, gap_s: float) -> Known:
@@ -151,6 +150,6 @@ def likelihood(stretches: Stretches, force: Force) -> Array:
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
         one = judged(products, stretches.changes, known)
-        total = total + one.quadratic + np.linalg.slogdet(one.grown)[1]
+        total = total + one.deviance
         known = after_stretch(known, one)
     return np.asarray(total)

@@ -32,7 +32,8 @@ def restored_calibration(table: dict[str, Any]) -> Calibration:
     """A calibration, read from what `saved` made of it."""
     arrays = {name: _array(values) for name, values in table.items() if isinstance(values, list)}
     rest = {name: table[name] for name in ("stretches", "stretch_s", "misfit_limit", "shoal_limit")}
-    return Calibration(force=Force(**_arrays(table["force"])), **arrays, **rest)
+    force, seas = (Force(**_arrays(table[name])) for name in ("force", "seas"))
+    return Calibration(force=force, seas=seas, **arrays, **rest)
 
 
 def restored_state(table: dict[str, Any]) -> State:
@@ -48,6 +49,8 @@ def restored_state(table: dict[str, Any]) -> State:
         whole=Sums(**_arrays(table["whole"])),
         load=Load(**{**table["load"], "taken": _array(table["load"]["taken"])}),
         budget=Budget(**_arrays(table["budget"])),
+        rough=Known(**_arrays(table["rough"])),
+        rougher=_array(table["rougher"]),
         weather=_array(table["weather"]),
         beyond_of_s=_array(table["beyond_of_s"]),
         calls=tuple(

@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.evidence import KINDS
-from expdesign.monitoring.force import Judged, Known, Surprise
+from expdesign.monitoring.force import Judged, Known
 from expdesign.values import Array
 
 
@@ -41,11 +41,7 @@ class Sums:
     score: Array
     information: Array
     stretches: Array  # (n,) that were added
-    surprise: Array  # (n,) sums of `force.surprise`, weighted for the change, in that of a stretch of the reference
-    # lasting, by_lasting: (n, m) and (n, m, m), score and information of changes that last in these surprises
-    lasting: Array
-    by_lasting: Array
-    weather: Array  # (n,) `State.weather` of the change as they began
+    rougher: Array  # (n, a) `State.rougher` before the first of them
 
     @property
     def count(self) -> int:
@@ -53,7 +49,7 @@ class Sums:
         return int(self.stretches[0])
 
     @classmethod
-    def begun(cls, count: int, changes: int, forces: int, time_s: float, weather: Array | float = 1.0) -> Sums:
+    def begun(cls, count: int, changes: int, forces: int, time_s: float, rougher: Array) -> Sums:
         """Nothing yet."""
         return cls(
             since_s=np.full(count, time_s),
@@ -61,36 +57,27 @@ class Sums:
             score=np.zeros((count, changes)),
             information=np.zeros((count, changes, changes)),
             stretches=np.zeros(count),
-            surprise=np.zeros(count),
-            lasting=np.zeros((count, changes)),
-            by_lasting=np.zeros((count, changes, changes)),
-            weather=np.broadcast_to(weather, count).astype(float),
+            rougher=np.tile(rougher, (count, 1)),
         )
 
     def one(self, place: int) -> Sums:
         """Those of one beginning."""
         return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
 
-    def again(self, places: np.ndarray, time_s: float, weather: Array | float = 1.0) -> Sums:
-        """The sums with some (n,) begun anew, in a weather (n,)."""
+    def again(self, places: np.ndarray, time_s: float, rougher: Array) -> Sums:
+        """The sums with some (n,) begun anew, at `State.rougher` (a,)."""
         count, changes = self.score.shape
-        return self._where(places, Sums.begun(count, changes, self.taken.shape[1], time_s, weather))
+        return self._where(places, Sums.begun(count, changes, self.taken.shape[1], time_s, rougher))
 
-    def first(
-        self, places: np.ndarray, one: Judged, time_s: float, surprise: Surprise, weights: Array, weather: Array
-    ) -> Sums:
-        """The sums with some (n,) begun with a stretch."""
-        squared, lasting, by_lasting = _lasting(surprise, weights, np.zeros_like(self.taken))
+    def first(self, places: np.ndarray, one: Judged, time_s: float, rougher: Array) -> Sums:
+        """The sums with some (n,) begun with a stretch, before which `State.rougher` was (a,)."""
         begun = Sums(
             since_s=np.array([time_s]),
             taken=(one.gain @ one.seen[0])[None],
             score=one.score[None],
             information=one.information[None],
             stretches=np.ones(1),
-            surprise=squared,
-            lasting=lasting,
-            by_lasting=by_lasting,
-            weather=weather,
+            rougher=rougher[None],
         )
         return self._where(places, begun)
 
@@ -106,16 +93,8 @@ class Sums:
         """The sums after a gap over which the force's autocorrelation is (f,)."""
         return replace(self, taken=keep[:, None] * self.taken)
 
-    def added(
-        self, one: Judged, surprise: Surprise | None = None, weights: Array | None = None
-    ) -> tuple[Sums, Array, Array]:
-        """The sums with one more stretch; and its scores (n, m) and information (n, m, m).
-
-        Surprises of components count by weights (n, q).
-        """
-        squared, lasting, by_lasting = np.zeros(1), np.zeros(1), np.zeros(1)
-        if surprise is not None and weights is not None:
-            squared, lasting, by_lasting = _lasting(surprise, weights, self.taken)
+    def added(self, one: Judged) -> tuple[Sums, Array, Array]:
+        """The sums with one more stretch; and its scores (n, m) and information (n, m, m)."""
         score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
         cross = one.by_force @ self.taken
         information = (
@@ -128,20 +107,9 @@ class Sums:
             score=self.score + score,
             information=self.information + information,
             stretches=self.stretches + 1.0,
-            surprise=self.surprise + squared,
-            lasting=self.lasting + lasting,
-            by_lasting=self.by_lasting + by_lasting,
-            weather=self.weather,
+            rougher=self.rougher,
         )
         return after, score, information
-
-
-def _lasting(surprise: Surprise, weights: Array, taken: Array) -> tuple[Array, Array, Array]:
-    """(n,) surprises, and (n, m) and (n, m, m) what changes of which the filter has `taken` explain of them."""
-    acting = surprise.seen[0] - surprise.seen[1] @ taken  # (n, q, m)
-    scaled = weights[:, :, None] * acting
-    lasting = np.einsum("nqm,q->nm", scaled, surprise.share)
-    return weights @ surprise.squared, lasting, np.swapaxes(scaled / surprise.variance[:, None], 1, 2) @ acting
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -208,6 +176,8 @@ class State:
     whole: Sums  # sums since the watch began, or since the last change was settled
     load: Load  # since the last port call; calls: those before, the latest of them
     budget: Budget  # of the stretches judged
+    rough: Known  # as `known`, in each of the (a,) other weathers of the calibration
+    rougher: Array  # (a,) log-likelihood of the data so far in these, beyond that in the reference's
     weather: Array  # (m,) of late, the `surprise` of stretches for every change, in that of the reference
     beyond_of_s: Array
     calls: tuple[Call, ...] = ()
@@ -231,19 +201,26 @@ class State:
     def begun(cls, calibration: Calibration, *, time_s: float) -> State:
         """The state at the beginning of a watch."""
         m, known = len(calibration.baseline), Known.nothing(calibration.nuisance)
+        rough, rougher = Known.nothing(calibration.others), np.zeros(len(calibration.seas.variance))
         return cls(
             until_s=time_s,
             known=known,
+            rough=rough,
+            rougher=rougher,
             ratios=np.zeros(2 * m),
-            sums=Sums.begun(2 * m, m, len(known.mean), time_s),
+            sums=Sums.begun(2 * m, m, len(known.mean), time_s, rougher),
             shift=np.zeros(m),
             before=np.zeros(m),
-            whole=Sums.begun(1, m, len(known.mean), time_s),
+            whole=Sums.begun(1, m, len(known.mean), time_s, rougher),
             load=Load(since_s=time_s, stay_s=0.0, judged=0, rounds=0, taken=np.zeros(m)),
             budget=Budget.begun(m),
             weather=np.ones(m),
             beyond_of_s=np.zeros(m),
         )
+
+    def with_known(self, known: Known) -> State:
+        """The state with other knowledge of force and load, from which the other weathers go on, too."""
+        return replace(self, known=known, rough=known.repeated(len(self.rougher)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ Source: doctoral thesis on grey-box identification of ship roll with few sensors
 several load conditions), chapters 4 to 6.
 """
 
-from expdesign.roll.estimate import METHODS, RollEstimate, RollProblem, build_problem, estimate_roll, fitted_pendulum
+from expdesign.roll.estimate import METHODS, RollEstimate, estimate_roll, fitted_pendulum
 from expdesign.roll.model import (
     MEANINGS,
     PARAMETERS,
@@ -27,6 +27,7 @@ from expdesign.roll.model import (
     stiffness,
 )
 from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, direction, null_space, open_directions
+from expdesign.roll.problem import RollProblem, build_problem
 from expdesign.roll.runs import EFFECTS, Case, LowPass, Run, low_pass, prepared
 from expdesign.roll.tuning import TUNING
 from expdesign.vessel.masses import (

@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.roll.estimate import UNSEEN, RollEstimate, RollProblem
+from expdesign.roll.estimate import UNSEEN, RollEstimate
 from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
+from expdesign.roll.problem import RollProblem
 from expdesign.values import Array, seal
 from expdesign.vessel.masses import Body, Load
 

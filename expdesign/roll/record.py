@@ -27,8 +27,9 @@ import numpy as np
 import scipy
 
 from expdesign.errors import InputError, NotInformative, UnknownName
-from expdesign.roll.estimate import RollEstimate, build_problem, estimate_roll
+from expdesign.roll.estimate import RollEstimate, estimate_roll
 from expdesign.roll.model import PARAMETERS, coefficients
+from expdesign.roll.problem import build_problem
 from expdesign.roll.runs import Case, Run, low_pass, prepared
 from expdesign.signals import AUXILIARY, Batch
 from expdesign.simulation import acting_response, delivered_at_samples, steering_signals

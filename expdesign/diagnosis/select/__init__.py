@@ -22,4 +22,5 @@ from expdesign.diagnosis.select.selection import (
 )
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates, same_effects_as_any
 from expdesign.diagnosis.select.starting_point import StartingPoint, joint_keys, starting_point
+from expdesign.diagnosis.select.suspected import Suspected, suspected_tests
 from expdesign.diagnosis.select.tuning import TUNING as SELECTION_TUNING

@@ -53,6 +53,7 @@ def select_forward(
     rng: np.random.Generator,
     progress: Estimated,
     validation: CrossValidation,
+    suspected: Sequence[str] = (),
 ) -> Selection:
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
@@ -68,7 +69,7 @@ def select_forward(
     base = first = fit_nuisance(ship, windows, starts)
     steps: list[Step] = []
     rejected: list[Candidate] = []
-    exchanges, work = 0, Work(progress=progress)
+    exchanges, work = 0, Work(progress=progress, suspected=tuple(suspected))
     while True:
         search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work, validation=validation)
         gains = _gains([first, *(step.chosen.fit for step in steps)], validation)

@@ -157,6 +157,7 @@ class Work:
     """Simulations of all data in fits of candidates, spent by the search that owns it."""
 
     simulations: int = 0  # so far
+    suspected: tuple[str, ...] = ()  # effects that were named before, whose tests need no allowance for others
     untried: list[str] = field(default_factory=list)  # what was left out once the limit was reached, in order
     rounds_left: int = TUNING.first_rounds  # expected after the present one
     # of the search and of what follows, in simulations of all data without roll
@@ -236,9 +237,21 @@ def round_tests(
     candidates = [
         c for c in open_candidates(base, windows) if not same_effects_as_any(c, rejected) and len(c.free) <= most
     ]
-    tests = score_tests(base, candidates, rng)
+    tests = _asked_first(score_tests(base, candidates, rng), work.suspected)
     work.progress.done += TESTS_WORK
     return tests
+
+
+def _asked_first(tests: tuple[ScoreTest, ...], suspected: Sequence[str]) -> tuple[ScoreTest, ...]:
+    """The tests with those of one effect that was named before in front: each is one question among no others."""
+
+    def named(test: ScoreTest) -> bool:
+        return len(test.candidate.free) == 1 and not test.candidate.fixed and set(test.candidate.free) <= {*suspected}
+
+    return (
+        *(replace(test, multiplicity=1.0) for test in tests if named(test)),
+        *(test for test in tests if not named(test)),
+    )
 
 
 def same_effects_as_any(candidate: Candidate, others: Sequence[Candidate]) -> bool:

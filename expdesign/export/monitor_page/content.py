@@ -193,7 +193,7 @@ def _no_alarm(content: MonitorContent, rate: str) -> str:
     if state.undecided_s:
         return (
             f"{no_alarm}, but the data end before it is known: a sum has been above the threshold of {limit} for "
-            f"{hours(state.undecided_s)}, too short to tell a change of the ship from weather."
+            f"{hours(state.undecided_s)}, too short to tell a change of the ship from weather beyond the reference."
         )
     soonest_s = min(delay_s(content, number) for number in watched)
     if state.judged_s < soonest_s:

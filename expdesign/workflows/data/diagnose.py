@@ -75,14 +75,14 @@ def diagnose(
         raise InputError("no data files are given, expected one or more CSV files")
     progress("reading the data", 0.0)
     ship, told = equipped(vessel, data)
-    ship, handed_over = with_alarms(ship, data)
+    ship, named = with_alarms(ship, data)
     record = in_stated_time(measured(data, ship, velocity=velocity, told=told), ship.sensors)
     proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     reported = Estimated(progress, after=drawing)
     with workers(jobs, load=None), doubted(record):
-        found = diagnose_record(ship, record, seed=seed, proposals=proposals, progress=reported)
+        found = diagnose_record(ship, record, seed=seed, proposals=proposals, suspected=named, progress=reported)
     reported.after = 0.0
     roll = _roll(ship, record)
     command = command_text(
@@ -101,17 +101,16 @@ def diagnose(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(
-        files=written, document=document_of(summary, _tables(found), (*handed_over, *diagnosis_notes(found)))
-    )
+    return Outcome(files=written, document=document_of(summary, _tables(found), diagnosis_notes(found)))
 
 
-def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
-    """The ship with parameters that a watch named as unsure as its alarm says, and notes; for files that it left.
+def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:
+    """The ship with parameters that a watch named as unsure as its alarm says; for files that it left.
 
     Their standard deviations, of which the fit starts, are the size of the change together with its standard error.
+    Returns also the effects that were named, each with who named it, in words.
     """
-    names, std, notes = ship.model.names, ship.model.parameter_std.copy(), list[str]()
+    names, std, named = ship.model.names, ship.model.parameter_std.copy(), dict[str, str]()
     for path in data:
         told = path.with_name("monitor.json")
         if path.name != SINCE_CHANGE or not told.is_file():
@@ -121,13 +120,11 @@ def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, tuple[str, 
             effect, size, words = str(alarm["effect"]), math.hypot(alarm["value"], alarm["std"]), alarm["in_words"]
         except (ValueError, KeyError, IndexError, TypeError):
             raise FileError(told, "alarms", f"is not as expdesign monitor leaves it beside {path.name}") from None
-        notes.append(f"{path.name}: expdesign monitor named {words}")
-        if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)]:
+        named[effect] = f"{path.name}: expdesign monitor named {words}"
+        if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)] > 0.0:
             std[names.index(name)] = size
-            notes[-1] += f"; the standard deviation of {name} is taken as {size:.3g}"
-    if not notes:
-        return ship, ()
-    return replace(ship, model=replace(ship.model, parameter_std=std)), tuple(notes)
+            named[effect] += f"; the standard deviation of {name} is taken as {size:.3g}"
+    return replace(ship, model=replace(ship.model, parameter_std=std)), named
 
 
 def _roll(ship: Vessel, record: Record) -> RollVerdict | None:

@@ -1,0 +1,71 @@
+"""Causes that were named before, as by a watch: tested first, each alone, with the ship else as her file states her.
+
+What was named beforehand is one question, whose p-value needs no allowance for all others that could be asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from expdesign.diagnosis.causes import Candidate, rounded
+from expdesign.diagnosis.data import Windows
+from expdesign.diagnosis.fit import Fit, fit, tail
+from expdesign.diagnosis.model import ExtendedModel, effect_kind
+from expdesign.diagnosis.motion import fitted_start
+from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
+from expdesign.diagnosis.select.tuning import TUNING
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suspected:
+    """A test of an effect that was named before."""
+
+    effect: str  # its key
+    value: float  # estimate of its change; std: standard error
+    std: float
+    p_value: float  # of the vessel file without it; not adjusted, as it is one question
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the data show it."""
+        return self.p_value <= TUNING.level
+
+    @property
+    def in_words(self) -> str:
+        """The outcome."""
+        unit = effect_kind(self.effect).unit
+        size = f"{rounded(self.value, self.std)}{' ' * bool(unit)}{unit}"
+        answer = "the data show it" if self.confirmed else "the data do not show it"
+        return f"tested first and alone, {answer}: {self.effect} by {size}, p = {self.p_value:.2g}"
+
+
+def suspected_tests(ship: ExtendedModel, windows: Windows, effects: Sequence[str]) -> tuple[Suspected, ...]:
+    """Tests of effects, most certain first; those that the data cannot show are left out.
+
+    Args:
+        ship: the model in use, whose parameters and statements are taken as known here.
+        windows: data.
+        effects: keys of the extended model, such as "gain" or "theta:X_uu".
+    """
+    if not effects:
+        return ()
+    known = replace(ship, model=replace(ship.model, parameter_std=np.zeros(len(ship.model.names))), stated_std={})
+    starts = fitted_start(known, windows)
+    base = fit(known, windows, (), starts=starts)
+    tests = score_tests(base, [Candidate(cause="suspected", free={key: 0.0}) for key in effects])
+    return tuple(sorted((_fitted(base, windows, test) for test in tests), key=lambda one: one.p_value))
+
+
+def _fitted(base: Fit, windows: Windows, test: ScoreTest) -> Suspected:
+    """The effect alone at its best value, with the noise that is left beside it, and how much runs differ."""
+    (key,) = test.candidate.free
+    found = fit(base.ship, windows, (key,), starts=base.starts)
+    value, place = found.value(key) - base.ship.get(key), found.keys.index(key)
+    std = float(np.sqrt(found.covariance[place, place]))
+    return Suspected(
+        effect=key, value=value, std=std * float(np.sqrt(test.factor)),
+        p_value=tail((value / std) ** 2, 1, test.factor, test.freedom),
+    )  # fmt: skip
