@@ -14,6 +14,7 @@ from expdesign.diagnosis.fit import (
     HeldOut,
     bootstrap_sums,
     held_out_gain,
+    interval_of,
     on_common_units,
     prediction_gain,
 )
@@ -183,8 +184,9 @@ def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Arra
     one, other = on_common_units(before, after)
     drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = 1.0 - np.sqrt(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0))
-        low, high = np.nanquantile(1.0 - np.sqrt(drawn[1] / drawn[0]), [0.025, 0.975], axis=0)
+        ratio = np.log(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0)) / 2
+        ends = interval_of(ratio, np.log(drawn[1] / drawn[0]) / 2, one)
+    share, high, low = 1.0 - np.exp([ratio, *ends])
     return share, low, high
 
 
