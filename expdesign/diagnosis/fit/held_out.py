@@ -194,7 +194,7 @@ def prediction_gain(
         return np.nan, (np.nan, np.nan)
     with np.errstate(invalid="ignore"):
         ratios = np.log(left / lost)  # nan where both models run away
-    middle, error = ratios.mean(), 1.96 * ratios.std(ddof=1) / np.sqrt(len(ratios))
+    middle, error = ratios.mean(), scipy.stats.t.ppf(0.975, len(ratios) - 1) * scipy.stats.sem(ratios)
     share, most, least = (1.0 - np.exp([middle, middle - error, middle + error])).tolist()
     return share, (least, most)
 

@@ -120,7 +120,7 @@ def improves_held_out(
     a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
     that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
     predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
-    these alone, if it makes simulations no worse for certain.
+    these alone, if it makes simulations no worse for certain; several parameters at once imitate many causes.
 
     Args:
         found: the selection.
@@ -147,7 +147,8 @@ def improves_held_out(
     if windows is None or not gains or shows_for_certain(held[0], held[1], seed):
         return simulated
     share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
-    alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
+    first = found.steps[0].chosen
+    alone = share >= TUNING.least_predicted and not (first.candidate.imitates or first.is_block)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
     shows = least > 0.0 and (alone or (simulated[0] and worth_a_word))
     low, high = gains[0][1]
