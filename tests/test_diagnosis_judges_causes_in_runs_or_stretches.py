@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from expdesign.diagnosis import judgement
-from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain
+from expdesign.diagnosis.fit.held_out import HeldOut, bootstrap_sums, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
 from expdesign.diagnosis.select.backward_elimination import certain_reductions, improves_held_out
 from expdesign.diagnosis.select.tuning import TUNING
@@ -53,6 +53,17 @@ def test_intervals_of_improvements_hold_the_truth_however_few_runs_there_are(run
         held.append([low < gain < high, *((least < share) & (share < most))])
     found = np.mean(held, axis=0)
     assert (found > 0.95 - 4 * np.sqrt(0.95 * 0.05 / count)).all(), found
+
+
+def test_parts_of_one_run_are_not_counted_as_runs():
+    """Their interval is of quantiles alone, within that of as many runs."""
+    before, after = (replace(item, cut=True) for item in drawn(np.random.default_rng(0), 4))
+    sums = [item.squared_error for item in bootstrap_sums(before, after, 0)]
+    _, low, high = certain_reductions(before, after, 0)
+    ends = 1 - np.sqrt(np.quantile(sums[1] / sums[0], [0.975, 0.025], axis=0))
+    np.testing.assert_allclose([low, high], ends, rtol=1e-3)
+    _, least, most = certain_reductions(replace(before, cut=False), replace(after, cut=False), 0)
+    assert ((least < low) & (high < most)).all()
 
 
 def test_a_later_cause_is_clear_in_stretches_where_whole_runs_leave_its_gain_open():
