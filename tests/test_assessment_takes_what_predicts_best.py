@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess
-from expdesign.assessment.held_out import Ahead, HeldOut, folds, ranked, stay_bounded
+from expdesign.assessment.held_out import Ahead, HeldOut, by_run, certainly_worse, folds, ranked, reason, stay_bounded
 from expdesign.cli import main
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
@@ -181,6 +181,46 @@ def test_the_least_error_decides_and_of_equal_ones_the_least_bias(shares: dict[s
         for name, share in shares.items()
     ]
     assert found[ranked(found)[0]].method.name == best
+
+
+def of_runs(name: str, horizon_s: float | None, errors: np.ndarray) -> HeldOut:
+    """Errors of one output in runs."""
+    share = np.exp(np.log(errors).mean(keepdims=True))
+    return HeldOut(
+        method=method_named(name), horizon_s=horizon_s, outputs=("r",), shares=share, unseen=True,
+        of_runs=np.log(errors),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("runs", [2, 3, 6])
+def test_of_methods_that_predict_alike_one_is_certainly_worse_as_rarely_as_the_interval_says(runs: int) -> None:
+    """One end of 95 %: 2.5 % of draws, of however few runs; all errors vary by 30 %."""
+    rng, count = np.random.default_rng(runs), 2000
+    drawn = 0.1 * np.exp(0.3 * rng.standard_normal((count, 2, runs)))
+    worse = [certainly_worse(of_runs("oe", 30.0, one), of_runs("iv", None, other)) for one, other in drawn]
+    far = (np.log(drawn[:, 0]).mean(axis=1) - np.log(drawn[:, 1]).mean(axis=1) > np.log(2.0)).mean()
+    assert np.mean(worse) <= 0.025 + far + 3 * np.sqrt(0.025 / count)
+
+
+@pytest.mark.parametrize(("runs", "best"), [(1, "oe"), (2, "oe"), (8, "iv")])
+def test_what_makes_the_deciding_error_least_goes_first_until_runs_tell_otherwise(runs: int, best: str) -> None:
+    """A third worse on average, more in some runs than in others."""
+    size = np.exp(np.random.default_rng(0).standard_normal(runs))
+    found = [
+        of_runs("iv", None, 0.1 * size), of_runs("oe", 10.0, 0.11 * size),
+        of_runs("oe", 30.0, 0.1 * size * np.exp(0.3 + 0.1 * (-1.0) ** np.arange(runs))),
+    ]  # fmt: skip
+    first, *others = [found[place] for place in ranked(found)]
+    assert first.method.name == best
+    assert {item.label for item in others[:2]} >= {"oe over 10 s"}
+    assert ("do not tell from chance" in reason(found, first.label, ())) == (best == "oe")
+    far = [found[0], of_runs("oe", 30.0, 0.21 * size)]
+    assert ranked(far) == [0, 1]
+
+
+def test_pieces_of_one_run_are_no_more_runs() -> None:
+    shares = np.array([[0.1, np.nan], [0.4, np.nan], [0.3, np.nan]])
+    np.testing.assert_allclose(np.exp(by_run(shares, ("a", "a", "b"))), [0.2, 0.3])
 
 
 def test_starts_of_stretches_stay_within_the_sensors_noise(monkeypatch: pytest.MonkeyPatch) -> None:

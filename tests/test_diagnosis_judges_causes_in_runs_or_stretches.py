@@ -4,11 +4,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from expdesign.diagnosis import judgement
-from expdesign.diagnosis.fit.held_out import HeldOut
+from expdesign.diagnosis.fit.held_out import HeldOut, bootstrap_sums, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
-from expdesign.diagnosis.select.backward_elimination import improves_held_out
+from expdesign.diagnosis.select.backward_elimination import certain_reductions, improves_held_out
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import silent
 from held_out_cases import POSSIBLE, errors, steps_of
@@ -27,6 +28,42 @@ def whole_and_ahead(*pairs: tuple[np.ndarray | float, np.ndarray | float]) -> li
         replace(errors(whole), ahead=lambda short=short: replace(errors(short), in_stretches=True))
         for whole, short in pairs
     ]
+
+
+def drawn(rng: np.random.Generator, runs: int) -> tuple[HeldOut, HeldOut]:
+    """Runs that differ in size, in how well they are simulated, and in what a cause takes off their error."""
+    size = np.exp(0.3 * rng.standard_normal((runs, 3)))
+    before = 0.2 * size * np.exp(0.3 * rng.standard_normal((runs, 3)))
+    after = before * np.exp(-0.3 + 0.3 * rng.standard_normal((runs, 1)))
+    return HeldOut(squared_error=before, squared_deviation=size), HeldOut(squared_error=after, squared_deviation=size)
+
+
+@pytest.mark.parametrize("runs", [3, 4, 8])
+def test_intervals_of_improvements_hold_the_truth_however_few_runs_there_are(runs: int):
+    """300 draws of as many runs; 0.75 of the quantiles of draws of three runs would."""
+    rng, count = np.random.default_rng(runs), 300
+    before, after = drawn(rng, 200_000)
+    gain = (after.fit - before.fit).mean()
+    share = 1 - np.sqrt(after.squared_error.sum(axis=0) / before.squared_error.sum(axis=0))
+    held = []
+    for _ in range(count):
+        pair = drawn(rng, runs)
+        _, (low, high) = held_out_gain(*pair, 0)
+        _, least, most = certain_reductions(*pair, 0)
+        held.append([low < gain < high, *((least < share) & (share < most))])
+    found = np.mean(held, axis=0)
+    assert (found > 0.95 - 4 * np.sqrt(0.95 * 0.05 / count)).all(), found
+
+
+def test_parts_of_one_run_are_not_counted_as_runs():
+    """Their interval is of quantiles alone, within that of as many runs."""
+    before, after = (replace(item, cut=True) for item in drawn(np.random.default_rng(0), 4))
+    sums = [item.squared_error for item in bootstrap_sums(before, after, 0)]
+    _, low, high = certain_reductions(before, after, 0)
+    ends = 1 - np.sqrt(np.quantile(sums[1] / sums[0], [0.975, 0.025], axis=0))
+    np.testing.assert_allclose([low, high], ends, rtol=1e-3)
+    _, least, most = certain_reductions(replace(before, cut=False), replace(after, cut=False), 0)
+    assert ((least < low) & (high < most)).all()
 
 
 def test_a_later_cause_is_clear_in_stretches_where_whole_runs_leave_its_gain_open():

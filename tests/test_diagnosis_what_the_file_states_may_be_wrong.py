@@ -131,9 +131,12 @@ def test_a_stated_current_is_left_out_where_no_heading_is_measured():
 
 
 def test_a_cause_with_little_gain_alone_is_judged_again_beside_later_ones():
-    """A compass and an antenna that are both not as stated: turned alone, the simulation hardly gains."""
+    """A compass and an antenna that are both not as stated: turned alone, the simulation hardly gains.
+
+    The compass takes 4 % off the error in sway. Six runs show that for certain; three leave its interval open.
+    """
     faults = {"heading_bias": 0.05, "lever_m": 3.0}
-    batches = hidden_record("barge", seed=6, batches=3, samples=150, faults=faults).batches
+    batches = hidden_record("barge", seed=6, batches=6, samples=150, faults=faults).batches
     record = Record(batches=tuple(from_pose(batch) for batch in batches))
     barge = vessel_of("barge")
     stated = replace(barge.sensors, heading_bias_rad=0.03, position=Mounting(forward_m=-1.0))

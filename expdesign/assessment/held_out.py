@@ -9,11 +9,17 @@ and outputs are joined by geometric means, in which no single one decides. Error
 of themselves count as equal. Of such methods the one goes first that noise in the measured velocities does not bias:
 instrumental variables, then output error, then least squares.
 
+Few runs tell methods apart badly: what is left of them is half of the data or less, and they differ among themselves.
+So output error over `Tuning.ahead_s`, which makes the very error least that decides, goes first unless another one is
+better for certain: by an interval of 95 % over the runs, or by a factor of `FAR_WORSE`.
+
 Predictions of what was recorded do not show what a model does beyond it. A hull dissipates: driven no harder than in
 the data, but with its rudders hard over, no point of it gets many times as fast as in the data. A model in which one
 does goes last.
 
-Source: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147, for leaving out.
+Sources: M. Stone, Journal of the Royal Statistical Society B 36 (1974), 111-147, for leaving out; L. Breiman, J. H.
+Friedman, R. A. Olshen and C. J. Stone, Classification and Regression Trees (1984), 3.4.3, for a preference among those
+that left-out data do not tell apart.
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from expdesign.assessment.misfit import whole
 from expdesign.assessment.tuning import TUNING
@@ -36,6 +43,7 @@ from expdesign.values import Array, seal
 from expdesign.vessel import Limit, Vessel, VesselModel
 
 SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
+FAR_WORSE = 2.0  # times the least error, from which on one is worse for certain however few runs there are
 MOST_FOLDS = 4  # into which runs are divided, to be left out in turn
 MOST_OF_DATA = 2 / 3  # share of the data from which on a run is not left out whole
 HELD_LENGTHS = 20.0  # for which inputs are held, in ship lengths sailed: two turning circles
@@ -58,6 +66,8 @@ class HeldOut:
     shares: Array  # (n,) errors over standard deviations, geometric means over runs; nan where one never changes
     unseen: bool  # whether each run was predicted without it
     bounded: bool = True  # whether the model stays near the speeds of the data where its inputs are held
+    # (runs,) means over outputs of the logarithms of each run's errors, the same runs of all methods; or not known
+    of_runs: Array | None = None
 
     def __post_init__(self) -> None:
         seal(self, shares="n")
@@ -81,15 +91,41 @@ class HeldOut:
 
 
 def ranked(found: Sequence[HeldOut]) -> list[int]:
-    """Indices, the best first, models that run away last; of errors that count as equal, the least biased first."""
-    least = min((item.share for item in found if item.bounded), default=0.0)
+    """Indices, the best first, models that run away last; of errors that count as equal, the least biased first.
 
-    def place(index: int) -> tuple[bool, bool, int, float]:
+    Before these goes what makes the very error least that decides, where none is better for certain.
+    """
+    best = min((item for item in found if item.bounded), key=lambda item: item.share, default=None)
+
+    def place(index: int) -> tuple[bool, int, int, float]:
         item = found[index]
-        equal = item.bounded and item.share <= (1.0 + SAME_ERROR) * least
-        return not item.bounded, not equal, UNBIASED.index(item.method.solver) if equal else 0, item.share
+        if best is None or not item.bounded:
+            return True, 0, 0, item.share
+        if _minimises_what_decides(item) and not certainly_worse(item, best):
+            return False, 0, 0, item.share
+        equal = _equal(item, best)
+        return False, 1 if equal else 2, UNBIASED.index(item.method.solver) if equal else 0, item.share
 
     return sorted(range(len(found)), key=place)
+
+
+def _minimises_what_decides(item: HeldOut) -> bool:
+    return item.unseen and item.method.solver == "oe" and item.horizon_s == TUNING.ahead_s
+
+
+def _equal(item: HeldOut, best: HeldOut) -> bool:
+    return item.share <= (1.0 + SAME_ERROR) * best.share
+
+
+def certainly_worse(item: HeldOut, best: HeldOut) -> bool:
+    """Whether errors are larger by more than chance makes them, by Student's interval of 95 % over paired runs."""
+    if item.share > FAR_WORSE * best.share or item.of_runs is None or best.of_runs is None:
+        return not _equal(item, best)
+    more = item.of_runs - best.of_runs
+    more = more[np.isfinite(more)]
+    if len(more) < 2:
+        return False
+    return bool(more.mean() > scipy.stats.t.ppf(0.975, len(more) - 1) * scipy.stats.sem(more) + np.log1p(SAME_ERROR))
 
 
 def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
@@ -109,6 +145,11 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     text = f"predicts {data} {TUNING.ahead_s:g} s ahead with an error of {_bounded(own.share)}"
     if own is least:
         text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
+    elif own is order[0] and least.bounded and _minimises_what_decides(own) and not _equal(own, least):
+        text += (
+            f", {least.label} with {_bounded(least.share)}, which so few runs do not tell from chance; "
+            f"{own.label} fits such predictions themselves"
+        )
     elif own is order[0] and least.bounded and own.method.solver != least.method.solver:
         text += f", {least.label} with {_bounded(least.share)}; noise of the sensors biases {own.label} less"
     elif own is not order[0]:
@@ -200,17 +241,27 @@ def held_out(
         wind: Ahead(candidates[0].model, apart, wind=wind, integration=integration)
         for wind in {candidate.wind for candidate in candidates}
     }
+    each = [ahead[item.wind].shares([row[number] for row in models]) for number, item in enumerate(candidates)]
+    names = [batch.name for batch in apart]
     return tuple(
         HeldOut(
             method=candidate.method,
             horizon_s=candidate.horizon_s,
             outputs=candidate.model.outputs,
-            shares=typical(ahead[candidate.wind].shares([row[number] for row in models])),
+            shares=typical(shares),
             unseen=unseen,
-            bounded=bounded[number],
+            bounded=own,
+            of_runs=by_run(shares, names),
         )
-        for number, candidate in enumerate(candidates)
+        for candidate, shares, own in zip(candidates, each, bounded, strict=True)
     )
+
+
+def by_run(shares: Array, names: Sequence[str]) -> Array:
+    """(runs,) means of the logarithms of shares (pieces, n), given the run of each piece; nan where none is known."""
+    logs, owners = np.log(shares), np.array(names)
+    rows = [logs[owners == name] for name in dict.fromkeys(names)]
+    return np.array([own[np.isfinite(own)].mean() if np.isfinite(own).any() else np.nan for own in rows])
 
 
 def _model(candidate: Candidate, rest: Record) -> VesselModel | None:

@@ -41,6 +41,7 @@ from expdesign.diagnosis.fit.held_out import (
     HeldOut,
     bootstrap_sums,
     held_out_gain,
+    interval_of,
     judged,
     leads_away,
     on_common_units,

@@ -214,6 +214,7 @@ def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
         squared_deviation=deviation,
         unconverged=unconverged,
         run=windows.batch if given.in_stretches else None,
+        cut=not given.in_stretches and given.unit is not windows.batch,
         models=tuple(tested),
     )
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
@@ -58,6 +59,7 @@ class HeldOut:
     ahead: Callable[[], HeldOut] | None = None
     in_stretches: bool = False  # whether these are such errors
     run: Array | None = None  # (b,) of each unit, where these are stretches of runs: those of one run share its errors
+    cut: bool = False  # whether units are parts of runs, because runs are too few to be units
     # (mask of windows, model fitted without them) of every fold; None where it could not be fitted
     models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
 
@@ -103,6 +105,7 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
             squared_error=item.squared_error[both],
             squared_deviation=item.squared_deviation[both],
             run=None if item.run is None else item.run[both],
+            cut=item.cut,
         )
         for item in (before, after)
     )
@@ -148,8 +151,26 @@ def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tu
     if not len(before.squared_error):
         return np.nan, (np.nan, np.nan)
     fits = [_fit_percent(item.squared_error, item.squared_deviation) for item in bootstrap_sums(before, after, seed)]
-    low, high = np.nanquantile(np.nanmean(fits[1] - fits[0], axis=1), [0.025, 0.975])
-    return float(np.nanmean(after.fit - before.fit)), (float(low), float(high))
+    gain = np.nanmean(after.fit - before.fit)
+    low, high = interval_of(gain, np.nanmean(fits[1] - fits[0], axis=1), before)
+    return float(gain), (float(low), float(high))
+
+
+def interval_of(found: Array | np.floating, drawn: Array, held: HeldOut) -> Array:
+    """(2, ...) 95 % interval of what was found, given the same of draws (draws, ...) of the units of such errors.
+
+    Quantiles of draws of n units are too near: draws vary by sqrt((n - 1) / n) of what they should, and of few units
+    nobody knows how they vary, which Student's distribution counts. Of stretches of several runs the runs count. Parts
+    of one run or two tell nothing of how runs differ: their quantiles are as they are, and too near for other runs.
+
+    Source: T. Hesterberg, The American Statistician 69 (2015), 371-386, 3.2.
+    """
+    if held.cut:
+        return np.asarray(np.nanquantile(drawn, [0.025, 0.975], axis=0))
+    runs = 1 if held.run is None else len(np.unique(held.run))
+    count = max(2, runs if runs > 1 else len(held.squared_error))
+    wider = np.sqrt(count / (count - 1)) * scipy.stats.t.ppf(0.975, count - 1) / scipy.stats.norm.ppf(0.975)
+    return np.asarray(found + wider * (np.nanquantile(drawn, [0.025, 0.975], axis=0) - found))
 
 
 def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:
@@ -178,7 +199,7 @@ def prediction_gain(
         return np.nan, (np.nan, np.nan)
     with np.errstate(invalid="ignore"):
         ratios = np.log(left / lost)  # nan where both models run away
-    middle, error = ratios.mean(), 1.96 * ratios.std(ddof=1) / np.sqrt(len(ratios))
+    middle, error = ratios.mean(), scipy.stats.t.ppf(0.975, len(ratios) - 1) * scipy.stats.sem(ratios)
     share, most, least = (1.0 - np.exp([middle, middle - error, middle + error])).tolist()
     return share, (least, most)
 

@@ -14,6 +14,7 @@ from expdesign.diagnosis.fit import (
     HeldOut,
     bootstrap_sums,
     held_out_gain,
+    interval_of,
     on_common_units,
     prediction_gain,
 )
@@ -119,7 +120,7 @@ def improves_held_out(
     a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
     that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
     predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
-    these alone, if it makes simulations no worse for certain.
+    these alone, if it makes simulations no worse for certain; several parameters at once imitate many causes.
 
     Args:
         found: the selection.
@@ -146,7 +147,8 @@ def improves_held_out(
     if windows is None or not gains or shows_for_certain(held[0], held[1], seed):
         return simulated
     share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
-    alone = share >= TUNING.least_predicted and not found.steps[0].chosen.candidate.imitates
+    first = found.steps[0].chosen
+    alone = share >= TUNING.least_predicted and not (first.candidate.imitates or first.is_block)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
     shows = least > 0.0 and (alone or (simulated[0] and worth_a_word))
     low, high = gains[0][1]
@@ -183,8 +185,9 @@ def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Arra
     one, other = on_common_units(before, after)
     drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = 1.0 - np.sqrt(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0))
-        low, high = np.nanquantile(1.0 - np.sqrt(drawn[1] / drawn[0]), [0.025, 0.975], axis=0)
+        ratio = np.log(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0)) / 2
+        ends = interval_of(ratio, np.log(drawn[1] / drawn[0]) / 2, one)
+    share, high, low = 1.0 - np.exp([ratio, *ends])
     return share, low, high
 
 

@@ -68,6 +68,11 @@ class FittedCandidate:
         return tuple(sorted(changes, key=lambda name: -changes[name]))
 
     @property
+    def is_block(self) -> bool:
+        """Whether it is several parameters at once."""
+        return self.candidate.cause == "parameters" and len(self.keys) > 1
+
+    @property
     def numbers(self) -> int:
         """How many it takes from the data."""
         return len(self.keys) + (self.profiled is not None)

@@ -91,7 +91,7 @@ def select_forward(
             steps = _with_joint_profiles(steps)
             found = Selection(steps=tuple(steps), first=first, last=base, last_tests=tests, untried=tuple(work.untried))
             return found.with_steps(tuple(steps))
-        steps += _smaller_causes(step, search) if _is_block(step.chosen) else [step]
+        steps += _smaller_causes(step, search) if step.chosen.is_block else [step]
         del steps[MOST_FINDINGS:]
         base = steps[-1].chosen.fit
         redundant = _to_reject(steps, search) if len(rejected) < MOST_REJECTED else None
@@ -203,11 +203,6 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
     found = fit(found.ship, windows, (), starts=found.starts, options=options)
     anew = FitOptions(steps=NUISANCE_STEPS, warm_start=found)
     return min(found, fit(found.ship, windows, (), starts=found.starts, options=anew), key=lambda item: item.deviance)
-
-
-def _is_block(chosen: FittedCandidate) -> bool:
-    """Several parameters at once."""
-    return chosen.candidate.cause == "parameters" and len(chosen.keys) > 1
 
 
 def _smaller_causes(block: Step, search: _Search) -> list[Step]:
