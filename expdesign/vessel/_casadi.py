@@ -119,7 +119,8 @@ def _functions(
         for vector, place in places:
             own = ca.vertsplit((shares * scale)[place])
             inputs += [ca.hypot(*own), ca.atan2(own[1], own[0])] if vector else own
-        return ca.vertcat(*model.accelerations(moving, moving[:2], inputs, CASADI, values))
+        found: ca.SX = ca.vertcat(*model.accelerations(moving, moving[:2], inputs, CASADI, values))
+        return found
 
     units = ca.horzsplit(ca.SX.eye(len(ranges)))
     secants = [accelerations(tried + width * x) - accelerations(tried - width * x) for x in units]
