@@ -16,9 +16,7 @@ import numpy as np
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer, NoPlan, Unreachable
 from expdesign.plan.checked import promising
-from expdesign.plan.control import HelmShip, capability
-from expdesign.plan.control.capability import USABLE_SHARE
-from expdesign.plan.control.helm_capability import HELM_SHARE, STEADY_HULLS
+from expdesign.plan.control import HELM_SHARE, STEADY_HULLS, USABLE_SHARE, HelmShip, capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import dispersion_m
 from expdesign.plan.solve import draft_trial, plan_drafted
