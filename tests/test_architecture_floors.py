@@ -107,6 +107,7 @@ IMPORTERS = {
         "estimation/replay/_casadi.py",
         "growing/_casadi.py",
         "plan/legs/_casadi.py",
+        "vessel/_casadi.py",
     ),
     "matplotlib": ("export/",),
 }

@@ -12,7 +12,7 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
 from expdesign.workflows.planning.new import KINDS
-from expdesign.workflows.steps.first_trial import NEAR_HULLS, calibration, is_wide
+from expdesign.workflows.steps.first_trial import ABLE, DRAWN, NEAR_HULLS, calibration, is_wide, legs_for_most
 from expdesign.workflows.steps.scored import actuation_remarks, speed_remarks
 
 
@@ -124,6 +124,24 @@ def test_speeds_beyond_those_of_the_data_are_named(tmp_path: Path) -> None:
         tracks = [item.primitive.trajectory for item in scored(case)]
         assert max(track.velocity[:, 0].max() for track in tracks) > 2.2
         assert bool(speed_remarks(case.vessel, tracks, "candidate")) is told
+
+
+def test_most_ships_of_a_wide_prior_reach_the_speed_and_the_turn_of_a_first_trials_legs(tmp_path: Path) -> None:
+    """Other ships, drawn anew: full ahead they are faster than legs on a straight course, and so than all runs."""
+    case = load_scenario(new(tmp_path / "trial", kind="propeller-rudder").files[0])
+    model = case.vessel.model
+    wide = replace(model, parameter_std=0.4 * np.abs(model.parameters))
+    usual, case = case.plan, replace(case, vessel=replace(case.vessel, model=wide))
+    asked = replace(case, plan=replace(usual, transit_speed_mps=2.0))
+    assert legs_for_most(asked, np.random.default_rng(0)).transit_speed_mps == 2.0  # what a file states stays
+    legs = legs_for_most(case, np.random.default_rng(0))
+    known = legs_for_most(replace(case, vessel=replace(case.vessel, model=model)), np.random.default_rng(0))
+    assert legs.transit_speed_mps < 0.8 * known.transit_speed_mps
+    assert legs.turning_radius_m > 1.2 * known.turning_radius_m
+    drawn, u = wide.drawn_parameters(2000, np.random.default_rng(1)), legs.transit_speed_mps
+    full = [max(limit.high for limit in case.vessel.limits[:1]), 0.0]
+    surge = wide.accelerations((u, 0.0, 0.0), (u, 0.0), full, parameters=drawn.T)[0]
+    assert np.mean(surge > 0.0) > ABLE - 4 * np.sqrt(ABLE * (1 - ABLE) / DRAWN)  # of the speed's own draws
 
 
 def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Path) -> None:

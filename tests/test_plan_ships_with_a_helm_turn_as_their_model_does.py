@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.optimize import fsolve
 
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
-from expdesign.plan.control import HelmShip
+from expdesign.plan.control import AgileShip, HelmShip
 from expdesign.plan.control.capability import capability, needs_helm
 from expdesign.plan.control.helm_capability import LATERAL_MPS2, steady_turns
 from expdesign.scenario import load_vessel
@@ -25,6 +26,9 @@ from plan_case import ship as tug
 WATER, BLOCK, DIAMETER, DEDUCTION, WAKE = 1025.0, 0.70, 3.0, 0.20, 0.30
 THRUST = (0.35, -0.40)
 STRAIGHTENED, EXTRA, EXTRA_PLACE, RUDDER_DEDUCTION = 0.6, 0.2, -0.45, 0.3
+
+
+TEMPLATES = Path(__file__).parents[1] / "expdesign" / "templates"
 
 
 @cache
@@ -194,3 +198,15 @@ def test_a_ship_that_is_unstable_on_course_still_has_turns():
 def test_a_vessel_with_forces_in_every_direction_needs_no_helm():
     assert not needs_helm(tug())
     assert not needs_helm(load_vessel(VESSELS / "model-ship.toml"))
+
+
+def test_thrusters_steer_a_ship_on_legs_only_where_they_hold_a_turn_against_her_hull():
+    """A hull that turning pushes outwards goes round by drifting: held without drift, she would go straight on."""
+    ship = load_vessel(TEMPLATES / "azimuth" / "vessel.toml")
+    values = dict(zip(ship.model.names, ship.model.parameters.tolist(), strict=True))
+    tunnel = {name: 3 * values[name] for name in ("Y_T3", "N_T3", "Y_uT3", "N_uT3")}
+    slender = {name: 0.02 * values[name] for name in ("Y_ur", "N_ur")}
+    for hull, kind in (({}, HelmShip), (slender, AgileShip)):
+        made = replace(ship, model=ship.model.with_parameters(values | tunnel | hull))
+        assert not needs_helm(made)  # at rest she turns on the spot and goes sideways
+        assert isinstance(capability(made, PlanSettings()), kind)

@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
 from expdesign.vessel.expressions import NUMPY
 from expdesign.vessel.model import VesselModel
+
+if TYPE_CHECKING:
+    from expdesign.vessel._casadi import CompiledSteps
 
 SECANTS = (0.05, 0.05, 0.02, 0.01, *([1e-3] * 8), *([1e-4] * 18))
 """Half widths of the secants of each iteration, as shares: wide ones see past thrust that vanishes."""
@@ -40,8 +44,6 @@ COARSE = 1e-2
 """Acceleration, in those of full thrust, from which on two iterations do."""
 CLEARLY = 0.3
 """Share of what is missing near those commands that must be missing elsewhere for commands to jump there."""
-DAMPING = 1e-12
-"""Of directions in which nothing pushes, in squares of the mean push."""
 STILL = 1e-8
 """Change of shares that makes no difference."""
 REST_WIDTH = 0.5
@@ -111,6 +113,14 @@ class Thrusts:
         return found[0], np.moveaxis(found[1 : c + 1] - found[c + 1 :], 0, -1) / (2.0 * width)
 
     @cached_property
+    def steps(self) -> CompiledSteps:
+        """Newton's steps."""
+        from expdesign.vessel._casadi import compiled_steps  # CasADi is loaded when commands are sought
+
+        ranges = tuple(zip(*(column.tolist() for column in (self.scale, *self._bounds)), strict=True))
+        return compiled_steps(self.model, self.actuators, ranges)
+
+    @cached_property
     def each(self) -> list[tuple[Actuator, slice]]:
         """Where the shares of each actuator are."""
         ends = np.cumsum([_width(actuator) for actuator in self.actuators]).tolist()
@@ -130,6 +140,13 @@ def thrusts(model: VesselModel) -> Thrusts:
     finite = tuple(size if math.isfinite(size) else 1.0 for size in full)
     arm = max(math.hypot(actuator.forward_m, actuator.starboard_m) for actuator in actuators) or 1.0
     return Thrusts(model=model, actuators=actuators, full=finite, weights=np.array([1.0, 1.0, arm]))
+
+
+@lru_cache(maxsize=16)
+def _without_sway(model: VesselModel) -> Thrusts:
+    """The thrusts of a model whose sway is left to itself."""
+    how = thrusts(model)
+    return replace(how, weights=how.weights * (1.0, 0.0, 1.0))
 
 
 def _answer(model: VesselModel, motion: tuple[float, float, float], commands: dict[str, float]) -> Array:
@@ -189,7 +206,7 @@ def required_thrust(
     how, rest = thrusts(model), push_at_rest(model)
     shape = np.broadcast_shapes(velocity.shape, acceleration.shape)[:-1]
     motion, desired = (np.broadcast_to(x, (*shape, 3)).reshape(-1, 3) for x in (velocity, acceleration))
-    how = replace(how, weights=how.weights * (1.0, float(sway), 1.0))
+    how = how if sway else _without_sway(model)
     enough = (SOLVED if near is None else tolerance) * max(float(np.abs(rest).sum(axis=1).max()), 1e-300)
     best, left = np.zeros((len(motion), rest.shape[1])), np.full(len(motion), np.inf)
     starts: Sequence[float] = STARTS
@@ -213,9 +230,11 @@ def required_thrust(
 
 def _like_at_rest(how: Thrusts, motion: Array, desired: Array) -> Array:
     """(n, c) commands that would do at rest, by thrust that grows with the square of the speed."""
-    push = np.broadcast_to(push_at_rest(how.model), (len(motion), *push_at_rest(how.model).shape))
-    missing = (desired - how.accelerations(motion, np.zeros((len(motion), push.shape[2])))) * how.weights
-    shares = _smallest(how, push, missing)
+    push = push_at_rest(how.model).T
+    missing = (desired - how.accelerations(motion, np.zeros((len(motion), len(push))))) * how.weights
+    shares = how.steps.smallest(
+        np.broadcast_to(push, (len(motion), *push.shape)), missing, np.zeros((len(motion), len(push)))
+    )
     for _, place in how.each:
         size = np.linalg.norm(shares[:, place], axis=-1, keepdims=True)
         shares[:, place] *= np.sqrt(REST_WIDTH / np.maximum(size, 1e-6))
@@ -240,38 +259,17 @@ def _searched(
     first: Array | None = None
     for width in widths:
         tried = best[open_] + step[open_]
-        found, push = how.push(motion[open_], tried, width)
+        found, push = how.steps.push(motion[open_], tried, width)
         missing = (desired[open_] - found) * how.weights
         size = np.linalg.norm(missing, axis=-1)
         better = (size < left[open_]) | (size <= enough)
-        rows, push, tried = open_[better], push[better] * how.weights[:, None], tried[better]
+        rows, push, tried = open_[better], push[better] * how.weights, tried[better]
         step[open_[~better]] *= SHORTER
         first = size if first is None else first
-        aimed = _smallest(how, push, missing[better] + (push @ tried[..., None])[..., 0], near=eased * tried)
+        aimed = how.steps.smallest(push, missing[better] + (tried[:, None] @ push)[:, 0], eased * tried)
         eased = 1.0
         best[rows], left[rows], step[rows] = tried, size[better], aimed - tried
         open_ = open_[(left[open_] > enough) & (np.abs(step[open_]).max(axis=-1) > STILL)]
         if not len(open_):
             break
     return best, left, left if first is None else first
-
-
-def _smallest(how: Thrusts, push: Array, wanted: Array, *, near: Array | float = 0.0) -> Array:
-    """(n, c) shares within limits, nearest to some, whose linear pushes (n, 3, c) give what is wanted (n, 3)."""
-    free, shares = np.ones(push.shape[:1] + push.shape[2:]), near + np.zeros(push.shape[:1] + push.shape[2:])
-    damping = DAMPING * ((push**2).sum(axis=(1, 2))[:, None, None] + 1e-30) * np.eye(3)
-    for _ in range(push.shape[2]):
-        mobile = push * free[:, None, :]
-        rest = wanted - (push @ shares[..., None])[..., 0]
-        solved = np.linalg.solve(mobile @ mobile.transpose(0, 2, 1) + damping, rest[..., None])
-        shares = shares + (mobile.transpose(0, 2, 1) @ solved)[..., 0]
-        inside = how.within(shares)
-        over = np.abs(inside - shares) > 1e-12
-        for actuator, place in how.each:
-            if actuator.kind == "azimuth":
-                over[:, place] |= over[:, place].any(axis=-1, keepdims=True)
-        shares = inside
-        if not (over & (free > 0)).any():
-            break
-        free = np.where(over, 0.0, free)
-    return shares

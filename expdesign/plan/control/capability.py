@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -29,6 +30,9 @@ HELM_OVERSHOOT = 1.3
 # weakest push at rest, in the strongest, with which thrusters steer a ship on legs: a tunnel thruster beside two
 # propellers does not
 STEERING_PUSH = 0.1
+# turning radius at transit speed without drift, in hull lengths, above which a ship is steered by a helm: thrusters
+# that turn her on the spot do not hold her hull across the flow
+WIDEST_WITHOUT_DRIFT = 10.0
 
 
 def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0.0) -> Capability:
@@ -51,6 +55,9 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
         raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead with its actuators and nominal model")
     transit = _transit_speed(vessel, settings, top, current_mps)
     yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
+    if yaw is None or transit / yaw > WIDEST_WITHOUT_DRIFT * vessel.length_m:
+        with suppress(NoPlan):  # without a helm she turns as wide as she does, or where she is
+            return _helm_ship(vessel, settings, current_mps)
     if yaw is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
     yaw = min(yaw, LATERAL_MPS2 / transit / USABLE_SHARE)

@@ -14,7 +14,7 @@ IFAC Proc. 17 (1984), 1603-1608.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import Any
@@ -23,7 +23,7 @@ import casadi as ca
 import numpy as np
 
 from expdesign.plan.legs.problem import LegProblem
-from expdesign.simulation import Environment, motion_rates, rk4_step, sample_map, step_shares
+from expdesign.simulation import Environment, SampleMap, motion_rates, rk4_step, sample_map, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import Operators, Vessel, by_force
@@ -69,7 +69,8 @@ class Program:
         delivered = ca.DM(self.input_scale[self.lagging]) * d
         variables = ca.vertcat(ca.vec(x), ca.vec(u), ca.vec(d), h)
         given = ca.vertcat(states, delivered)
-        arguments = ca.vertcat(given[:, :-1], *self._arriving(past, inputs), ca.repmat(h, 1, j))
+        ends = (inputs[:, :-1], inputs[:, 1:]) if _prompt(self.maps) else self._arriving(past, inputs)
+        arguments = ca.vertcat(given[:, :-1], *ends, ca.repmat(h, 1, j))
         scale = np.tile(1.0 / np.r_[self.state_scale, self.input_scale[self.lagging]], j)
         motion = ca.DM(scale) * ca.vec(block.value.map(j)(arguments) - given[:, 1:])
         rows = self._region(states[:, 1:-1], path, circle, arm)
@@ -266,8 +267,9 @@ class BlockMap:
     """The map over a block of samples: state and what lagging actuators deliver, from these and the commands between.
 
     Its argument (n,) holds the state (6,), what lagging actuators deliver (c,), the earlier and the later commands that
-    arrive in each sample (m block,) each, and the sample time. Dead bands are left out: commands inside them make the
-    leg miss its end, which the caller finds.
+    arrive in each sample (m block,) each, and the sample time. Where no actuator has a dead time, the commands at both
+    nodes (m,) each stand for all between. Dead bands are left out: commands inside them make the leg miss its end,
+    which the caller finds.
     """
 
     value: ca.Function  # argument -> (6 + c,)
@@ -283,16 +285,26 @@ def _block_map(ship: _Ship, block: int) -> BlockMap:
     vessel = ship.vessel
     lagging, m = sum(response.lag_s > 0 for response in vessel.responses), len(vessel.limits)
     x, d, h = ca.SX.sym("x", 6), ca.SX.sym("d", lagging), ca.SX.sym("h")
-    early, late = ca.SX.sym("early", m, block), ca.SX.sym("late", m, block)
-    argument = ca.vertcat(x, d, ca.vec(early), ca.vec(late), h)
-    value = _after(ship, x, d, early, late, h, SUBSTEPS)
+    if _prompt([sample_map(response, sample_time_s=vessel.sample_time_s) for response in vessel.responses]):
+        ends = ca.SX.sym("before", m), ca.SX.sym("after", m)
+        early = late = ca.horzcat(*[ends[0] + (k + 1) / block * (ends[1] - ends[0]) for k in range(block)])
+        argument = ca.vertcat(x, d, *ends, h)
+    else:
+        early, late = ca.SX.sym("early", m, block), ca.SX.sym("late", m, block)
+        argument = ca.vertcat(x, d, ca.vec(early), ca.vec(late), h)
+    value = ca.cse(_after(ship, x, d, early, late, h, SUBSTEPS))
     weights = ca.SX.sym("weights", value.numel())
-    bent = ca.dot(weights, _after(ship, x, d, early, late, h, 1))
+    bent = ca.cse(ca.dot(weights, _after(ship, x, d, early, late, h, 1)))
     return BlockMap(
         value=ca.Function("block", [argument], [value]),
         jacobian=ca.Function("block_jacobian", [argument], [ca.jacobian(value, argument)]),
         hessian=ca.Function("block_hessian", [argument, weights], [ca.hessian(bent, argument)[0]]),
     )
+
+
+def _prompt(maps: Sequence[SampleMap]) -> bool:
+    """Whether what actuators do in a sample depends on the command of that sample alone, and where they were."""
+    return not any(through.lateness or through.means[:, 1].any() or through.end[1] for through in maps)
 
 
 def _after(ship: _Ship, x: ca.SX, d: ca.SX, early: ca.SX, late: ca.SX, h: ca.SX, substeps: int) -> ca.SX:

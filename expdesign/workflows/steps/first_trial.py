@@ -2,7 +2,8 @@
 
 Where the standard deviations of the parameters are wide, runs as long as a dictionary asks for lead the ships of the
 prior too far apart to be safe, or to come to the next run. The first trial then takes each run only as long as these
-ships keep to its planned track. What it tells narrows the prior, and `replan` goes on with longer runs.
+ships keep to its planned track, at a speed that they reach, and its legs turn as wide as they do. What it tells narrows
+the prior, and `replan` goes on with longer runs.
 """
 
 from __future__ import annotations
@@ -15,22 +16,27 @@ import numpy as np
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer, NoPlan, Unreachable
 from expdesign.plan.checked import promising
+from expdesign.plan.control import HELM_SHARE, STEADY_HULLS, USABLE_SHARE, HelmShip, capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import dispersion_m
 from expdesign.plan.solve import draft_trial, plan_drafted
-from expdesign.plan.values import Plan
+from expdesign.plan.values import Plan, PlanSettings
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario
+from expdesign.simulation import simulate_many
 from expdesign.vessel import VesselModel
 from expdesign.vessel.hull import covering_discs
 
 WIDE = 0.25  # median standard deviation of parameters, in their values, from which a prior is wide
 NEAR_HULLS = 0.75  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
 KEPT = 0.9  # share of the ships that do
+ABLE = 0.95  # share of the ships that reach the speed and the turning radius of legs
 DRAWN = 200  # ships drawn of each run
 CUT = (0.5, 0.9)  # least and most share of a run that is tried next
 SHORTEST = 0.15  # share of a run below which it is left out
+SPEEDS = 200  # between rest and top speed, at which the thrust of drawn ships is compared with their resistance
+WIDEST = 20.0  # hull lengths of the turning radius of legs at most
 TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
 
 
@@ -58,11 +64,59 @@ def calibration(case: Scenario, *, seed: int) -> Scenario:
         NoAnswer: no run is safe for so long that it tells anything.
     """
     rng = np.random.default_rng((seed, len(case.dictionary)))
+    case = replace(case, plan=legs_for_most(case, rng))
+    case = replace(case, dictionary=tuple(_slowed(spec, case.plan.transit_speed_mps) for spec in case.dictionary))
     cut = [spec for given in case.dictionary if (spec := _cut(case, given, rng)) is not None]
     if not cut:
         raise NoAnswer("the ships of the prior keep to the track of no run: state less uncertainty, or shorter runs")
     total_s = max(TIME_SHARE * case.design.total_s, max(_length_s(case, spec) for spec in cut))
     return replace(case, dictionary=tuple(cut), design=replace(case.design, total_s=total_s))
+
+
+def _slowed(spec: PrimitiveSpec, most_mps: float | None) -> PrimitiveSpec:
+    """The specification with speeds of at most so much, all of them by the same share."""
+    speeds = {name: value for name, value in spec.settings.items() if name.endswith("speed_mps") and value}
+    fastest = max(speeds.values(), default=0.0)
+    if most_mps is None or fastest <= most_mps:
+        return spec
+    return replace(spec, settings={**spec.settings, **{k: v * most_mps / fastest for k, v in speeds.items()}})
+
+
+def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
+    """Settings with a speed and a turning radius of legs that most ships of the prior reach, where the file has none.
+
+    The speed is that of full ahead on a straight course; the radius that of the helm as far over as legs use it.
+    """
+    vessel, plan = case.vessel, case.plan
+    ship = capability(vessel, plan, current_mps=float(np.hypot(*case.environment.current_to)))
+    if not isinstance(ship, HelmShip):
+        return plan
+    approach, drawn = ship.approach, vessel.model.drawn_parameters(DRAWN, rng)
+    speeds = np.linspace(0.0, ship.top_speed_mps, SPEEDS)[:, None]
+    ahead = approach.helm.inputs(1.0, approach.angle_rad)
+    surge, _, _ = vessel.model.accelerations((speeds, 0.0, 0.0), (speeds, 0.0), ahead, parameters=drawn.T)
+    fastest = float(np.quantile(speeds[np.maximum((surge > 0.0).sum(axis=0) - 1, 0), 0], 1.0 - ABLE))
+    over = approach.starboard * HELM_SHARE * (approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
+    helms = approach.angle_rad + np.repeat([over, -over], DRAWN)
+    samples = int(np.ceil(STEADY_HULLS * vessel.length_m / ship.transit_speed_mps / vessel.sample_time_s))
+    orders = approach.helm.rows(np.array(approach.drive), helms)  # (2 DRAWN, m)
+    states = simulate_many(
+        vessel,
+        np.repeat(orders[:, None], samples, axis=1),
+        pose=np.zeros((len(orders), 3)),
+        velocity=np.tile(approach.velocity, (len(orders), 1)),
+        current_to=np.zeros((len(orders), 2)),
+        wind_to=np.zeros((len(orders), 2)),
+        parameters=np.tile(drawn, (2, 1)),
+    )
+    u, v, r = np.nan_to_num(states[-1, :, 3:].T, nan=0.0, posinf=0.0, neginf=0.0)
+    radii = np.where(r == 0.0, np.inf, np.hypot(u, v) / np.maximum(np.abs(r), 1e-12)).reshape(2, DRAWN)
+    widest = min(float(np.quantile(radii.max(axis=0), ABLE)), WIDEST * vessel.length_m)
+    return replace(
+        plan,
+        transit_speed_mps=plan.transit_speed_mps or min(ship.transit_speed_mps, USABLE_SHARE * fastest),
+        turning_radius_m=plan.turning_radius_m or max(ship.turning_radius_m, widest),
+    )
 
 
 def _length_s(case: Scenario, spec: PrimitiveSpec) -> float:
