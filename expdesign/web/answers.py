@@ -160,16 +160,17 @@ def played(plan: str) -> Answer:
         content = json.loads(path.read_text(encoding="utf-8"))
         track = path.with_name("track.csv")
         check_ends(track, "a track")
-        names = track.open(encoding="utf-8").readline().strip().split(",")
+        header = track.open(encoding="utf-8").readline().strip().split(",")
         rows = np.loadtxt(track, delimiter=",", skiprows=1, ndmin=2)
         inputs = path.with_name("commands.csv").open(encoding="utf-8").readline().strip().split(",")[1:-1]
         orders = np.loadtxt(path.with_name("commands.csv"), delimiter=",", skiprows=1, ndmin=2)
     except (OSError, ValueError) as error:
         return {"problem": f"{plan} has no track beside it that can be played: {error}"}
     step = max(1, -(-len(rows) // MOST_PLAYED))
-    columns = {name: np.round(rows[::step, index], 8).tolist() for index, name in enumerate(names)}
+    columns = {name: np.round(rows[::step, index], 8).tolist() for index, name in enumerate(header)}
     held = np.minimum(np.arange(0, len(rows), step), len(orders) - 1)  # the last order stands at the last sample
     commands = {name: np.round(orders[held, 1 + index], 5).tolist() for index, name in enumerate(inputs)}
+    names = said(path)
     return {
         "scenario": content["scenario"],
         "verified": content["verified"],
@@ -179,12 +180,21 @@ def played(plan: str) -> Answer:
         "columns": columns,
         "commands": commands,
         "legs": [
-            {key: leg.get(key) for key in ("kind", "name", "duration_s")} | {"start": leg["start"]}
+            {"kind": leg["kind"], "name": names.get(leg["name"], leg["name"]), "duration_s": leg["duration_s"]}
             for leg in content["legs"]
         ],
         "informative_s": content["informative_s"],
         "reposition_s": content["reposition_s"],
     }
+
+
+def said(plan: Path) -> dict[str, str]:
+    """Names of the runs of a plan as people say them, by the dictionary beside it; none where there is none."""
+    try:
+        runs = json.loads(plan.with_name("dictionary.json").read_text(encoding="utf-8"))["primitives"]
+        return names_of_runs((run["name"], run["family"], run["settings"]) for run in runs)
+    except (OSError, ValueError, KeyError):
+        return {}
 
 
 def wrong(error: Exception) -> Answer:

@@ -149,9 +149,10 @@ class _Plan:
                 for name in routes:
                     ui.link(name, f"/folder/{quote(str(beside / name))}").props(f'download="{name}"')
         ui.label("Runs").classes("head2")
+        names = answers.said(folder.path(self.shown))
         for leg in content["legs"]:
             if leg["kind"] == "primitive":
-                ui.label(f"{leg['name']}, {words.duration(leg['duration_s'])}").classes("quiet")
+                ui.label(f"{names.get(leg['name'], leg['name'])}, {words.duration(leg['duration_s'])}").classes("quiet")
 
     def _refused(self, refusal: dict[str, Any]) -> None:
         ui.label("Refused").classes("mark bad")

@@ -138,6 +138,8 @@
         from = k;
       }
       this.body = L.polygon([], { color: "#111", weight: 1, fillColor: "#f5c400", fillOpacity: 0.95, interactive: false, renderer: L.svg() }).addTo(this.group);
+      this.dot = L.circleMarker([lat[0], lon[0]], { radius: 6, color: "#111", weight: 2, fillColor: "#f5c400", fillOpacity: 1, interactive: false, renderer: L.svg() }).addTo(this.group);
+      mapOf(id).fitBounds(L.latLngBounds(lat.map((value, k) => [value, lon[k]])), { padding: [30, 30] });
       this.slider = document.getElementById(`when${id}`);
       this.slider.max = this.until;
       this.slider.oninput = () => this.show(Number(this.slider.value));
@@ -167,6 +169,7 @@
       const turned = Math.atan2(Math.sin(of.heading_rad[next] - of.heading_rad[k]), Math.cos(of.heading_rad[next] - of.heading_rad[k]));
       const heading = of.heading_rad[k] + share * turned;
       this.body.setLatLngs(hull(mix("lat_deg"), mix("lon_deg"), heading, this.plan.length_m, this.plan.beam_m));
+      this.dot.setLatLng([mix("lat_deg"), mix("lon_deg")]);
       this.slider.value = now;
       const leg = this.plan.legs[of.leg[k]], degrees = (((heading * 180) / Math.PI) % 360 + 360) % 360;
       const rows = [
