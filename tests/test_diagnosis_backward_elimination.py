@@ -24,14 +24,13 @@ from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_fo
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.selection import Step, least_significant_step, wald_p_value, without_step
 from expdesign.diagnosis.select.selection_round import (
-    ABOUT_AS_LIKELY,
     NEARLY_AS_MUCH,
     Work,
     _best_on_held_out,
     selection_round,
     simplest,
-    starting_points,
 )
+from expdesign.diagnosis.select.shortlist import ABOUT_AS_LIKELY, starting_points
 from expdesign.diagnosis.select.starting_point import starting_point
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model

@@ -31,11 +31,11 @@ from expdesign.diagnosis.select.selection_round import (
     Work,
     best_step,
     has_rivals,
-    listed_causes,
     round_tests,
     same_effects_as_any,
     selection_round,
 )
+from expdesign.diagnosis.select.shortlist import listed_causes
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.progress import Estimated
 from expdesign.values import Array

@@ -13,10 +13,9 @@ if TYPE_CHECKING:
         recorded_dictionary_json,
         subsets_json,
     )
+    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table, plus_minus
     from expdesign.export.files.estimates import (
         breach_sentences,
-        disturbance_entries,
-        disturbance_table,
         estimate_json,
         estimate_warnings,
         estimated_vessel,
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
         motion_words,
         parameter_entries,
         parameter_table,
-        plus_minus,
         prediction_entries,
         prediction_table,
         prediction_title,
