@@ -71,8 +71,9 @@ class Folder:
                 count += 1
                 if count > MOST_FILES:
                     return
-                if not name.startswith("."):
-                    yield Path(base) / name
+                path = Path(base) / name
+                if not name.startswith(".") and path.resolve().is_relative_to(self.root):
+                    yield path
 
     def of_kind(self, kind: str) -> tuple[str, ...]:
         """Names of the TOML files of a kind of `KINDS`."""
@@ -117,6 +118,11 @@ class Folder:
     def versions(self, name: str) -> int:
         """How often a file can be undone."""
         return len(self._versions(self.path(name)))
+
+    def last_changed(self, *names: str) -> str:
+        """The file of these that was changed last and can be undone; "" where none can."""
+        kept = {name: found[-1].stat().st_mtime_ns for name in names if (found := self._versions(self.path(name)))}
+        return max(kept, key=kept.__getitem__, default="")
 
     def undo(self, name: str) -> None:
         """Take the newest version of a file back.

@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import wraps
+from inspect import isawaitable
 from multiprocessing import get_context
 from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
+from expdesign.errors import InputError
 from expdesign.web import answers
 from expdesign.web.folder import Folder
 from expdesign.web.jobs import Job, Jobs
@@ -66,11 +69,36 @@ class Site:
         return f"runs/{read_toml(path).get('scenario', {}).get('name', path.stem)}"
 
     def file_of(self, scenario: str, key: str) -> str:
-        """The vessel, dictionary or area file that a scenario names, as it is called in the folder."""
-        from expdesign.scenario.tables import read_toml
+        """The vessel, dictionary or area file that a scenario names, as it is called in the folder.
 
-        path = self.folder.path(scenario)
-        return self.folder.name(self.folder.named_in(path, read_toml(path)["scenario"][key]))
+        Raises:
+            InputError: it names none, or none in the folder.
+        """
+        from expdesign.scenario.tables import Entry, read_toml
+
+        entry = Entry(self.folder.path(scenario), f"scenario.{key}")
+        named = read_toml(entry.path).get("scenario", {}).get(key)
+        if not isinstance(named, str):
+            raise entry.error("is missing, expected the path of a file in quotes")
+        return self.folder.name(self.folder.named_in(entry.path, named))
+
+    def page(self, address: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+        """Give a function that draws a page its address; what is wrong in a file is said in the page."""
+
+        def register(draw: Callable[..., Any]) -> Callable[..., Any]:
+            @wraps(draw)
+            async def drawn(*arguments: Any, **options: Any) -> None:
+                try:
+                    found = draw(*arguments, **options)
+                    if isawaitable(found):
+                        await found
+                except InputError as error:
+                    wrong(str(error))
+                    ui.label("The page Files shows it as text.").classes("quiet")
+
+            return ui.page(address)(drawn)
+
+        return register
 
 
 class Watched:

@@ -8,6 +8,7 @@ from pathlib import Path
 from nicegui import events, ui
 
 from expdesign.errors import InputError
+from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 
@@ -28,7 +29,7 @@ COMMANDS = ("import", *(name for name in PAGES if name != "import"))
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/data")
+    @site.page("/data")
     def data(scenario: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/data", scenario), ui.column().classes("sheet"):
@@ -46,7 +47,9 @@ class _Data:
         """Logs, runs, commands, results."""
         ui.label("1. Logs").classes("head2")
         ui.label("Drop logs of any format here; together they are one trial.").classes("quiet")
-        ui.upload(label="Drop logs", multiple=True, auto_upload=True, on_upload=self._take).classes("upload")
+        ui.upload(
+            label="Drop logs", multiple=True, auto_upload=True, max_file_size=MOST_UPLOAD_BYTES, on_upload=self._take
+        ).classes("upload")
         self.logs = ui.select(list(self._logs()), multiple=True, label="Logs to import", value=[]).classes("field")
         ui.button("Import", on_click=self._import)
         ui.label("2. Runs").classes("head2")

@@ -19,7 +19,7 @@ LARGEST = 2**20
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/files")
+    @site.page("/files")
     def files(scenario: str = "", file: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/files", scenario) as watched, ui.column().classes("sheet"):

@@ -20,7 +20,7 @@ SIZE_PX = 120
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/manoeuvres")
+    @site.page("/manoeuvres")
     async def manoeuvres(scenario: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/manoeuvres", scenario) as watched, ui.column().classes("sheet"):

@@ -22,7 +22,7 @@ ROUTES = ("route.rtz", "route.gpx", "route.kml", "route.geojson", "route.plan", 
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/plan")
+    @site.page("/plan")
     async def plan(scenario: str = "", plan: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/plan", scenario) as watched:

@@ -15,6 +15,7 @@ from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import Entry, check_table, read_toml
 from expdesign.web import answers
+from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.forms import Form
 from expdesign.web.site import Site, Watched, framed, spelled, told, wrong
 
@@ -33,7 +34,7 @@ CHARTS = (".geojson", ".json", ".000")
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/sea")
+    @site.page("/sea")
     async def sea(scenario: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/sea", scenario) as watched:
@@ -59,7 +60,7 @@ class _Sea:
                 with ui.row().classes("line"):
                     ui.button("Draw a no-go zone", on_click=self._pen).tooltip("Click corners; end on the first one")
                     ui.button("Undo", on_click=self._undo).props("outline").tooltip(
-                        "Take the last change of the area back"
+                        "Take the last change of area or scenario back"
                     )
                     self.clear = ui.label().classes("clear").props('role="status"')
             self.side = ui.column().classes("narrow")
@@ -104,7 +105,9 @@ class _Sea:
             ui.label("None yet. Draw one on the chart.").classes("quiet")
         ui.label("Another chart").classes("head2")
         ui.label("GeoJSON in longitude and latitude, or an S-57 cell (*.000).").classes("quiet")
-        ui.upload(label="Open a chart", auto_upload=True, on_upload=self._open).classes("upload")
+        ui.upload(
+            label="Open a chart", auto_upload=True, max_file_size=MOST_UPLOAD_BYTES, on_upload=self._open
+        ).classes("upload")
         with ui.expansion("Start, goal and plan as numbers").classes("table"):
             Form(self.site.folder, self.scenario, ScenarioFile, changed=self._fill_later).draw(
                 "start", "goal", "plan", "environment"
@@ -137,11 +140,11 @@ class _Sea:
         ui.run_javascript(f"expd.pen({self.map.id})")
 
     def _undo(self) -> None:
-        try:
-            self.site.folder.undo(self.area)
-        except InputError as error:
-            ui.notify(str(error))
+        name = self.site.folder.last_changed(self.area, self.scenario)
+        if not name:
+            ui.notify("There is nothing to undo.")
             return
+        self.site.folder.undo(name)
         self._fill_later()
 
     def _fill_later(self) -> None:

@@ -36,7 +36,7 @@ area_percent = 2.0
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/ship")
+    @site.page("/ship")
     def ship(scenario: str = "", card: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/ship", scenario) as watched, ui.column().classes("sheet"):

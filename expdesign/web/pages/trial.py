@@ -15,7 +15,7 @@ from expdesign.workflows.planning.new import KINDS
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/")
+    @site.page("/")
     async def trial(scenario: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/", scenario) as watched, ui.column().classes("sheet"):

@@ -18,7 +18,7 @@ FIRST = "[design]\ntotal_s = 1800.0\n"
 def register(site: Site) -> None:
     """Give the page its address."""
 
-    @ui.page("/whatif")
+    @site.page("/whatif")
     def whatif(scenario: str = "") -> None:
         scenario = site.scenario(scenario)
         with framed(site, "/whatif", scenario) as watched, ui.column().classes("sheet"):
