@@ -22,7 +22,8 @@ def steps_of(*keys: str) -> Selection:
     steps = [
         SimpleNamespace(
             chosen=SimpleNamespace(
-                parameters=(), keys=(key,), fit=key, candidate=Candidate(cause="current", free={key: 0.0})
+                parameters=(), keys=(key,), fit=key, is_block=False,
+                candidate=Candidate(cause="current", free={key: 0.0}),
             ),
             tests=(key,), p_value=1e-4,
         )

@@ -15,10 +15,10 @@ BIAS_RAD = 0.08
 
 
 def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
-    """The file has the true parameters, stated to 10 %, and three runs of 150 s tell them worse than that."""
+    """The file has the true parameters, stated to 10 %, and eight runs of a minute tell them worse than that."""
     beside = 0
-    for seed in (1, 4):
-        record = hidden_record("coaster", seed=seed, batches=3, samples=150, faults={"heading_bias": BIAS_RAD})
+    for seed in (1, 6):
+        record = hidden_record("coaster", seed=seed, batches=8, samples=60, faults={"heading_bias": BIAS_RAD})
         vessel = vessel_of("coaster", relative_std=0.1)
         found = diagnose(vessel, record)
         assert [item.cause for item in found.findings] == ["heading_bias"]
@@ -29,7 +29,7 @@ def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
             beside += 1
             np.testing.assert_array_equal(found.extended.model.parameters, vessel.model.parameters)
             np.testing.assert_array_equal(found.extended.model.parameter_std, vessel.model.parameter_std)
-    # the file's parameters have to be better for certain, as they are with seeds 4, 6 and 7 of 1 to 7
+    # the file's parameters have to be better for certain, as they are with seeds 1 and 6 of 1, 4 and 6
     assert beside >= 1
 
 

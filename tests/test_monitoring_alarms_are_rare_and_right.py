@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_page import Moment, MonitorContent, sentences
+from expdesign.export.monitor_page import Moment, MonitorContent
+from expdesign.export.monitor_page.content import sentences
 from expdesign.monitoring import (
     Alarm,
     Calibration,

@@ -19,8 +19,6 @@ from expdesign.simulation import Environment, delivered
 from outside_check import columns
 from short_examples import copied
 
-pytestmark = pytest.mark.usefixtures("undrawn")
-
 ASKED = "total_s = 250.0\naccuracy = {as = 'durations'}\ngrow = {families = ['zigzag', 'multisine'], pool = 16}"
 
 

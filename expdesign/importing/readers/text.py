@@ -379,7 +379,7 @@ class _Table:
                 (f"time is {self.time_name}, date and time"),
             )
         # one that stands still, as a count-down that has not begun, is no clock
-        clocks = [k for k in self._of("clock") if np.unique(self.blocks.joined(f"{k}|second"))[1:2] >= 0]
+        clocks = [k for k in self._of("clock") if np.isfinite(np.unique(self.blocks.joined(f"{k}|second"))[1:2]).any()]
         if clocks:
             second = over_midnight(self.blocks.joined(f"{clocks[0]}|second"))
             self.time_name = self.dialect.names[clocks[0]]
