@@ -13,6 +13,8 @@ from expdesign.errors import NoAnswer
 from expdesign.foresight import design_runs, foresee, told_apart_from, told_apart_with
 from expdesign.scenario import load_scenario
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
 
 

@@ -10,6 +10,8 @@ from expdesign import workflows
 from expdesign.errors import FileError
 from expdesign.scenario import load_dictionary, load_scenario
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 GROW = """
 [design.grow]
 rounds = 2

@@ -39,6 +39,8 @@ from logged_trial import (
     write_ulog,
 )
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 KNOT, DEGREE = 1852 / 3600, math.pi / 180
 EXTRA = {
     write_excel: "openpyxl", write_parquet: "pyarrow", write_matlab73: "h5py", write_ulog: "pyulog",

@@ -17,6 +17,8 @@ from expdesign.importing.mapping import COG, SOG, Mapping
 from expdesign.scenario import equipped_vessel, load_vessel
 from logged_trial import SHIP, Voyage, sentence, voyage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SILENT = SHIP[: SHIP.index("[sensors]")]
 TOLD = {"position_interval_s": 5.0, "velocity_interval_s": 5.0, "heading_rad": 0.004}
 

@@ -13,6 +13,8 @@ from expdesign.signals import Batch
 from expdesign.simulation.helm import Helm
 from logged_trial import Voyage, voyage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def trips() -> dict[str, Voyage]:

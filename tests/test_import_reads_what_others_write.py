@@ -12,6 +12,8 @@ import pytest
 from expdesign.importing import Log, guess, read_log
 from logged_trial import Voyage, dm, sentence, voyage
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def trip() -> Voyage:

@@ -17,6 +17,8 @@ from expdesign.importing import Channel, Log, guess, read_log
 from expdesign.importing.mapping import dimension
 from expdesign.importing.units import FACTORS, SHARES, unit_word
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 HEAD = "time,lat,lon,sog,cog,hdg,rpm,rudder"
 ROWS = [f"{k},54.{k:05d},18.5,5.0,{k},{k},3.0,{k // 20 % 2 * 10}" for k in range(60)]
 TABLE = "\n".join([HEAD, *ROWS])

@@ -32,6 +32,8 @@ from logged_trial import (
     write_ulog,
 )
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def trip() -> Voyage:

@@ -37,6 +37,8 @@ from expdesign.workflows.steps.scored import scored
 from helm_case import catamaran
 from plan_case import acceleration, area, ship
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 WIDE = shapely.box(-400, -400, 400, 400)
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 

@@ -15,6 +15,8 @@ from expdesign.cli import main
 from outside_check import columns
 from short_examples import example_run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SMALL = """
 [scenario]

@@ -20,6 +20,8 @@ from expdesign.errors import FileError, InputError, NoPlan, NotInformative, Spee
 from expdesign.processes import as_finished, in_order, local_processes
 from expdesign.workflows.steps.workers import workers
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 MANY = 30
 """Tasks, more than are begun at once."""
 WAYS = (in_order, as_finished)

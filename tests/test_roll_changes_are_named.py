@@ -16,6 +16,8 @@ from expdesign.vessel import NOMINAL, Load, RollPendulum
 from expdesign.workflows import diagnose, estimate
 from rolling_ship import HIGH, ROLL_MODEL, loaded, measured, roll_model, trial, write_csv
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SHIP = roll_model()
 assert SHIP.pendulum is not None
 PARAMETERS = SHIP.pendulum.parameters

@@ -22,6 +22,8 @@ from expdesign.simulation import Environment
 from expdesign.workflows.steps.day import with_leg_speed
 from plan_case import acceleration, area, ship
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 

@@ -13,6 +13,8 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import ready
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 
 

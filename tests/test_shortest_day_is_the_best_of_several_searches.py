@@ -16,6 +16,8 @@ from expdesign.workflows.steps import day as step
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 
 

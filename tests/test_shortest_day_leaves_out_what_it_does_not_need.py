@@ -17,6 +17,8 @@ from expdesign.shortest_day.prices import DraftedDay
 from expdesign.simulation import CALM
 from plan_case import acceleration, area, ship
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TOLD = {"much": 5.0, "little": 1.0, "less": 0.5}
 NAMES = tuple(TOLD)
 NEEDED = 6.5

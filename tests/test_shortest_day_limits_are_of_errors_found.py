@@ -16,6 +16,8 @@ from expdesign.vessel import Sensors
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import scored
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STORY = Path(__file__).parents[1] / "scenarios" / "story.toml"
 NORMAL_95 = 1.959963984540054
 

@@ -16,6 +16,8 @@ from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 

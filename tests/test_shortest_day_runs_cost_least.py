@@ -14,6 +14,8 @@ from expdesign.shortest_day.alternate import promised_at_zero
 from expdesign.shortest_day.cheapest import cheapest_shares
 from expdesign.shortest_day.prices import Offer
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 PARAMETERS = ("X_u", "Y_v", "N_r")
 SAMPLES = 100.0
 

@@ -21,6 +21,8 @@ from export_case import plan, plan_files
 from live_case import SHORT, Crew, list_csv, plateau_of, rows_csv, watch_setup
 from step_case import GUESS, INPUTS
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def words(folder: Path, data: str, *more: str, steps: str = "list.csv") -> list[str]:
     files = [str(folder / data) if data != "-" else "-", "--steps", str(folder / steps), "--vessel", str(GUESS)]

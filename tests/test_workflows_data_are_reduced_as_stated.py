@@ -15,6 +15,8 @@ from expdesign.vessel import Mounting, Response, Sensors, Vessel
 from expdesign.workflows.steps.present import present_state
 from measured_trials import TUG_TRUE, tug_commands, write_run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY, TENDER = SCENARIOS / "story.toml", load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 FAULTS = Sensors(

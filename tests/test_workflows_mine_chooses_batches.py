@@ -18,6 +18,8 @@ from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
 from expdesign.workflows.data.mine import in_pieces, mine
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SHIP = SCENARIOS / "vessels" / "model-ship.toml"
 FORCES = ("tau_x", "tau_y", "tau_psi")
 

@@ -25,6 +25,8 @@ from expdesign.workflows.data.labelled import labelled_pieces
 from labelled_trials import label_of, sailed, write_labelled
 from sample_files import outside
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TRUTH = vessel("model-ship-true")
 QUIET = replace(TRUTH, sensors=Sensors())
 DICTIONARY = example_dictionary("model-ship")

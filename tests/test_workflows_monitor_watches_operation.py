@@ -19,6 +19,8 @@ from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from monitoring_case import ROOT, TENDER, tender, voyage_csv
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 HOUR = 3600
 
 

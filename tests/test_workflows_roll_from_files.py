@@ -12,6 +12,8 @@ from expdesign.workflows import roll
 from roll_files import K_KNOWN, KNOWN, SHIP, UNKNOWN, csv, stated, three
 from roll_truths import MODEL_SHIP_TRUTH
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def truth(name: str) -> float:
     return float(MODEL_SHIP_TRUTH[PARAMETERS.index(name)])

@@ -16,6 +16,8 @@ from expdesign import workflows
 from outside_check import columns, hull_to_land_m, recomputed_gap, replayed, runs_of_plan
 from short_examples import SCENARIOS, SHORTER, copied, example_run
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 LOOKED_AT = {
     "harbour": ("areas/harbour.geojson", "vessels/azimuth-30m.toml", 20.0),
     "helsinki": ("areas/helsinki-gshhg.geojson", "vessels/azimuth-30m.toml", 20.0),
