@@ -12,7 +12,15 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
 from expdesign.workflows.planning.new import KINDS
-from expdesign.workflows.steps.first_trial import ABLE, DRAWN, NEAR_HULLS, calibration, is_wide, legs_for_most
+from expdesign.workflows.steps.first_trial import (
+    ABLE,
+    DRAWN,
+    NEAR_HULLS,
+    calibration,
+    first_note,
+    is_wide,
+    legs_for_most,
+)
 from expdesign.workflows.steps.scored import actuation_remarks, speed_remarks
 
 
@@ -172,3 +180,15 @@ def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Pat
             draws=300,
         )
         assert apart[-1] <= 1.1 * NEAR_HULLS * case.vessel.length_m
+
+
+def test_the_note_on_a_first_trial_counts_the_runs_that_it_slows(tmp_path: Path) -> None:
+    asked = load_scenario(new(tmp_path / "trial", kind="asv").files[0]).dictionary
+    slower = [
+        replace(spec, settings={k: v / 2 if k.endswith("speed_mps") else v for k, v in spec.settings.items()})
+        for spec in asked
+    ]
+    count = sum(one.settings != other.settings for one, other in zip(slower, asked, strict=True))
+    assert 0 < count
+    assert "slower than asked" not in first_note(asked, asked)
+    assert f"({count} of them slower than asked" in first_note(slower, asked)

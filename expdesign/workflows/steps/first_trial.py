@@ -8,7 +8,7 @@ the prior, and `replan` goes on with longer runs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -154,9 +154,22 @@ def _of_length(spec: PrimitiveSpec, length_s: float, sample_time_s: float) -> Pr
 
 
 def first_note(runs: Sequence[Primitive], asked: Sequence[PrimitiveSpec]) -> str:
-    """What a first trial is, in one sentence."""
+    """What a first trial is, in one sentence; runs that are slower than asked for are counted."""
+    settings = {spec.name: spec.settings for spec in asked}
+    slowed = sum(
+        any(
+            name.endswith("speed_mps") and value != settings[run.name].get(name) for name, value in run.settings.items()
+        )
+        for run in runs
+        if run.name in settings
+    )
+    slower = f" ({slowed} of them slower than asked, as most of these ships reach no more)" if slowed else ""
     return (
         "a first trial: the standard deviations of the parameters are too wide for the runs asked for, so "
-        f"{len(runs)} of {len(asked)} are taken, none longer than ships of the prior keep within {NEAR_HULLS:g} hull "
-        "lengths of the track; expdesign replan goes on with what it tells"
+        f"{len(runs)} of {len(asked)} are taken{slower}, none longer than ships of the prior keep within "
+        f"{NEAR_HULLS:g} hull lengths of the track; expdesign replan goes on with what it tells"
     )
+
+
+def _is_slower(own: Mapping[str, float], asked: Mapping[str, float]) -> bool:
+    return any(abs(own[name]) < abs(asked[name]) for name in asked if name.endswith("speed_mps") and name in own)
