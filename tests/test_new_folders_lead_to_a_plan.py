@@ -189,6 +189,6 @@ def test_the_note_on_a_first_trial_counts_the_runs_that_it_slows(tmp_path: Path)
         for spec in asked
     ]
     count = sum(one.settings != other.settings for one, other in zip(slower, asked, strict=True))
-    assert 0 < count
+    assert count > 0
     assert "slower than asked" not in first_note(asked, asked)
     assert f"({count} of them slower than asked" in first_note(slower, asked)
