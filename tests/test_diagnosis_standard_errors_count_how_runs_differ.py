@@ -27,7 +27,8 @@ from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import score_tests
 from expdesign.diagnosis.select.selection import _equivalent
-from expdesign.diagnosis.select.selection_round import _alternatives, _shortlist, open_candidates
+from expdesign.diagnosis.select.selection_round import _alternatives, open_candidates
+from expdesign.diagnosis.select.shortlist import _shortlist
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.signals import Record
 from hidden_effects import Weather
