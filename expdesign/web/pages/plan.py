@@ -117,6 +117,8 @@ class _Plan:
         )
         self.side.clear()
         with self.side:
+            if "problem" in ends:
+                wrong(ends["problem"])
             if not self.shown:
                 ui.label("Nothing is planned yet.").classes("quiet")
             elif refusal:
