@@ -1,13 +1,16 @@
 """The page reads and writes one folder, lets in who may, keeps versions, and makes forms of what reads the files."""
 
 import asyncio
+import re
 from pathlib import Path
 
 import pytest
 
 from expdesign.errors import InputError
+from expdesign.plan.values import PlanSettings
+from expdesign.scenario import load_scenario
 from expdesign.scenario.scenario_file import ScenarioFile
-from expdesign.web.answers import change_in, clearance_of, durations_of, problem_of
+from expdesign.web.answers import change_in, clearance_of, durations_of, ends_of, problem_of
 from expdesign.web.folder import MOST_VERSIONS, Folder
 from expdesign.web.forms import put
 from expdesign.web.jobs import Jobs
@@ -51,6 +54,14 @@ def test_every_version_comes_back_in_turn_and_comments_stay(folder: Folder) -> N
     for number in range(MOST_VERSIONS + 5):
         folder.write("a.toml", str(number))
     assert folder.versions("a.toml") == MOST_VERSIONS
+
+
+def test_files_that_are_too_many_to_list_are_told(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("expdesign.web.folder.MOST_FILES", 2)
+    for name in ("a.csv", "b.csv", "c.csv"):
+        folder.write(name, "x")
+    assert [path.name for path in folder.files()] == ["a.csv", "b.csv"]
+    assert "only the first 2" in folder.too_many
 
 
 def test_a_file_handed_over_replaces_no_other(folder: Folder) -> None:
@@ -161,7 +172,15 @@ def test_answers_are_those_of_the_commands(tmp_path: Path) -> None:
     scenario = str(tmp_path / "craft/scenario.toml")
     assert "problem" not in problem_of(scenario)
     assert clearance_of(scenario, 58.0, 11.0, 0.0)["clearance_m"] > 10
-    assert not clearance_of(scenario, 58.1, 11.0, 0.0)["inside"]
+    assert clearance_of(scenario, 58.1, 11.0, 0.0) == {"inside": False, "clearance_m": 0.0}
+    text = Path(scenario).read_text()
+    stated = ends_of(scenario)["clearance_m"]
+    assert stated == load_scenario(scenario).plan.clearance_m
+    Path(scenario).write_text(re.sub(r"clearance_m = .*", "", text))
+    assert ends_of(scenario)["clearance_m"] == PlanSettings.clearance_m != stated
+    Path(scenario).write_text(text + "\n[design.accuracy]\nas = 'durations'\n")
+    assert durations_of(scenario)["aside"] == ["accuracy"]
+    Path(scenario).write_text(text)
     found = durations_of(scenario)
     shares = [run["duration_s"] for run in found["runs"]]
     assert sum(shares) == pytest.approx(found["total_s"])

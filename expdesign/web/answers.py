@@ -23,6 +23,7 @@ from expdesign.export.words import names as names_of_runs
 from expdesign.information import PrimitiveInformation
 from expdesign.input_files import check_ends
 from expdesign.memory import digest
+from expdesign.plan.values import PlanSettings
 from expdesign.scenario import Scenario, load_scenario
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.tables import Entry, read_toml
@@ -80,7 +81,7 @@ def ends_of(scenario: str) -> Answer:
         return {
             "length_m": float(np.ptp(hull[:, 0])),
             "beam_m": float(np.ptp(hull[:, 1])),
-            "clearance_m": tables.get("plan", {}).get("clearance_m", 10.0),
+            "clearance_m": tables.get("plan", {}).get("clearance_m", PlanSettings.clearance_m),
             "draught_m": draught,
             "ends": {key: _end(tables[key], area) for key in ("start", "goal")},
         }
@@ -89,7 +90,7 @@ def ends_of(scenario: str) -> Answer:
 
 
 def clearance_of(scenario: str, lat_deg: float, lon_deg: float, heading_deg: float) -> Answer:
-    """Distance of the hull from forbidden water at a place [m]; negative where it is in forbidden water."""
+    """Distance of the hull from forbidden water at a place [m]; 0 where it is in forbidden water."""
     try:
         _, area, _, hull = _parts(scenario)
     except (InputError, NoAnswer) as error:
@@ -97,8 +98,7 @@ def clearance_of(scenario: str, lat_deg: float, lon_deg: float, heading_deg: flo
     pose = np.array([*area.frame.to_metres(np.array([lat_deg, lon_deg])), np.radians(heading_deg)])
     outline = shapely.Polygon(to_n_frame(hull, pose)[:, ::-1])
     inside = bool(area.water.covers(outline))
-    distance = outline.distance(area.water.boundary) if inside else -shapely.difference(outline, area.water).length / 4
-    return {"inside": inside, "clearance_m": float(distance)}
+    return {"inside": inside, "clearance_m": float(outline.distance(area.water.boundary)) if inside else 0.0}
 
 
 def problem_of(scenario: str) -> Answer:
@@ -113,13 +113,15 @@ def problem_of(scenario: str) -> Answer:
 def durations_of(scenario: str) -> Answer:
     """The convex durations of a scenario's design as it stands, with the certificate and what each run tells.
 
-    The accuracy that a shortest day must reach is left aside: these are the durations of `total_s`.
+    The accuracy that a shortest day must reach and the search for more manoeuvres are left aside, and named: these are
+    the durations of the dictionary in `total_s`.
     """
     from expdesign.durations import bordered, pool_gains
     from expdesign.workflows.steps.design_problem import designed
 
     try:
         case = load_scenario(scenario)
+        aside = [key for key in ("accuracy", "grow") if getattr(case.design, key) is not None]
         case = replace(case, design=replace(case.design, grow=None, accuracy=None))
         information = _scored(case)
         gains = pool_gains(np.array([bordered(item, case.design.mean_subtraction) for item in information]))
@@ -136,6 +138,7 @@ def durations_of(scenario: str) -> Answer:
         "efficiency_repeats": design.efficiency_repeats,
         "efficiency_uniform": design.efficiency_uniform,
         "note": design.note,
+        "aside": aside,
         "excluded": list(case.design.excluded),
         "runs": [
             {

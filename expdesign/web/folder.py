@@ -67,13 +67,18 @@ class Folder:
         count = 0
         for base, folders, names in os.walk(self.root):
             folders[:] = sorted(name for name in folders if not name.startswith("."))
-            for name in sorted(names):
-                count += 1
-                if count > MOST_FILES:
+            for path in (Path(base) / name for name in sorted(names) if not name.startswith(".")):
+                if count == MOST_FILES:
                     return
-                path = Path(base) / name
-                if not name.startswith(".") and path.resolve().is_relative_to(self.root):
+                if path.resolve().is_relative_to(self.root):
+                    count += 1
                     yield path
+
+    @property
+    def too_many(self) -> str:
+        """A warning where files are left out because there are so many, or ""."""
+        count = sum(1 for _ in self.files())
+        return f"This folder has so many files that only the first {count} are listed." if count >= MOST_FILES else ""
 
     def of_kind(self, kind: str) -> tuple[str, ...]:
         """Names of the TOML files of a kind of `KINDS`."""

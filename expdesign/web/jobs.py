@@ -119,3 +119,5 @@ async def _read(stream: asyncio.StreamReader | None, job: Job, progress: bool) -
             job.errors.append(text.removeprefix("expdesign: "))
         elif len(job.lines) < MOST_LINES:
             job.lines.append(text)
+        elif len(job.lines) == MOST_LINES:
+            job.lines.append("(further lines are not kept here)")

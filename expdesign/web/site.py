@@ -161,6 +161,8 @@ def framed(site: Site, here: str, scenario: str) -> Iterator[Watched]:
         ui.label(str(site.folder.root)).classes("quiet")
         ui.space()
         ui.button("Night", on_click=switch).props("flat dense").tooltip("Change between bright and dark")
+    if warning := site.folder.too_many:
+        wrong(warning)
     yield Watched(site)
 
 

@@ -78,6 +78,8 @@ class _Manoeuvres:
                 f"{words.percent(found['efficiency_repeats'])}, equal times "
                 f"{words.percent(found['efficiency_uniform'])}."
             )
+            for key in found["aside"]:
+                ui.label(f"[design.{key}] is left aside here: `expdesign run` follows it, and may choose other runs.")
             if found["note"]:
                 ui.label(found["note"]).classes("quiet")
         self.runs.clear()

@@ -108,9 +108,9 @@ class _Plan:
     async def _fill(self) -> None:
         ends = await self.site.answer(answers.ends_of, str(self.site.folder.path(self.scenario)))
         query = urlencode({"area": self.area, "draught_m": ends.get("draught_m", 0.0)})
-        refused = self.shown.endswith("refused.json")
-        track = f"/track?{urlencode({'plan': self.shown})}" if self.shown and not refused else ""
-        refusal = json.loads(self.site.folder.path(self.shown).read_text(encoding="utf-8")) if refused else None
+        content = json.loads(self.site.folder.path(self.shown).read_text(encoding="utf-8")) if self.shown else {}
+        refusal = content if content.get("refused") else None
+        track = "" if refusal or content.get("draft") or not content else f"/track?{urlencode({'plan': self.shown})}"
         ui.run_javascript(
             f"expd.chart({self.map.id}, '/chart?{query}', {json.dumps(ends)}, false)"
             f".then(() => expd.trial({self.map.id}, {json.dumps(track)}, {json.dumps(_place_of(refusal))}))"
@@ -124,11 +124,10 @@ class _Plan:
             elif refusal:
                 self._refused(refusal)
             else:
-                self._planned()
+                self._planned(content)
 
-    def _planned(self) -> None:
+    def _planned(self, content: dict[str, Any]) -> None:
         folder = self.site.folder
-        content = json.loads(folder.path(self.shown).read_text(encoding="utf-8"))
         draft, verified = content.get("draft", False), content["verified"]
         mark = "Draft" if draft else "Verified" if verified else "Not verified"
         ui.label(mark).classes("mark good" if verified else "mark doubt")

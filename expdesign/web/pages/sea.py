@@ -133,7 +133,7 @@ class _Sea:
                     wrong(found["problem"])
             else:
                 ui.label("Start, goal and area can be planned in.").classes("good")
-                for note in found["notes"]:
+                for note in (*found["remarks"], *found["notes"]):
                     ui.label(note).classes("quiet")
 
     def _pen(self) -> None:

@@ -11,7 +11,7 @@ from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.vessels.vessel_tables import VesselTable
 from expdesign.web.forms import Form
 from expdesign.web.jobs import Job
-from expdesign.web.site import Site, framed, page_of, shown_job, spelled, wrong
+from expdesign.web.site import Site, framed, page_of, shown_job, spelled
 
 FIRST_CARD = """\
 # What is known of the ship. Everything beyond the first seven lines may be left out.
@@ -91,9 +91,7 @@ def _card(site: Site, scenario: str, asked: str) -> None:
 
 def _first(site: Site) -> str:
     name = "card.toml"
-    if site.folder.path(name).exists():
-        wrong(f"{name} exists already")
-    else:
+    if not site.folder.path(name).exists():  # else it is shown
         site.folder.write(name, FIRST_CARD)
     return name
 

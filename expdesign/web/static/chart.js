@@ -112,7 +112,8 @@
     }
     if (!url) return;
     const answer = await (await fetch(url)).json();
-    if (!answer.problem) mine.player = new Player(id, answer);
+    if (answer.problem) document.getElementById(`now${id}`).textContent = answer.problem;
+    else mine.player = new Player(id, answer);
   }
 
   class Player {
