@@ -23,7 +23,7 @@ from expdesign.export.report.chart import chart, draw_position_ticks, footprints
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.design import chain
-from expdesign.export.report.parameters import expected, parameter_rows
+from expdesign.export.report.parameters import parameter_rows
 from expdesign.growing.space import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM
@@ -260,7 +260,7 @@ def read_number(text: str) -> float:
 
 def test_uncertainties_are_those_of_the_whole_track_and_of_the_runs() -> None:
     content = noisy_content()
-    found = expected(content)
+    found = content.accuracy
     part = TrialPart(commands=content.plan.commands, velocity=np.zeros(3), heading_rad=0.0)
     forecast = content.environment
     unknown = forecast.current_std_mps > 0

@@ -120,6 +120,27 @@ def validate(
     """
 
 
+@command("trial-result")
+def trial_result(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.json", help="The plan that was sailed.")],
+    estimate: Annotated[
+        Path,
+        typer.Option("--estimate", metavar="ESTIMATE.json", help="What expdesign estimate found in the data."),
+    ],
+    indices: Annotated[
+        Path | None,
+        typer.Option("--indices", metavar="INDICES.json", help="What expdesign indices found in them."),
+    ] = None,
+    out: OutBesidePlan = None,
+) -> None:
+    """Put what a trial promised beside what came out: one page for owner and class, with space to sign.
+
+    Writes result.json and result.html: runs, accuracy of every parameter, indices and their limits.
+
+    Example: expdesign trial-result runs/helsinki/plan.json --estimate runs/measured/estimate.json
+    """
+
+
 @command("replan")
 def replan(
     scenario: ScenarioFile,

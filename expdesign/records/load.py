@@ -56,7 +56,7 @@ HELD_SHARE = 0.5  # share of repeated positions of a moving ship above which the
 SIDEWAYS_RATIO = 2.0  # sway over surge (root mean square) above which the axes of the pose are questioned
 
 
-UNCHECKED = ("time_s", "batch", "depth_m", "lat_deg", "lon_deg")
+UNCHECKED = ("time_s", "batch", STEERED, "depth_m", "lat_deg", "lon_deg")
 
 
 def table_remarks(table: Table) -> Iterator[str]:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.trials.foresee import foresee
     from expdesign.workflows.trials.incline import incline
     from expdesign.workflows.trials.replan import replan
+    from expdesign.workflows.trials.result import trial_result
     from expdesign.workflows.trials.roll import roll
     from expdesign.workflows.trials.simulate import simulate
     from expdesign.workflows.trials.validate import validate_design

@@ -15,6 +15,7 @@ from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_scenario
+from expdesign.workflows.outcome import command_text
 from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, report_content
@@ -85,6 +86,8 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
     design = designed(case, information, seed=seed, progress=within(progress, 0.1, 0.15))
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
     route = built_route(case, day.plan)
-    content = report_content(case, day.information, day.design, day.plan, seed)
+    content = report_content(
+        case, day.information, day.design, day.plan, command_text("run", [case.path], {"--seed": seed})
+    )
     content = replace(content, compared=efficiencies(design), route=route, growth=growth, day=day.shortest)
     return Trial(content=content, route=route)

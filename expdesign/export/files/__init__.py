@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
+    from expdesign.export.files.accuracy import PlannedAccuracy, planned_accuracy
     from expdesign.export.files.design_files import (
         dictionary_files,
         dictionary_json,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
+from expdesign.export.files.accuracy import PlannedAccuracy, accuracy_entries
 from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
 from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate
@@ -33,7 +34,15 @@ LATTICE_SENTENCE = (
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
 
 
-def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environment, clearance_m: float) -> str:
+def plan_json(
+    plan: Plan,
+    *,
+    scenario: str,
+    vessel: Vessel,
+    environment: Environment,
+    clearance_m: float,
+    accuracy: PlannedAccuracy | None = None,
+) -> str:
     """The plan, leg by leg, with the results of the independent check, as plan.json; that of a draft says so.
 
     Args:
@@ -42,6 +51,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
         vessel: for name and particulars.
         environment: the forecast it was planned for.
         clearance_m: the required clearance [m].
+        accuracy: that is expected of the trial, where it is known.
 
     Raises:
         NoPlan: the plan is not verified.
@@ -78,6 +88,7 @@ def plan_json(plan: Plan, *, scenario: str, vessel: Vessel, environment: Environ
             "fence": _fence_entry(plan, vessel, clearance_m),
             "leave_water_probability": plan.leave_water_probability,
             "drawn_trials": _risk_entry(plan.risk),
+            **({} if accuracy is None else {"parameters": accuracy_entries(accuracy)}),
             "design_efficiency_placed": plan.design_efficiency_placed,
             "design_efficiency_realised": plan.design_efficiency_realised,
             **({} if check.heel_max_rad is None else {"heel_max_rad": check.heel_max_rad}),

@@ -197,6 +197,7 @@ def indices_json(content: IndicesContent) -> str:
                     "run": verdict.run,
                     "side": verdict.side,
                     "index": verdict.criterion.key,
+                    "name": verdict.criterion.name,
                     "value": verdict.value,
                     "tolerance": verdict.tolerance,
                     "limit": verdict.criterion.limit,

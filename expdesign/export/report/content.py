@@ -9,12 +9,12 @@ import numpy as np
 
 from expdesign.durations import DurationDesign, Efficiencies
 from expdesign.export import words
-from expdesign.export.files import Known
+from expdesign.export.files import Known, PlannedAccuracy, planned_accuracy
 from expdesign.export.routes import Route
 from expdesign.growing import Growth
 from expdesign.information.moments import PrimitiveInformation, over_shares
 from expdesign.plan.values import Plan
-from expdesign.shortest_day import ShortestDay
+from expdesign.shortest_day import AccuracySettings, ShortestDay
 from expdesign.simulation.environment import Environment
 from expdesign.values import Array, readonly, seal
 from expdesign.vessel import Vessel
@@ -44,6 +44,7 @@ class ReportContent:
     known: Known | None = None  # the state of a trial in progress, or None for a new trial
     growth: Growth | None = None  # additions to the dictionary, or None without a search
     day: ShortestDay | None = None  # how the day was found to be the shortest, or None where total_s decides
+    asked: AccuracySettings | None = None  # the accuracy that the scenario asks for
     remarks: tuple[str, ...] = ()  # what the files state and the trial does not use, or takes as certain; one line each
 
     def __post_init__(self) -> None:
@@ -57,6 +58,13 @@ class ReportContent:
     def shown(self, name: str) -> str:
         """The name of a manoeuvre as people say it."""
         return self._names.get(name, name)
+
+    @cached_property
+    def accuracy(self) -> PlannedAccuracy:
+        """How accurately the trial is expected to tell each parameter."""
+        return planned_accuracy(
+            self.plan, self.design.problem, vessel=self.vessel, environment=self.environment, asked=self.asked
+        )
 
     @property
     def parameters(self) -> tuple[str, ...]:

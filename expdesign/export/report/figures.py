@@ -11,6 +11,7 @@ from expdesign.conventions import KNOTS_PER_MPS, to_n_frame
 from expdesign.dictionary.build import desired_motion
 from expdesign.dictionary.spec import Primitive
 from expdesign.durations import DurationDesign
+from expdesign.export.files import PlannedAccuracy
 from expdesign.export.pages.figures import (
     BLACK,
     BLUE,
@@ -28,7 +29,6 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.report.content import ReportContent, primitive_runs, relative_information
-from expdesign.export.report.parameters import Expected
 from expdesign.plan.values import Plan
 from expdesign.shortest_day import ShortestDay
 from expdesign.values import Array
@@ -150,7 +150,7 @@ def pareto_figure(day: ShortestDay) -> str:
 
 
 @page_figure
-def uncertainty_figure(content: ReportContent, found: Expected) -> str:
+def uncertainty_figure(content: ReportContent, found: PlannedAccuracy) -> str:
     """One row for each parameter, logarithmic: prior, after the runs, after the whole track."""
     names = [short(name) for name in content.parameters]
     figure = new_figure(6.4, 1.4 + 0.27 * len(names))

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from expdesign.export import words
+from expdesign.export.files import PlannedAccuracy
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import drawn, marked
 from expdesign.export.report import tables
@@ -43,10 +44,8 @@ from expdesign.export.report.figures import (
     uncertainty_figure,
 )
 from expdesign.export.report.parameters import (
-    Expected,
     accuracy_table,
     equation_sentence,
-    expected,
     known_rows,
     known_sentences,
     measures_velocity,
@@ -113,7 +112,7 @@ class Fact:
 
 def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
-    after = expected(content)
+    after = content.accuracy
     rows = parameter_rows(content, after)
     page = page_template("report.html")
     return page.render(
@@ -159,7 +158,7 @@ def report_html(content: ReportContent) -> str:
     )
 
 
-def _figures(content: ReportContent, after: Expected) -> dict[str, object]:
+def _figures(content: ReportContent, after: PlannedAccuracy) -> dict[str, object]:
     figures: dict[str, Callable[[], str]] = {
         "chart": partial(chart, content),
         "durations": partial(durations_figure, content),

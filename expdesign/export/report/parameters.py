@@ -7,17 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expdesign.errors import NoAnswer
 from expdesign.estimation.methods import steady_current_method
 from expdesign.export import words
-from expdesign.export.files import Known, Purchase
+from expdesign.export.files import Known, PlannedAccuracy, Purchase
 from expdesign.export.report.content import ReportContent
 from expdesign.export.tuning import TUNING
-from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.plan.verify import part_of_track
 from expdesign.sea_area import LocalFrame
 from expdesign.shortest_day import ShortestDay
-from expdesign.values import Array, seal
 
 # Parameters: expected standard deviations before and after the trial, and their table.
 
@@ -36,10 +32,10 @@ class ParameterRow:
     less: bool = False
 
 
-def parameter_rows(content: ReportContent, found: Expected) -> list[ParameterRow]:
+def parameter_rows(content: ReportContent, found: PlannedAccuracy) -> list[ParameterRow]:
     """Parameters in order; standard deviations in the parameter's own unit."""
     model = content.vessel.model
-    nominal = dict(zip(model.names, model.parameters.tolist(), strict=True))
+    nominal = dict(zip(found.parameters, found.nominal.tolist(), strict=True))
     left = "T d{}/dt" if model.form == "discrete" else "d{}/dt"
     terms = {term.name: f"{left.format(term.equation)} = ... + {term.name} * {term.expression}" for term in model.terms}
     columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
@@ -105,44 +101,6 @@ def unknown_current_sentence(content: ReportContent) -> str:
         f"this page hold where it is estimated with the parameters, by expdesign estimate --method {method}. By a "
         "method that knows nothing of it, errors can be many times larger."
     )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Expected:
-    """Standard deviations (p,) in the order of the parameters."""
-
-    before: Array  # prior, zero where none was stated
-    runs: Array  # of estimates from the informative runs alone; nan where they cannot be estimated
-    track: Array  # of estimates from the whole track
-
-    def __post_init__(self) -> None:
-        seal(self, before="p", runs="p", track="p")
-
-
-def expected(content: ReportContent) -> Expected:
-    """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise."""
-    sailed = content.plan.sailed
-    runs = [leg for leg in sailed.legs if leg.kind == "primitive"]
-    return Expected(
-        before=content.parameter_std,
-        runs=_deviations(content, [part_of_track(sailed, leg.first, leg.last) for leg in runs]),
-        track=_deviations(content, [part_of_track(sailed)]),
-    )
-
-
-def _deviations(content: ReportContent, parts: list[TrialPart]) -> Array:
-    try:
-        covariance = expected_covariance(
-            content.vessel,
-            parts,
-            content.parameters,
-            environment=content.environment,
-            mean_subtraction=content.design.problem.mean_subtraction,
-            unknown_current=content.environment.current_std_mps > 0,
-        )
-    except NoAnswer:
-        return np.full(len(content.parameters), np.nan)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 def measures_velocity(content: ReportContent) -> bool:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError, NoPlan
+from expdesign.export.files.read_json import Entry, read_json, read_text
 from expdesign.export.routes.fence import Fence
-from expdesign.input_files import check_ends
 from expdesign.plan.values import Leg, Plan
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory
@@ -27,27 +27,23 @@ from expdesign.vessel import Variation, Vessel, column_name
 # The entries of plan.json that routes and simulated trials need, with their types and ranges.
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="ignore")
-
-
-class _Vessel(_Entry):
+class _Vessel(Entry):
     name: str
     length_m: float = Field(gt=0)
     beam_m: float = Field(gt=0)
 
 
-class _Origin(_Entry):
+class _Origin(Entry):
     lat_deg: float = Field(ge=-90, le=90)
     lon_deg: float = Field(ge=-180, le=180)
 
 
-class _Frame(_Entry):
+class _Frame(Entry):
     projection: str
     origin: _Origin
 
 
-class _Medium(_Entry):
+class _Medium(Entry):
     north_mps: float
     east_mps: float
     std_mps: float = Field(ge=0)
@@ -55,13 +51,13 @@ class _Medium(_Entry):
     correlation_s: float = Field(default=0.0, ge=0)
 
 
-class _Environment(_Entry):
+class _Environment(Entry):
     current_to: _Medium
     wind_to: _Medium
     sea_state: int | None = Field(default=None, ge=0, le=9)
 
 
-class _State(_Entry):
+class _State(Entry):
     time_s: float
     north_m: float
     east_m: float
@@ -75,7 +71,7 @@ class _State(_Entry):
         return np.array([getattr(self, name) for name in (*POSE_COLUMNS, *VELOCITY_COLUMNS)])
 
 
-class _Leg(_Entry):
+class _Leg(Entry):
     index: int
     kind: Literal["primitive", "reposition"]
     name: str
@@ -84,17 +80,17 @@ class _Leg(_Entry):
     end: _State
 
 
-class _Fence(_Entry):
+class _Fence(Entry):
     inside: tuple[tuple[float, float], ...] = Field(min_length=3)
     outside: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
-class _DrawnTrials(_Entry):
+class _DrawnTrials(Entry):
     aborted_share: float = Field(default=0.0, ge=0, le=1)
     aborted_most: float = Field(default=1.0, ge=0, le=1)
 
 
-class PlanFile(_Entry):
+class PlanFile(Entry):
     """The entries of plan.json."""
 
     scenario: str
@@ -217,7 +213,7 @@ def read_plan(path: Path) -> PlannedTrack:
     Raises:
         FileError: a file is missing or garbled, the files contradict each other, or the plan failed its checks.
     """
-    file = _parse(path)
+    file = read_json(path, PlanFile, EXPECTED)
     if file.draft:
         raise FileError(path, "draft", "is true: nobody may sail a draft, plan again without --draft before using it")
     if not file.passed:
@@ -246,36 +242,6 @@ def read_plan(path: Path) -> PlannedTrack:
     )
 
 
-def _parse(path: Path) -> PlanFile:
-    try:
-        return PlanFile.model_validate_json(_text(path))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        if first["type"] == "json_invalid" or not first["loc"]:
-            why = first["msg"].removeprefix("Invalid JSON: ")
-            kind = "a TOML file" if path.suffix == ".toml" else f"no readable JSON ({why})"
-            raise FileError(path, "", f"is {kind}, expected {EXPECTED}") from None
-        problem = first["msg"][:1].lower() + first["msg"][1:]
-        found = first.get("input")
-        if isinstance(found, str | int | float | bool):
-            problem = f"is {found!r}: {problem}"
-        if first["type"] == "missing":
-            problem = f"is missing, expected {EXPECTED}"
-        raise FileError(path, ".".join(str(part) for part in first["loc"]), problem) from None
-
-
-def _text(path: Path) -> str:
-    check_ends(path, "a file as expdesign run writes it")
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise FileError(path, "", "does not exist") from None
-    except UnicodeDecodeError:
-        raise FileError(path, "", "is not UTF-8 text") from None
-    except OSError as error:
-        raise FileError(path, "", f"cannot be read: {error.strerror or error}") from None
-
-
 def _legs(path: Path, file: PlanFile) -> tuple[Leg, ...]:
     legs: list[Leg] = []
     for number, entry in enumerate(file.legs):
@@ -301,7 +267,7 @@ def _sample(path: Path, file: PlanFile, key: str, time_s: float) -> int:
 
 
 def _read_table(path: Path, columns: tuple[str, ...]) -> Array:
-    rows = list(csv.reader(_text(path).splitlines()))
+    rows = list(csv.reader(read_text(path).splitlines()))
     if not rows or tuple(rows[0]) != columns:
         found = ",".join(rows[0]) if rows else "nothing"
         raise FileError(path, "row 1", f"has the columns {found}, expected {','.join(columns)}")

@@ -21,6 +21,7 @@ PAGES = {
     "monitor": "monitor.html",
     "indices": "indices.html",
     "replan": "report.html",
+    "trial-result": "result.html",
 }
 """Command -> its page."""
 COMMANDS = ("import", *(name for name in PAGES if name != "import"))
@@ -68,6 +69,7 @@ class _Data:
             ui.button("Monitor", on_click=lambda: self._on_runs("monitor")).props("outline")
             if self.scenario:
                 ui.button("Plan the rest of the trial", on_click=self._replan).props("outline")
+                ui.button("Trial result", on_click=self._result).props("outline")
         self.place = ui.column().classes("work").props('aria-live="polite"')
         with self.place:
             for job in self.site.jobs.all:
@@ -106,8 +108,25 @@ class _Data:
         if not self.runs.value or not self.ship.value:
             self._refuse("choose runs and a vessel file first")
             return
-        out = f"runs/{Path(self.runs.value[0]).stem}-{command}"
+        out = self._out(command)
         self._start((command, *self.runs.value, "--vessel", self.ship.value, "--out", out), out)
+
+    def _out(self, command: str) -> str:
+        """The folder of what a command finds in the runs that are chosen."""
+        return f"runs/{Path(self.runs.value[0]).stem}-{command}"
+
+    def _result(self) -> None:
+        """From the scenario's plan and what was estimated, and perhaps judged, before."""
+        plan, found = f"{self.site.out_of(self.scenario)}/plan.json", ""
+        if self.runs.value:
+            found = f"{self._out('estimate')}/estimate.json"
+        if not found or not all(self.site.folder.path(name).is_file() for name in (plan, found)):
+            self._refuse("plan the scenario's trial, choose its runs and estimate from them first")
+            return
+        judged = f"{self._out('indices')}/indices.json"
+        more = ("--indices", judged) if self.site.folder.path(judged).is_file() else ()
+        out = self._out("result")
+        self._start(("trial-result", plan, "--estimate", found, *more, "--out", out), out)
 
     def _replan(self) -> None:
         if not self.runs.value:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign.durations import with_repeats
+from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.outcome import Outcome, command_text, document_of
@@ -61,6 +62,13 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
         )
     else:
         day = planned_day(case, information, design, seed=seed, progress=planning)
-    files = {**plan_files(case, day.plan), **day_files(case, day)}
+    accuracy = planned_accuracy(
+        day.plan,
+        day.design.problem,
+        vessel=case.vessel,
+        environment=case.environment,
+        asked=case.design.accuracy,
+    )
+    files = {**plan_files(case, day.plan, accuracy), **day_files(case, day)}
     document = document_of({**plan_summary(case, day.plan), **day_summary(day)}, day_tables(day))
     return written(case, out, files, noted(case, document), progress)

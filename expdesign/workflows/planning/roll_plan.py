@@ -174,8 +174,8 @@ def _placed(
         runs, trip = trips[repeats]
         loaded_case = replace(case, name=f"{case.name}, {name}")
         route = built_route(loaded_case, trip)
-        content = report_content(loaded_case, information, runs, trip, seed)
-        content = replace(content, route=route, command=loads.commands[number])
+        content = report_content(loaded_case, information, runs, trip, loads.commands[number])
+        content = replace(content, route=route)
         drawing = within(_of_case(name, part), 0.8, 1.0)
         found.append(trial_files(loaded_case, None, content, route, progress=drawing))
     return found

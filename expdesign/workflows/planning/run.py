@@ -67,10 +67,10 @@ def run(
     check_plannable(case)
     words = command_text("run", [scenario], {"--vessel": vessel, "--draft": draft, "--seed": seed})
     with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
-        return _run(case, out, seed, progress)
+        return _run(case, out, words, seed, progress)
 
 
-def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Outcome:
+def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Progress) -> Outcome:
     work = WORK if case.design.accuracy is None else WORK_OF_SEARCH
     scoring, designing, comparing, planning, writing = in_phases(progress, *work)
     information, growth = ready(case, seed=seed, progress=scoring)
@@ -80,7 +80,7 @@ def _run(case: Scenario, out: Path | None, seed: int, progress: Progress) -> Out
     day = planned_day(case, information, design, seed=seed, progress=planning)
     writing("writing routes, run cards and report", 0.0)
     route = None if day.plan.draft else built_route(case, day.plan)
-    content = report_content(case, day.information, day.design, day.plan, seed)
+    content = report_content(case, day.information, day.design, day.plan, words)
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     summary = {

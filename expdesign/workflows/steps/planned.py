@@ -25,6 +25,7 @@ from expdesign.export import (
     track_csv,
 )
 from expdesign.export.cards import cards_html
+from expdesign.export.files import PlannedAccuracy
 from expdesign.export.report import ReportContent, report_html
 from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation
@@ -106,7 +107,7 @@ def check_plannable(case: Scenario) -> None:
     check_start_speed(case.vessel, case.environment, ship, np.r_[case.start, case.under_way.velocity])
 
 
-def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
+def plan_files(case: Scenario, plan: Plan, accuracy: PlannedAccuracy) -> dict[str, str | bytes]:
     """The plan, its track and its commands; of a draft, which cannot be sailed, the plan alone."""
     files: dict[str, str | bytes] = {
         "plan.json": plan_json(
@@ -115,6 +116,7 @@ def plan_files(case: Scenario, plan: Plan) -> dict[str, str | bytes]:
             vessel=case.vessel,
             environment=case.environment,
             clearance_m=case.plan.clearance_m,
+            accuracy=accuracy,
         )
     }
     return files if plan.draft else {**files, "track.csv": track_csv(plan), "commands.csv": commands_csv(plan)}
@@ -212,7 +214,7 @@ def trial_files(
         **score_files(case, content.information),
         **growth_files(case, growth),
         "durations.json": durations_json(content.design, compared=content.compared),
-        **plan_files(case, content.plan),
+        **plan_files(case, content.plan, content.accuracy),
         **({} if route is None else route_files(route, STANDARD)),
     }
     return {**files, **trial_pages(content, progress)}
@@ -254,7 +256,7 @@ def built_route(case: Scenario, plan: Plan) -> Route:
 
 
 def report_content(
-    case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, seed: int
+    case: Scenario, information: tuple[PrimitiveInformation, ...], design: DurationDesign, plan: Plan, command: str
 ) -> ReportContent:
     """Content of the report and the run cards."""
     return ReportContent(
@@ -270,7 +272,8 @@ def report_content(
         information=information,
         design=design,
         plan=plan,
-        command=f"expdesign run {case.path}{' --draft' if plan.draft else ''} --seed {seed}",
+        command=command,
         version=__version__,
+        asked=case.design.accuracy,
         remarks=trial_remarks(case, plan),
     )

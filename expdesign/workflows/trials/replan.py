@@ -124,11 +124,10 @@ def _replanned(
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, day.design, day.plan)
     route = built_route(case, day.plan)
     content = replace(
-        report_content(case, day.information, day.design, day.plan, seed),
+        report_content(case, day.information, day.design, day.plan, words),
         compared=compared,
         route=route,
         known=known,
-        command=words,
         day=day.shortest,
     )
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
