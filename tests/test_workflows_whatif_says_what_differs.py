@@ -49,6 +49,16 @@ def test_twice_the_time_is_twice_the_information_and_the_same_files_give_no_diff
     assert longer == pytest.approx(2.0, rel=0.1)
     assert found["twice"]["accuracy"] == pytest.approx(longer, rel=0.1)
     assert found["twice"]["same_accuracy_s"] == pytest.approx(found["model-ship"]["informative_s"], rel=0.1)
+    # cases that differ in time alone lie on one curve, which falls with the root of time
+    curves = {
+        name: {row["informative_s"]: row["std_ratio"] for row in case["accuracy_by_time"]}
+        for name, case in found.items()
+    }
+    for own_s in (case["informative_s"] for case in found.values()):
+        assert curves["twice"][own_s] == pytest.approx(curves["model-ship"][own_s], rel=1e-9)
+    assert curves["twice"][found["twice"]["informative_s"]] == pytest.approx(found["twice"]["accuracy"] ** -0.5)
+    times, ratios = (np.array(side) for side in zip(*sorted(curves["twice"].items()), strict=True))
+    assert ratios * np.sqrt(times) == pytest.approx(np.sqrt(found["model-ship"]["informative_s"]), rel=0.1)
     assert found["twice"]["changes"] == [f"design.total_s = {2 * base:g} instead of {base:g}"]
 
 

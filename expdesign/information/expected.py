@@ -20,7 +20,7 @@ derived here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,33 +83,51 @@ def expected_covariance(
     Raises:
         NotInformative: the trial contains no information about some parameters.
     """
-    rows = [
-        _rows(
-            vessel,
-            part,
-            parameters,
-            environment,
-            integrator,
-            unknown_current,
-            excitation,
-        )
-        for part in parts
-    ]
-    weights = np.array([part.repeats for part in parts], dtype=float)
-    size = rows[0].regressors.shape[1]
-    G, Omega = np.zeros((size, size)), np.zeros((size, size))
-    for item, Z, weight in zip(rows, _without_means(rows, weights, mean_subtraction), weights, strict=True):
-        G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
-        Omega += weight * _score_covariance(Z, item)
+    of_repeats = covariance_of_repeats(
+        vessel,
+        parts,
+        parameters,
+        environment=environment,
+        mean_subtraction=mean_subtraction,
+        integrator=integrator,
+        unknown_current=unknown_current,
+        excitation=excitation,
+    )
+    return of_repeats(np.array([part.repeats for part in parts], dtype=float))
+
+
+def covariance_of_repeats(
+    vessel: Vessel,
+    parts: Sequence[TrialPart],
+    parameters: Sequence[str],
+    *,
+    environment: Environment = CALM,
+    mean_subtraction: str = "complete",
+    integrator: str = "rk4",
+    unknown_current: bool = False,
+    excitation: str = FREE,
+) -> Callable[[Array], Array]:
+    """The same as a function of the number of runs (n,) of each part; what the parts tell is computed once."""
+    rows = [_rows(vessel, part, parameters, environment, integrator, unknown_current, excitation) for part in parts]
     names = (*parameters, *(STEADY_CURRENT if unknown_current else ()))
-    return _sandwich(G, Omega, names)[: len(parameters), : len(parameters)]
+
+    def covariance(repeats: Array) -> Array:
+        done = [(item, weight) for item, weight in zip(rows, repeats.tolist(), strict=True) if weight]
+        size = rows[0].regressors.shape[1]
+        G, Omega = np.zeros((size, size)), np.zeros((size, size))
+        for (item, weight), Z in zip(done, _without_means(done, mean_subtraction), strict=True):
+            G += weight * np.einsum("kpo,kqo->pq", Z, item.regressors)
+            Omega += weight * _score_covariance(Z, item)
+        return _sandwich(G, Omega, names)[: len(parameters), : len(parameters)]
+
+    return covariance
 
 
-def _without_means(rows: Sequence[_Rows], weights: Array, mean_subtraction: str) -> Iterator[Array]:
+def _without_means(rows: Sequence[tuple[_Rows, float]], mean_subtraction: str) -> Iterator[Array]:
     """Instruments (k, p, n) of each part without the mean of their stratum, zero in samples that are not used."""
     if mean_subtraction == "complete":
-        totals = _sums([(item, weight) for item, weight in zip(rows, weights, strict=True)])
-    for item in rows:
+        totals = _sums(rows)
+    for item, _ in rows:
         if mean_subtraction != "complete":
             totals = _sums([(item, 1.0)])
         Z = np.array(item.instruments)

@@ -36,6 +36,8 @@ class Case:
     plan: Mapping[str, object]  # numbers of the planned trial, units in the names; empty when none was planned
     # (p, p) inverse information of the whole planned track, in units of the noise; None where it is not known
     track: Array | None = None
+    # (informative time [s], (p, p) covariance) of the optimal runs in shorter and longer times
+    times: tuple[tuple[float, Array], ...] = ()
     legs_count: bool = False  # whether the accuracy asked for is that of the whole track, not of the runs alone
     remarks: tuple[str, ...] = ()  # what its files state and it does not use, or takes as certain; one line each
 
@@ -89,6 +91,16 @@ class WhatIfContent:
             same_accuracy_s=None if legs_count else case.informative_s / accuracy,
             track=track,
         )
+
+    def curve(self, case: Case) -> tuple[tuple[float, float], ...]:
+        """(informative time [s], standard deviation over the scenario's, geometric mean of directions) of a case."""
+        first = self.cases[0]
+        common = tuple(name for name in first.parameters if name in case.parameters)
+        if first.problem or case.problem or not common:
+            return ()
+        theirs = _part(first, first.covariance, common)
+        known = sorted((*case.times, (case.informative_s, case.covariance)), key=lambda item: item[0])
+        return tuple((time_s, _gain(_part(case, mine, common), theirs) ** -0.5) for time_s, mine in known)
 
 
 def _part(case: Case, covariance: Array, names: tuple[str, ...]) -> Array:
@@ -222,6 +234,7 @@ def _entry(content: WhatIfContent, case: Case, sentences: tuple[str, ...]) -> di
         "accuracy": None if against is None else against.accuracy,
         "same_accuracy_s": None if against is None else against.same_accuracy_s,
         "track_accuracy": None if against is None else against.track,
+        "accuracy_by_time": [{"informative_s": time_s, "std_ratio": ratio} for time_s, ratio in content.curve(case)],
         "std_ratio": None if against is None else dict(zip(against.common, against.ratios, strict=True)),
         "plan": dict(case.plan) or None,
         "differences": list(sentences),

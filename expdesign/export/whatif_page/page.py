@@ -68,6 +68,28 @@ def day_figure(content: WhatIfContent) -> str:
 
 
 @page_figure
+def curve_figure(content: WhatIfContent) -> str:
+    """Standard deviation against informative time, a line a case; what is planned is marked."""
+    figure = new_figure(6.4, 3.6)
+    axes = figure.subplots()
+    for case, colour in zip(content.cases, LINES * 9, strict=False):
+        if not (curve := content.curve(case)):
+            continue
+        times, ratios = np.transpose(curve)
+        axes.plot(times / 60, ratios, "-", color=colour, linewidth=1.2, label=plain(case.name))
+        stands = times == case.informative_s
+        axes.plot(times[stands] / 60, ratios[stands], "o", color=colour)
+    axes.set_xscale("log")
+    round_ticks(axes)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("time of all runs [min]")
+    axes.set_ylabel("relative standard deviation")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)
+    light_grid(axes)
+    return svg(figure, key="curves", label="Standard deviation of the estimates against the time of all runs")
+
+
+@page_figure
 def ratio_figure(content: WhatIfContent) -> str:
     """Standard deviations over those of the scenario, for each parameter."""
     compared = [(case, against) for case in content.cases[1:] if (against := content.against(case))]
@@ -75,7 +97,7 @@ def ratio_figure(content: WhatIfContent) -> str:
     figure = new_figure(6.4, 1.3 + 0.26 * len(names))
     axes = figure.subplots()
     axes.axvline(1.0, color="black", linewidth=1.0, label=plain(content.cases[0].name))
-    for (case, against), colour in zip(compared, LINES * 9, strict=False):
+    for (case, against), colour in zip(compared, LINES[1:] + LINES * 9, strict=False):
         rows = [names.index(name) for name in against.common]
         axes.plot(against.ratios, rows, "o", color=colour, markersize=5, label=plain(case.name))
     axes.set_yticks(range(len(names)), [plain(name) for name in names])
@@ -135,6 +157,7 @@ def whatif_document(content: WhatIfContent) -> Document:
                 ),
             ),
             *([_days(content)] if any(against and against.track for against in compared) else []),
+            *([_curves(content)] if any(map(content.curve, content.cases)) else []),
             *(section(name, *([Listing(changes[name])] if changes[name] else []), *lines) for name, lines in told),
             section("Differences", Table(header=("Case", "What differs"), rows=differences, on="terminal")),
             *([_ratios(content)] if any(compared[1:]) else []),
@@ -177,6 +200,14 @@ def _days(content: WhatIfContent) -> Section:
         "scenario\u2019s. Lines: to the 95th percentile of the simulated trials, with a mark at the median."
     )
     return section("The day and what it tells", Figure(draw=partial(day_figure, content), caption=caption))
+
+
+def _curves(content: WhatIfContent) -> Section:
+    caption = (
+        "Expected standard deviation (geometric mean over parameters) of the optimal whole runs in shorter and longer "
+        "times, divided by that of the scenario; points are the cases as they stand. Legs are not counted."
+    )
+    return section("Accuracy against time", Figure(draw=partial(curve_figure, content), caption=caption))
 
 
 def _ratios(content: WhatIfContent) -> Section:

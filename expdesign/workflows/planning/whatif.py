@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -12,13 +12,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from expdesign import __version__
-from expdesign.durations import DurationDesign, efficiencies
+from expdesign.dictionary import Primitive
+from expdesign.durations import DurationDesign, efficiencies, optimal_shares
+from expdesign.durations.rounding import whole_runs
 from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
 from expdesign.export.pages import document_html
 from expdesign.export.whatif_page import Case, WhatIfContent, whatif_document, whatif_json
 from expdesign.information import PrimitiveInformation, estimated_parameters
-from expdesign.information.expected import expected_covariance
+from expdesign.information.expected import covariance_of_repeats
 from expdesign.memory import Memory, recalled, remembering, user_memory
 from expdesign.plan.verify import track_covariance
 from expdesign.processes import as_finished, reported_together
@@ -28,7 +30,7 @@ from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
 from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
-from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.design_problem import designed, duration_problem
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.scored import ready, scored
 from expdesign.workflows.steps.workers import load_plans, workers
@@ -38,6 +40,8 @@ SEARCHED = 0.1
 """Share of the work that is done once for all cases, where trials are planned."""
 WORKED = 0.95
 """Share of the work that the cases are."""
+SHARES = (0.25, 0.5, 2.0, 4.0)
+"""Of the time of all runs, for which the accuracy is shown as well."""
 WORK = (0.5, 0.5, 10.0, 0.5)
 """Relative times of the parts of a case: scoring, sharing out time, planning, comparing criteria."""
 
@@ -184,27 +188,55 @@ def _described(
     design: DurationDesign,
     plan: dict[str, object],
 ) -> Case:
-    primitives = [item.primitive for item in information]
     parameters = estimated_parameters(case.vessel.model, case.design.fixed_parameters)
-    covariance = expected_covariance(
-        case.vessel,
-        trial_parts(primitives, design.repeats, environment=case.environment),
-        parameters,
-        environment=case.environment,
-        mean_subtraction=case.design.mean_subtraction,
-    )
+    run_s = design.problem.run_s
+    others = _in_other_times(case, information, design)
+    used = [place for place, runs in enumerate(zip(design.repeats, *others, strict=True)) if any(runs)]
+    of_runs = _covariance(case, [information[place].primitive for place in used], parameters)
+    times = []
+    for repeats in others:
+        with suppress(NoAnswer):
+            times.append((float(np.dot(repeats, run_s)), of_runs(np.array(repeats, dtype=float)[used])))
     compared = {item.criterion: item.of[WHOLE_RUNS] for item in recalled(efficiencies, design) if WHOLE_RUNS in item.of}
     return Case(
         name=case.name,
         changes=changes,
         criterion=case.design.criterion,
         runs={name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count},
-        informative_s=float(np.dot(design.repeats, design.problem.run_s)),
+        informative_s=float(np.dot(design.repeats, run_s)),
         gap_relative=design.gap_relative,
         efficiencies=compared,
         parameters=parameters,
-        covariance=covariance,
+        covariance=of_runs(np.array(design.repeats, dtype=float)[used]),
         plan=plan,
+        times=tuple(times),
         legs_count=case.design.accuracy is not None,
         remarks=case.remarks,
     )
+
+
+def _in_other_times(
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign
+) -> list[tuple[int, ...]]:
+    """The optimal whole runs in shorter and longer times, those that tell every parameter."""
+    found = []
+    for share in SHARES:
+        settings = replace(case.design, total_s=share * design.problem.total_s, accuracy=None)
+        with suppress(NoAnswer):
+            problem = duration_problem(replace(case, design=settings), information)
+            found.append(whole_runs(problem, optimal_shares(problem).fractions))
+    return found
+
+
+def _covariance(case: Scenario, primitives: Sequence[Primitive], parameters: Sequence[str]) -> Callable[[Array], Array]:
+    """(p, p) covariance expected of estimates from whole runs alone, as a function of how often each is run."""
+    parts = trial_parts(primitives, np.ones(len(primitives)).tolist(), environment=case.environment)
+    headings = len(parts) // len(primitives)
+    of_parts = covariance_of_repeats(
+        case.vessel,
+        parts,
+        parameters,
+        environment=case.environment,
+        mean_subtraction=case.design.mean_subtraction,
+    )
+    return lambda repeats: of_parts(np.repeat(repeats / headings, headings))
