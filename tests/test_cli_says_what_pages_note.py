@@ -10,6 +10,8 @@ import pytest
 
 import expdesign.export
 from expdesign.cli import main
+from expdesign.cli.summary import as_json, print_summary
+from expdesign.workflows import Outcome
 from instrumented_ship import POSE, voyages, write_log, write_vessel
 
 EXPORT = Path(expdesign.export.__file__).parent
@@ -70,10 +72,16 @@ DOUBT = {"monitor": "hours.csv: r_radps is 0.9"}
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_terminal_says_all_that_the_page_notes(
-    folder: Path, tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = [*COMMANDS[command].format(folder).split(), "--out", str(tmp_path)]
-    assert main(words) == 0
+    printed = list[Outcome]()
+
+    def both(outcome: Outcome) -> None:
+        printed.append(outcome)
+        print_summary(outcome)
+
+    monkeypatch.setattr("expdesign.cli.app.print_summary", both)
+    assert main([*COMMANDS[command].format(folder).split(), "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert DOUBT.get(command, "the headings are read every 4 s") in told
     assert "ignored mood" in told
@@ -85,8 +93,7 @@ def test_the_terminal_says_all_that_the_page_notes(
         assert any("ignored mood" in note for note in noted)
         for note in noted:
             assert any(line.endswith(note) for line in lines), note
-    assert main([*words, "--json"]) == 0
-    notes = json.loads(capsys.readouterr().out)["notes"]
+    notes = json.loads(as_json(command, printed[0]))["notes"]
     assert [f"- {note}" in told for note in notes] == [True] * len(notes)
 
 
