@@ -43,16 +43,16 @@ def worth_replanning(
 
 def too_risky(problem: PlanProblem, first: PlanRoom, made: list[Refused], more: str = "") -> NoPlan:
     """The refusal of plans of which too many drawn trials fail, with the confidence that accepts the first of them."""
-    last, best = made[-1], min(made, key=lambda plan: plan.risk.left)
+    best = min(made, key=lambda plan: plan.risk.left)
     again = f"; planned {len(made)} times, each with more room than before" if len(made) > 1 else ""
     error = NoPlan(f"the plan found is too risky: {best.failed}{again}{more}", place=best.place)
     error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
-    error.poses = last.sailed.trajectory.pose
+    error.poses = best.sailed.trajectory.pose
     lower = _met(problem, made[0].risk)
     if lower is not None and _accepts(problem, first, made[0], lower):
         error.remedies = (f"with plan.confidence = {lower:g} the first plan is made once more, and accepted",)
         return error
-    error.what, error.which, error.confidence = "risk", last.worst, lower
+    error.what, error.which, error.confidence = "risk", best.worst, lower
     error.plan = made[0]
     return error
 
@@ -79,7 +79,9 @@ def not_again(error: NoPlan, made: list[Refused]) -> NoPlan:
     if made:
         error.obstacle = f"the plan found is too risky: {made[0].failed}; made anew with more room: {error.obstacle}"
         error.tried = tuple(f"plan {number}: {plan.failed}" for number, plan in enumerate(made, start=1))
-        error.poses = made[-1].sailed.trajectory.pose if error.poses is None else error.poses
+        error.poses = made[0].sailed.trajectory.pose if error.poses is None else error.poses
+        if error.place is None and (place := made[0].place) is not None:
+            error.place = float(place[0]), float(place[1])
     return error
 
 
