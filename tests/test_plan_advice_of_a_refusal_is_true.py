@@ -15,7 +15,7 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, checked, solve
+from expdesign.plan import PlanSettings, checked, replanning, solve
 from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
@@ -25,7 +25,6 @@ from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import advice, advised, changes
 from expdesign.plan.remedies.advice import REMEDY_WORK
-from expdesign.plan.replanning import not_again, too_risky
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.tuning import PLAN
@@ -355,20 +354,24 @@ def refused(number: int, left: float) -> SimpleNamespace:
     """A plan that is too risky, all of whose entries say which one it is."""
     trajectory = SimpleNamespace(pose=np.full((3, 3), float(number)))
     return SimpleNamespace(
-        sailed=SimpleNamespace(trajectory=trajectory, legs=()), risk=SimpleNamespace(left=left, error=0.01), trials=None,
-        failed=f"plan {number} fails near {number}", place=np.full(2, float(number)), worst=f"run {number}",
-    )  # fmt: skip
+        sailed=SimpleNamespace(trajectory=trajectory, legs=()),
+        risk=SimpleNamespace(left=left, error=0.01),
+        trials=None,
+        failed=f"plan {number} fails near {number}",
+        place=np.full(2, float(number)),
+        worst=f"run {number}",
+    )
 
 
 def test_words_mark_and_track_of_a_refusal_are_of_one_plan() -> None:
     made = [refused(1, 0.9), refused(2, 0.7), refused(3, 0.8)]
     problem = SimpleNamespace(settings=SimpleNamespace(confidence=0.95))
-    error = too_risky(problem, None, made)
+    error = replanning.too_risky(problem, None, made)
     assert "plan 2 fails near 2" in error.obstacle
     assert error.place == (2.0, 2.0)
     assert error.which == "run 2"
     assert (error.poses == 2.0).all()
-    again = not_again(NoPlan("no path"), made[:1])
+    again = replanning.not_again(NoPlan("no path"), made[:1])
     assert "plan 1 fails near 1" in again.obstacle
     assert again.place == (1.0, 1.0)
     assert (again.poses == 1.0).all()
