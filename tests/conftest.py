@@ -37,7 +37,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Cycles are looked for more rarely, and not among modules and tests: a tenth of the work of the whole suite."""
+    """Cycles of garbage are looked for more rarely, and not among modules and tests."""
     gc.freeze()
     gc.set_threshold(50_000, 20, 50)
 
