@@ -241,7 +241,7 @@ def _accuracy(content: ResultContent) -> str:
     least, middle, most = (words.significant(value, 2) for value in (min(ratios), median(ratios), max(ratios)))
     return (
         f"Standard deviations of the estimates are {middle} times those planned (median; {least} to {most}). "
-        "The scenario asks for no accuracy."
+        "The scenario limits none of them."
     )
 
 
