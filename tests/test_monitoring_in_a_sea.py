@@ -23,8 +23,8 @@ from expdesign.monitoring import (
     Rules,
     State,
     calibrate,
+    grams_and_noise,
     grams_of,
-    noise_of,
     stretch_length,
     threshold,
     watch,
@@ -60,8 +60,10 @@ def stretches(vessel: Vessel, table: np.ndarray, *, known: Noise | None = None, 
     record = as_record(vessel, table)
     ship = extended_model(vessel, record)
     changes, words = watched_changes(ship), {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)}
-    noise = noise_of(ship, record, changes, known=known, **words) if noise is None else noise
-    return changes, noise, grams_of(ship, record, changes, noise=noise, **words)
+    if noise is not None:
+        return changes, noise, grams_of(ship, record, changes, noise=noise, **words)
+    grams, noise = grams_and_noise(ship, record, changes, known=known, **words)
+    return changes, noise, grams
 
 
 @pytest.fixture(scope="module")

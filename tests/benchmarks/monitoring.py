@@ -41,9 +41,10 @@ from expdesign.monitoring import (
     Rules,
     State,
     calibrate,
+    grams_and_noise,
     grams_of,
     joined,
-    noise_of,
+    later_part,
     stretch_length,
     threshold,
     watch,
@@ -122,17 +123,19 @@ def gone_on(
     """A record watched from a state on, linearised anew after each change, and the alarms in it."""
     ship, alarms, first = extended_model(vessel, record), list[Alarm](), 0
 
-    def linearised() -> Grams:
-        effects = {c.effect: c.size * x for c, x in zip(changes, state.shift.tolist(), strict=True) if x}
-        changed = ship.with_effects(effects)
-        return grams_of(changed, record, changes, begins_s=[begin_s], stretch_s=calibration.stretch_s, noise=noise)
+    def linearised(shift: np.ndarray, since_s: float = begin_s) -> Grams:
+        effects = {c.effect: c.size * x for c, x in zip(changes, shift.tolist(), strict=True) if x}
+        part, begins_s = later_part(record, [begin_s], since_s, calibration.stretch_s)
+        words = {"begins_s": begins_s, "stretch_s": calibration.stretch_s, "noise": noise}
+        return grams_of(ship.with_effects(effects), part, changes, **words)
 
-    grams = linearised()
+    grams = linearised(state.shift)
     while first < len(grams):
-        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), rules=rules)
+        part = grams.part(slice(first, None))
+        state, more, _, used = watch(calibration, state, part, rules=rules, again=linearised)
         alarms, first = [*alarms, *more], first + used
         if first < len(grams):
-            grams = linearised()
+            grams = linearised(state.shift)
     return state, alarms
 
 
@@ -352,9 +355,12 @@ def sea_study(trials: int, *, calm: bool, white: bool) -> None:
             ship = extended_model(vessel, record)
             changes = watched_changes(ship)
             words = {"begins_s": [0.0], "stretch_s": stretch_s}
-            noise = WHITE if white else noise_of(ship, record, changes, **words)
+            if white:
+                grams, noise = grams_of(ship, record, changes, **words), WHITE
+            else:
+                grams, noise = grams_and_noise(ship, record, changes, **words)
             load = np.array([change.load for change in changes])
-            known.append((changes, noise, calibrate(grams_of(ship, record, changes, noise=noise, **words), load=load)))
+            known.append((changes, noise, calibrate(grams, load=load)))
         for number, (case, changed) in enumerate(SEA_CASES.items()):
             tables = sailed(
                 [changed] * trials, 3 * HOUR, seeds=[10 * k + 5001 + number for k in seeds], sea=sea, since_s=HOUR
@@ -381,7 +387,7 @@ def sea_trial(
     record = as_record(vessel, table)
     if not noise.white:
         words = {"begins_s": [0.0], "stretch_s": calibration.stretch_s, "known": noise}
-        noise = noise_of(extended_model(vessel, record), record, changes, **words)
+        _, noise = grams_and_noise(extended_model(vessel, record), record, changes, **words)
     state, alarms = gone_on(
         State.begun(calibration, time_s=0.0), vessel, record, changes, calibration, rules, begin_s=0.0, noise=noise
     )

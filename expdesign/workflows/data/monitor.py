@@ -303,7 +303,7 @@ def _state(now: Watch, asked: Asked) -> str:
         lines = (*now.phase.lines, *now.reading.pending[bool(now.phase.lines) :])
         reading = replace(now.reading, pending=lines, now_s=-np.inf, offset_s=0.0)
         now = replace(now, phase=Learning(), reading=reading, roll=RollWatch())
-    return json.dumps({**saved(now), "version": __version__, "options": _kept(asked)})
+    return json.dumps({**saved(replace(now, late=())), "version": __version__, "options": _kept(asked)})
 
 
 def _resumed(path: Path, asked: Asked) -> Watch:

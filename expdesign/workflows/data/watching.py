@@ -13,6 +13,7 @@ from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
     TUNING,
     WHITE,
+    Again,
     Alarm,
     Calibration,
     Change,
@@ -33,6 +34,7 @@ from expdesign.records import STREAM, Piece, Taken
 from expdesign.roll import Run
 from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
 from expdesign.signals import Record
+from expdesign.values import Array
 from expdesign.vessel import Vessel
 from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unread
 
@@ -42,6 +44,8 @@ CORRECTION_S = 120.0
 """Time by which a clock that is put back is taken to have been corrected [s]."""
 MOST_SAVED_ROWS = 7200
 """Largest number of rows saved since a change, for a diagnosis."""
+KEPT_ROWS = 7200
+"""Rows before the last piece that are kept, at least where there are so many: a change may have begun in them."""
 MOST_MOMENTS = 1000
 """Largest number of moments kept for the page."""
 HOUR, DAY = 3600.0, 86_400.0
@@ -115,6 +119,8 @@ class Watch:
     reading: Reading = Reading()  # how far the data have been read
     phase: Learning | Ready | Watching = Learning()  # what is known of the ship
     roll: RollWatch = field(default_factory=RollWatch)  # what is known of its roll
+    # the last pieces with what was added to their times [s]; not saved: a watch that is resumed goes on without
+    late: tuple[tuple[Read, float], ...] = ()
 
 
 def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:
@@ -255,16 +261,27 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     if first == len(grams):
         return now
     on = now.phase if isinstance(now.phase, Watching) else _begun(now.phase, float(grams.time_s[first]))
-    raised = list[Alarm]()
+    raised, late = list[Alarm](), _latest((*now.late, (read, offset_s)))
+
+    def again(shift: Array, since_s: float) -> Grams:
+        known = replace(known_of(now), shift=shift)
+        return joined([one.since(since_s, known, asked, offset_s=later_s) for one, later_s in late])
+
     while first < len(grams):
         before = on.state
-        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked))
+        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked), again)
         raised += more
         first += used
         if on.state.shift is not before.shift and first < len(grams):
             grams = read.at(replace(known_of(now), shift=on.state.shift), asked, offset_s=offset_s)
     changed = _changed(on, piece, raised, offset_s)[: MOST_SAVED_ROWS + 1]
-    return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed))
+    return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed), late=late)
+
+
+def _latest(late: Sequence[tuple[Read, float]]) -> tuple[tuple[Read, float], ...]:
+    """The last piece, and of those before as many as `KEPT_ROWS` asks for."""
+    rows = np.cumsum([sum(map(len, one.record.batches)) for one, _ in late[-2::-1]])
+    return tuple(late[-2 - int(np.searchsorted(rows, KEPT_ROWS)) :])
 
 
 def known_of(now: Watch) -> Known:
@@ -281,9 +298,9 @@ def _begun(ready: Ready, time_s: float) -> Watching:
     )
 
 
-def _hour(on: Watching, grams: Grams, rules: Rules) -> tuple[Watching, list[Alarm], int]:
+def _hour(on: Watching, grams: Grams, rules: Rules, again: Again) -> tuple[Watching, list[Alarm], int]:
     """Watch the stretches of one moment of the page; returns the alarms raised and the number of stretches used."""
-    state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules)
+    state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules, again=again)
     value, std = estimates(state, on.calibration)
     statistic = max((step.statistic for step in steps if step.compared), default=0.0)
     moment = Moment(time_s=state.until_s, statistic=statistic, value=value, std=std)
