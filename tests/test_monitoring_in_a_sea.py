@@ -138,7 +138,7 @@ def test_scores_of_an_unchanged_ship_are_unbiased_where_the_rudder_answers_the_s
             changes, _, grams = stretches(vessel, table, noise=None if modelled else WHITE)
             told = calibrate(grams)
             places = [k for k, change in enumerate(changes) if change.effect in ("theta:Y_ur", "inertia:r")]
-            values.append((told.baseline / told.baseline_std)[places])
+            values.append((told.baseline / told.baseline_std * np.sqrt(told.inflation))[places])
     bias = {modelled: np.abs(np.mean(values, axis=0)).max() for modelled, values in far.items()}
     assert bias[True] < 3.0 / np.sqrt(len(seeds))
     assert bias[False] > 3.0 / np.sqrt(len(seeds))

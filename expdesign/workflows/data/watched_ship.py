@@ -171,13 +171,29 @@ class Read:
         grams = self.grams if same else _linearised(self.record, self.begins_s, known, asked)[0]
         return replace(grams, time_s=grams.time_s + offset_s)
 
-    def since(self, since_s: float, known: Known, asked: Asked, *, offset_s: float) -> Grams:
-        """Inner products of the stretches since a time [s], later by an offset, with the noise of all."""
-        record, begins_s = later_part(self.record, self.begins_s, since_s - offset_s, asked.stretch_s)
-        if not record.batches:
-            return self.grams.part(slice(0, 0))
-        grams = _linearised(record, begins_s, replace(known, noise=self.noise), asked, fixed=True)[0]
-        return replace(grams, time_s=grams.time_s + offset_s)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Late:
+    """The rows of a piece that was watched, in which a change may have begun that is noticed later."""
+
+    text: str  # header and rows
+    time_s: Array  # (k,) of the rows [s]
+    offset_s: float  # added to these times
+    noise: Noise  # within the stretches
+
+    def record(self, asked: Asked) -> tuple[Record, tuple[float, ...]]:
+        """The rows as a record, and the time at which each batch begins, in the clock of the file [s]."""
+        return _record_of(asked, self.text, self.time_s)
+
+    def since(
+        self, since_s: float, record: Record, begins_s: Sequence[float], known: Known, asked: Asked
+    ) -> Grams | None:
+        """Inner products of the stretches of its record since a time [s]; None where there are none."""
+        part, begins = later_part(record, begins_s, since_s - self.offset_s, asked.stretch_s)
+        if not part.batches:
+            return None
+        grams = _linearised(part, begins, replace(known, noise=self.noise), asked, fixed=True)[0]
+        return replace(grams, time_s=grams.time_s + self.offset_s)
 
 
 @dataclass(frozen=True)
@@ -200,14 +216,19 @@ def prepared(asked: Asked, text: str, time_s: Array, known: Known) -> Read | Unr
     if len(time_s) < FEWEST_LINES:
         return None
     try:
-        with as_file(text) as path:
-            record = measured([path], asked.vessel, velocity=asked.velocity, undo=False)
-            record = in_stated_time(record, asked.vessel.sensors)
+        record, begins = _record_of(asked, text, time_s)
     except FileError as error:
         return Unread(error.key, error.problem)
-    begins = tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
     grams, known, noise, notes = _linearised(record, begins, known, asked)
     return Read(record=record, begins_s=begins, grams=grams, known=known, noise=noise, notes=notes)
+
+
+def _record_of(asked: Asked, text: str, time_s: Array) -> tuple[Record, tuple[float, ...]]:
+    """Rows as a record, and the time at which each batch begins [s]."""
+    with as_file(text) as path:
+        record = measured([path], asked.vessel, velocity=asked.velocity, undo=False)
+        record = in_stated_time(record, asked.vessel.sensors)
+    return record, tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
 
 
 def _linearised(

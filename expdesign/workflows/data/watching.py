@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_so
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unread
+from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Late, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
 """Time from the end of a file to the beginning of the next, where its times begin again [s]."""
@@ -119,8 +120,7 @@ class Watch:
     reading: Reading = Reading()  # how far the data have been read
     phase: Learning | Ready | Watching = Learning()  # what is known of the ship
     roll: RollWatch = field(default_factory=RollWatch)  # what is known of its roll
-    # the last pieces with what was added to their times [s]; not saved: a watch that is resumed goes on without
-    late: tuple[tuple[Read, float], ...] = ()
+    late: tuple[Late, ...] = ()  # the last pieces
 
 
 def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:
@@ -261,12 +261,9 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     if first == len(grams):
         return now
     on = now.phase if isinstance(now.phase, Watching) else _begun(now.phase, float(grams.time_s[first]))
-    raised, late = list[Alarm](), _latest((*now.late, (read, offset_s)))
-
-    def again(shift: Array, since_s: float) -> Grams:
-        known = replace(known_of(now), shift=shift)
-        return joined([one.since(since_s, known, asked, offset_s=later_s) for one, later_s in late])
-
+    raised = list[Alarm]()
+    late = _latest((*now.late, Late(text=piece.text, time_s=piece.time_s, offset_s=offset_s, noise=read.noise)))
+    again = _again(late, known_of(now), asked)
     while first < len(grams):
         before = on.state
         on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked), again)
@@ -278,9 +275,24 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed), late=late)
 
 
-def _latest(late: Sequence[tuple[Read, float]]) -> tuple[tuple[Read, float], ...]:
+def _again(late: Sequence[Late], known: Known, asked: Asked) -> Again:
+    """Stretches of the last pieces, linearised anew."""
+
+    @cache
+    def record(number: int) -> tuple[Record, tuple[float, ...]]:
+        return late[number].record(asked)
+
+    def again(shift: Array, since_s: float) -> Grams:
+        ship = replace(known, shift=shift)
+        parts = [one.since(since_s, *record(number), ship, asked) for number, one in enumerate(late)]
+        return joined([part for part in parts if part is not None])
+
+    return again
+
+
+def _latest(late: Sequence[Late]) -> tuple[Late, ...]:
     """The last piece, and of those before as many as `KEPT_ROWS` asks for."""
-    rows = np.cumsum([sum(map(len, one.record.batches)) for one, _ in late[-2::-1]])
+    rows = np.cumsum([len(one.time_s) for one in late[-2::-1]])
     return tuple(late[-2 - int(np.searchsorted(rows, KEPT_ROWS)) :])
 
 
