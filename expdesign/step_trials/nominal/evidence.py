@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from expdesign.errors import NotInformative
 from expdesign.step_trials.samples import Delays, StepSample
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
