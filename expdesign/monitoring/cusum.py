@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.monitoring.alarms import REFINED, Again, fits, raised, settling
+from expdesign.monitoring.alarms import REFINED, Again, beside_baseline, fits, raised, settling
 from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
@@ -91,9 +91,10 @@ def calls_of(state: State, calibration: Calibration) -> tuple[Call, ...]:
 
 def estimates(state: State, calibration: Calibration) -> tuple[Array, Array]:
     """(m,) size of each change, had it alone happened when the watch began, and (m,) its standard error."""
-    known = np.diag(state.whole.information[0])
+    score, information = beside_baseline(state.whole, calibration)
+    known, wider = np.diag(information), np.maximum(calibration.inflation / calibration.common, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return state.whole.score[0] / known, np.sqrt(calibration.inflation / known)
+        return score / known, np.sqrt(wider / known)
 
 
 def threshold(watched: int, stretches: float) -> float:
