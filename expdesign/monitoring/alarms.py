@@ -76,11 +76,12 @@ def settling(state: State, one: Judged, calibration: Calibration, again: Again |
     assert state.pending is not None
     assert state.alarm is not None
     pending = state.pending.added(one)[0]
-    state = replace(state, pending=pending, alarm=_attributed(state, state.alarm, pending, calibration))
-    since = (state.until_s - state.alarm.since_s) / calibration.stretch_s
+    alarm = _attributed(state, state.alarm, pending, calibration)
+    state = replace(state, pending=pending, alarm=alarm)
+    since = (state.until_s - alarm.since_s) / calibration.stretch_s
     if pending.count < max(SETTLING_STRETCHES, MORE * since):
         return state
-    before = state.alarm.value
+    before = alarm.value
     state = _simulated(state, calibration, again, rules)
     assert state.pending is not None
     assert state.alarm is not None

@@ -74,7 +74,8 @@ class Sums:
 
     def again(self, places: np.ndarray, state: State) -> Sums:
         """The sums with some (n,) begun anew at a state."""
-        return self._where(places, Sums.begun(*self.score.shape, state.known, state.until_s, state.rougher))
+        count, changes = self.score.shape
+        return self._where(places, Sums.begun(count, changes, state.known, state.until_s, state.rougher))
 
     def first(self, places: np.ndarray, one: Judged, time_s: float, before: State) -> Sums:
         """The sums with some (n,) begun with a stretch at a time, before which the state was another."""
