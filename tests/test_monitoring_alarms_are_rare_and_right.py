@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,7 @@ from expdesign.monitoring import (
     threshold,
     watch,
 )
+from expdesign.monitoring.alarms import beside_baseline
 from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
 from expdesign.monitoring.evidence import stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
@@ -253,6 +255,65 @@ def test_a_change_under_way_after_a_port_call_is_an_alarm_even_if_it_is_one_of_l
         assert alarms[0].since_s == pytest.approx(8 * HOUR + 2 * CALL * STRETCH_S, abs=3 * STRETCH_S)
         assert alarms[-1].settled
         assert alarms[-1].change == number or number in alarms[-1].as_likely
+
+
+def test_sizes_carry_the_errors_of_the_reference(calibration: Calibration) -> None:
+    """Their weights are those of the dense covariance J + J B J of the scores, and a short reference widens them."""
+    columns = drawn_columns(60, seed=11, change=np.array([0.0, 0.0, 1.5, 0.0]))
+    state, _, _ = watched(calibration, grams_from(columns), np.inf)
+    score, information = beside_baseline(state.whole, calibration)
+    J, B = state.whole.information[0] / calibration.common, calibration.baseline_covariance
+    weights = np.linalg.inv(J + J @ B @ J)
+    assert information == pytest.approx(J @ weights @ J)
+    assert score == pytest.approx(J @ weights @ state.whole.score[0] / calibration.common)
+    short = calibrate(drawn_grams(FEWEST_STRETCHES, seed=0))
+    assert np.all(np.diag(beside_baseline(state.whole, short)[1]) < np.diag(information))
+
+
+BENT = 0.1
+"""Second-order part of the error, by which a change of three sizes acts a third more than it does when small."""
+
+
+def bent(columns: np.ndarray, change: np.ndarray, since: int) -> tuple[Grams, Callable[[np.ndarray, float], Grams]]:
+    """Stretches whose error is no linear function of a change, and the same linearised anew."""
+
+    def linearised(shift: np.ndarray, since_s: float = 0.0) -> Grams:
+        own = columns.copy()
+        X = columns[:, :, :CHANGES]
+        for place, added in enumerate(
+            change * np.ones((len(columns), 1)) * (np.arange(len(columns)) >= since)[:, None]
+        ):
+            own[place, :, -1] += X[place] @ (
+                added + BENT * added * np.abs(added) - shift - BENT * shift * np.abs(shift)
+            )
+        own[:, :, :CHANGES] = X * (1.0 + 2.0 * BENT * np.abs(shift))
+        grams = grams_from(own)
+        return grams.part(slice(int(np.searchsorted(grams.time_s, since_s - 1e-6)), None))
+
+    return linearised(np.zeros(CHANGES)), linearised
+
+
+def test_the_size_of_a_large_change_is_right_once_it_is_simulated(calibration: Calibration) -> None:
+    """Over ships: without bias, and within what is stated; linearised at the ship before, it is too large."""
+    change, since = np.array([0.0, 0.0, 3.0, 0.0]), 30
+    far = dict[bool, list[float]]({True: [], False: []})
+    for seed in range(12):
+        grams, linearised = bent(drawn_columns(80, seed=900 + seed), change, since)
+        for simulated, values in far.items():
+            state = State.begun(calibration, time_s=0.0)
+            again = linearised if simulated else None
+            state, _, _, used = watch(
+                calibration, state, grams, rules=Rules(limit=threshold(CHANGES, 1e4)), again=again
+            )
+            assert state.alarm is not None
+            if simulated:
+                assert used < len(grams)  # the ship is another: what follows is to be linearised anew
+            assert state.alarm.change == 2
+            values.append((state.alarm.value - change[2]) / state.alarm.std)
+    mean = {simulated: abs(np.mean(values)) for simulated, values in far.items()}
+    assert mean[True] < 3.0 / np.sqrt(12)
+    assert np.mean(np.square(far[True])) < 1.0 + 3.0 * np.sqrt(2.0 / 12)
+    assert mean[False] > 3.0 / np.sqrt(12)
 
 
 def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], tuple[Step, ...]], limit: float):

@@ -12,9 +12,9 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.scenario import load_vessel
-from expdesign.step_trials import controls_of, identify_steps, nominal, nominal_vessel
-from expdesign.step_trials.samples import standard_error
-from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, noise, write_csv
+from expdesign.step_trials import StepTrial, controls_of, identify_steps, nominal, nominal_vessel
+from expdesign.step_trials.nominal.evidence import evidence
+from step_case import GUESS, INPUTS, STEPS, TRUTH, craft_columns, craft_record, mirrored, write_csv
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -94,9 +94,13 @@ def test_a_vessel_file_that_is_not_there_leaves_no_results(tmp_path: Path, capsy
     assert not (tmp_path / "out").exists()
 
 
-def test_a_mirrored_trial_gives_the_same_model() -> None:
-    record = craft_record(3)
-    one, other = (identify_steps(part, CONTROLS) for part in (record, mirrored(record)))
+@pytest.fixture(scope="module")
+def trial() -> StepTrial:
+    return identify_steps(craft_record(3), CONTROLS)
+
+
+def test_a_mirrored_trial_gives_the_same_model(trial: StepTrial) -> None:
+    one, other = trial, identify_steps(mirrored(craft_record(3)), CONTROLS)
     assert [a.inertia for a in one.samples] == pytest.approx([b.inertia for b in other.samples], nan_ok=True, rel=1e-6)
     states = np.array([[3.0, 0.05], [6.0, 0.1]])
     for a, b in zip(
@@ -131,15 +135,11 @@ def test_speeds_through_water_are_those_over_ground_without_the_current(heading_
     assert measured.state[0, 1] == 0.1
 
 
-def test_errors_of_means_of_slow_noise_are_enlarged_as_drawn_noise_needs() -> None:
-    """Noise of correlation exp(-t / T), white noise sampled as slowly as T: the blocks' error times its factor."""
-    rng, samples, constant = np.random.default_rng(4), 150, 25.0
-    drawn = np.array([noise(rng, samples, sample_time_s=1.0, std=1.0, correlation_s=constant) for _ in range(2000)])
-    stated = np.array([standard_error(row) for row in drawn])
-    factor = nominal.correlated(np.array([[float(samples)]]), np.array([constant]))[0, 0]
-    actual = drawn.mean(axis=1).std()
-    assert np.sqrt(np.mean(stated**2)) * factor == pytest.approx(actual, rel=4 / np.sqrt(2 * len(drawn)) + 0.03)
-    assert nominal.correlated(np.array([[1000.0]]), np.array([0.1]))[0, 0] == pytest.approx(1.0, abs=0.01)
+def test_plateaus_enter_with_the_errors_that_they_state(trial: StepTrial) -> None:
+    """Their means know that noise is slow: it must not be counted again."""
+    held = [one.plateau for one in trial.samples if one.plateau is not None and np.isfinite(one.plateau.std).all()]
+    known = evidence(trial.samples, trial.delays)
+    assert known.steady_std[:, [0, 2]] == pytest.approx(np.array([part.std for part in held]))
 
 
 @pytest.mark.slow

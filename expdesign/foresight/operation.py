@@ -24,11 +24,13 @@ from expdesign.monitoring import (
     Alarm,
     Calibration,
     Change,
+    Grams,
     Rules,
     State,
     calibrate,
     grams_of,
     joined,
+    later_part,
     stretch_length,
     threshold,
     watch,
@@ -196,18 +198,24 @@ def watched_voyage(
         true = changed(vessel, extended_model(vessel, short), hidden, size)
     record = voyage(true, forecast, length_s=length_s, seed=seed)
     ship = extended_model(vessel, record)
-    grams = grams_of(ship, record, changes, begins_s=[0.0], stretch_s=stretch_s)
+
+    def linearised(shift: Array, since_s: float = 0.0) -> Grams:
+        effects = {
+            change.effect: ship.get(change.effect) + change.size * value
+            for change, value in zip(changes, shift.tolist(), strict=True)
+            if value
+        }
+        part, begins_s = later_part(record, [0.0], since_s, stretch_s)
+        return grams_of(ship.with_effects(effects), part, changes, begins_s=begins_s, stretch_s=stretch_s)
+
     state, alarms, first = State.begun(calibration, time_s=0.0), list[Alarm](), 0
+    grams, rules = linearised(state.shift), Rules(limit=limit)
     while first < len(grams):
-        state, more, _, used = watch(calibration, state, grams.part(slice(first, None)), rules=Rules(limit=limit))
+        part = grams.part(slice(first, None))
+        state, more, _, used = watch(calibration, state, part, rules=rules, again=linearised)
         alarms, first = [*alarms, *more], first + used
         if first < len(grams):
-            effects = {
-                change.effect: ship.get(change.effect) + change.size * shift
-                for change, shift in zip(changes, state.shift.tolist(), strict=True)
-                if shift
-            }
-            grams = grams_of(ship.with_effects(effects), record, changes, begins_s=[0.0], stretch_s=stretch_s)
+            grams = linearised(state.shift)
     alarms += [] if state.alarm is None else [state.alarm]
     if not alarms:
         return Watched(delay_s=None)

@@ -53,7 +53,8 @@ class Calibration:
     force: Force  # the unmeasured force
     ramp: Array  # (o,) variances of what its accelerations grow by within a stretch
     baseline: Array  # (m,) differences of the ship from its model in the reference, in sizes of the changes
-    baseline_std: Array  # (m,) their standard errors, all free at once, with a prior of one size
+    # (m, m) covariance of their errors, all free at once, with a prior of one size, after inflation
+    baseline_covariance: Array
     inflation: Array  # (m,) variance of sums of scores over that of independent stretches, at least one
     rate: Array  # (m,) information of a stretch, on average, in inverse squared sizes and after inflation
     alike: Array  # (m, m) correlation of scores: one where two changes cannot be told apart
@@ -72,7 +73,7 @@ class Calibration:
             std="4",
             ramp="o",
             baseline="m",
-            baseline_std="m",
+            baseline_covariance="m m",
             inflation="m",
             rate="m",
             alike="m m",
@@ -95,6 +96,16 @@ class Calibration:
     def others(self) -> Force:
         """`nuisance` in each of the other weathers."""
         return self.seas.with_load(len(self.loads))
+
+    @property
+    def baseline_std(self) -> Array:
+        """(m,) standard errors of the baseline."""
+        return np.sqrt(np.diag(self.baseline_covariance))
+
+    def called(self, known: Known) -> Known:
+        """What is known of force and load after a port call, which may have changed the load."""
+        more = np.concatenate([np.zeros(len(self.force.time_s)), self.load[self.loads] ** 2])
+        return replace(known, covariance=known.covariance + np.diag(more))
 
     @property
     def watched(self) -> NDArray[np.bool_]:
@@ -147,7 +158,7 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
         ramp=ramp,
         force=force,
         baseline=baseline,
-        baseline_std=np.sqrt(np.diag(np.linalg.inv(whole + np.eye(m)))),
+        baseline_covariance=np.linalg.inv(whole + np.eye(m)) * np.sqrt(np.outer(inflation, inflation)),
         inflation=inflation,
         rate=np.diag(whole) / inflation / len(grams),
         alike=whole / np.outer(own, own),

@@ -21,29 +21,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration, misfit_of
+from expdesign.monitoring.alarms import REFINED, Again, beside_baseline, fits, raised, settling
+from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
-from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step, Sums
+from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step
 from expdesign.values import Array
 
-AS_LIKELY = 3.0  # difference of log-likelihood up to which another change explains the data as well
 WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
 WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond which the weather is unlike it
 # stretches of a sum from which a change of the ship is told from weather beyond the reference, and from which weather
 # is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
 WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
-APART = 0.02  # common weight below which a change cannot have raised the alarm of another
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
-UNEXPLAINED_SHARE = 0.1  # of the surprise, that the effects of large changes leave as they are not linear
-SETTLING_STRETCHES = 20  # fewest from which the size of a change is told
-REFINED = 0.2  # change of the size, in sizes that matter, below which it is refined no further
-CLEAR = 2.0  # standard errors from which a size from the data since the last refinement takes the place of that one
-# information, in inverse squared sizes, from which a change is settled; patience: factor of it where other changes
-# explain the data as well
-SETTLED = 60.0
-PATIENCE = 10.0
 LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its load is taken for the ship's, and again
 
 
@@ -56,12 +47,10 @@ MOST_CALLS = 100
 def called(state: State, calibration: Calibration, until_s: float) -> State:
     """The state after a port call that ends then: the load may be another."""
     loads, first = calibration.loads, len(state.known.mean) - len(calibration.loads)
-    more, taken = np.zeros(len(state.known.mean)), np.zeros(len(state.shift))
-    more[first:] = calibration.load[loads] ** 2
+    taken = np.zeros(len(state.shift))
     taken[loads] = -state.known.mean[first:]
     load = Load(since_s=until_s, stay_s=until_s - state.until_s, judged=0, rounds=0, taken=taken)
-    known = replace(state.known, covariance=state.known.covariance + np.diag(more))
-    return replace(state.with_known(known), load=load, calls=calls_of(state, calibration))
+    return replace(state.with_known(calibration.called(state.known)), load=load, calls=calls_of(state, calibration))
 
 
 def with_load(state: State, calibration: Calibration) -> State:
@@ -77,7 +66,8 @@ def with_load(state: State, calibration: Calibration) -> State:
     mean = state.known.mean.copy()
     mean[len(mean) - len(loads) :] = 0.0
     known = replace(state.known, mean=mean)
-    return replace(state.with_known(known), shift=state.shift + more, load=replace(load, taken=found))
+    sums = replace(state.sums, known_s=np.full(len(state.ratios), np.inf))
+    return replace(state.with_known(known), shift=state.shift + more, sums=sums, load=replace(load, taken=found))
 
 
 def load_of(state: State, calibration: Calibration) -> tuple[Array, Array]:
@@ -99,100 +89,12 @@ def calls_of(state: State, calibration: Calibration) -> tuple[Call, ...]:
     return (*state.calls, last)[-MOST_CALLS:]
 
 
-# Alarms: which change explains the data best, and how large it is once that is known.
-
-
-def raised(state: State, step: Step, place: int, calibration: Calibration) -> tuple[State, Alarm]:
-    """Raise an alarm of the sum with a number."""
-    pending = state.sums.one(place)
-    alarm = Alarm(time_s=state.until_s, since_s=float(pending.since_s[0]), statistic=step.statistic, change=step.change)
-    alarm = _attributed(alarm, pending, calibration, state.until_s)
-    return replace(state, alarm=alarm, pending=pending, before=state.shift), alarm
-
-
-def settling(state: State, alarm: Alarm, one: Judged, calibration: Calibration) -> State:
-    """The state with a stretch added to the estimate of the change that raised the alarm.
-
-    Once it is known well, the ship is changed by it. That is repeated with the data that follow, as the error is not
-    linear in large changes, until there is nothing left to change; then it is settled.
-    """
-    assert state.pending is not None
-    pending = state.pending.added(one)[0]
-    known, before = state.known, alarm
-    named = alarm.change if alarm.named else None
-    alarm = _attributed(alarm, pending, calibration, state.until_s, named=named, so_far=state.shift - state.before)
-    state = replace(state, alarm=alarm, pending=pending)
-    enough = pending.information[0][alarm.change, alarm.change] / calibration.common >= SETTLED * (
-        PATIENCE if alarm.as_likely else 1.0
-    )
-    if not enough or pending.count < SETTLING_STRETCHES:
-        if before.named and abs(alarm.value - before.value) < CLEAR * alarm.std:  # few data since the last size
-            alarm = replace(alarm, value=before.value, std=before.std)
-        return replace(state, alarm=alarm)
-    together = np.array([alarm.change, *alarm.as_likely])
-    inner = pending.information[0][np.ix_(together, together)] + np.eye(len(together))
-    found = np.linalg.solve(inner, pending.score[0][together])
-    shift = state.shift.copy()
-    shift[together] += found
-    m = len(shift)
-    every = np.ones(2 * m, dtype=bool)
-    return replace(
-        state.with_known(replace(known, mean=known.mean - pending.taken[0][:, together] @ found)),
-        ratios=np.zeros(2 * m),
-        sums=state.sums.again(every, state.until_s, state.rougher),
-        whole=state.whole.again(every[:1], state.until_s, state.rougher),
-        shift=shift,
-        alarm=replace(alarm, named=True, settled=bool(np.abs(found).max() < REFINED)),
-        pending=pending.again(every[:1], state.until_s, state.rougher),
-    )
-
-
-def _attributed(
-    alarm: Alarm,
-    pending: Sums,
-    calibration: Calibration,
-    now_s: float,
-    *,
-    named: int | None = None,
-    so_far: Array | float = 0.0,
-) -> Alarm:
-    """The change that explains the data since an alarm's beginning best, among those that are watched.
-
-    Args:
-        alarm: before.
-        pending: sums since then.
-        calibration: of the reference.
-        now_s: end of the data [s].
-        named: the change, where it was named by earlier data.
-        so_far: (m,) by which the ship was changed since the alarm.
-    """
-    score, information = pending.score[0], pending.information[0]
-    seen = calibration.weights @ calibration.weights[alarm.change] > APART
-    watched = np.flatnonzero(calibration.watched & seen)
-    known = np.maximum(np.diag(information)[watched], 1e-300)
-    gain = score[watched] ** 2 / known / (2.0 * calibration.common)
-    order = np.argsort(-gain)
-    best = int(order[0]) if named is None else int(np.flatnonzero(watched == named)[0])
-    rest = tuple(int(watched[k]) for k in order if k != best and gain[k] > gain[best] - AS_LIKELY)
-    inner = information[np.ix_(watched, watched)] + np.eye(len(watched))
-    together = float(score[watched] @ np.linalg.solve(inner, score[watched])) / (2.0 * calibration.common)
-    change = int(watched[best])
-    return replace(
-        alarm,
-        change=change,
-        value=float(score[change] / known[best] + (so_far if isinstance(so_far, float) else so_far[change])),
-        std=float(math.sqrt(calibration.common / known[best])),
-        as_likely=alarm.as_likely if alarm.named else rest,
-        unexplained=max(0.0, together - float(gain[best])),
-        judged_s=now_s,
-    )
-
-
 def estimates(state: State, calibration: Calibration) -> tuple[Array, Array]:
     """(m,) size of each change, had it alone happened when the watch began, and (m,) its standard error."""
-    known = np.diag(state.whole.information[0])
+    score, information = beside_baseline(state.whole, calibration)
+    known, wider = np.diag(information), np.maximum(calibration.inflation / calibration.common, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return state.whole.score[0] / known, np.sqrt(calibration.inflation / known)
+        return score / known, np.sqrt(wider / known)
 
 
 def threshold(watched: int, stretches: float) -> float:
@@ -201,7 +103,7 @@ def threshold(watched: int, stretches: float) -> float:
 
 
 def watch(
-    calibration: Calibration, state: State, grams: Grams, *, rules: Rules
+    calibration: Calibration, state: State, grams: Grams, *, rules: Rules, again: Again | None = None
 ) -> tuple[State, tuple[Alarm, ...], tuple[Step, ...], int]:
     """Go on watching for a while.
 
@@ -210,6 +112,7 @@ def watch(
         state: before.
         grams: of the stretches that follow, in order of time, linearised at the ship changed by `state.shift`.
         rules: threshold and port calls.
+        again: the stretches so far, those of `grams` among them; None where they are not kept.
 
     Returns:
         The state after them, alarms as they were raised and again when settled, the sums after every stretch, and the
@@ -231,23 +134,21 @@ def watch(
             continue
         own, loads = _less(products, calibration.baseline), calibration.loads
         one = judged(own, stretches.changes, state.known, loads=loads)
-        unlinear = UNEXPLAINED_SHARE * float(one.quadratic) / max(count, 1.0) if state.alarm is not None else 0.0
-        misfit = misfit_of(float(one.quadratic), one.score, one.information, count)
-        if misfit > calibration.misfit_limit + unlinear:
+        if not fits(one, count, calibration, changed=state.alarm is not None):
             state = replace(state, left_out_s=state.left_out_s + duration_s)
             continue
         surprised = calibration.weights @ surprise(own, stretches.changes, state.known, loads)
         weather = state.weather + (surprised / calibration.surprise - state.weather) / WEATHER_STRETCHES
-        before, state = state.rougher, _rougher(state, own, one, loads)
+        before, state = state, _rougher(state, own, one, loads)
         state = _counted(state, one, weather, calibration, duration_s, int(grams.kind[index]), grams.budget[index])
         if state.alarm is not None:
-            state = settling(state, state.alarm, one, calibration)
+            state = settling(state, one, calibration, again, rules)
             if state.alarm is not None and state.alarm.settled:
                 alarms.append(state.alarm)
                 state = replace(state, alarm=None, pending=None, weather=np.ones(len(weather)))
         else:
             state, step = _summed(state, one, before, begin_s, calibration)
-            state, alarm, step = _noticed(state, step, calibration, rules.limit, duration_s)
+            state, alarm, step = _noticed(state, step, calibration, rules, duration_s, again)
             steps.append(step)
             alarms += [] if alarm is None else [alarm]
         if state.shift is not ship:
@@ -287,7 +188,7 @@ def _counted(
 
 
 def _noticed(
-    state: State, step: Step, calibration: Calibration, limit: float, duration_s: float
+    state: State, step: Step, calibration: Calibration, rules: Rules, duration_s: float, again: Again | None
 ) -> tuple[State, Alarm | None, Step]:
     """Raise an alarm where a sum has passed the limit, unless weather explains it.
 
@@ -295,7 +196,7 @@ def _noticed(
     surge. Returns also the step with the largest sum that was compared with the limit.
     """
     m = len(state.shift)
-    passed = [int(place) for place in np.argsort(-state.ratios) if state.ratios[place] > limit]
+    passed = [int(place) for place in np.argsort(-state.ratios) if state.ratios[place] > rules.limit]
     if not passed:
         brief = state.brief + (state.undecided_s > 0)
         return with_load(replace(state, brief=brief, undecided_s=0.0), calibration), None, step
@@ -313,7 +214,7 @@ def _noticed(
             doubtful |= alike
         else:
             step = replace(step, statistic=float(state.ratios[place]), change=one)
-            state, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration)
+            state, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration, again, rules)
             explained_s = min(state.beyond_s, state.until_s - alarm.since_s)
             judged_s, left_out_s = state.judged_s + explained_s, state.left_out_s - explained_s
             return replace(state, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, step
@@ -321,7 +222,7 @@ def _noticed(
     state = replace(state, undecided_s=undecided_s, by_weather=state.by_weather + bool(explained.any()))
     if explained.any():
         both = np.tile(explained, 2)
-        sums = state.sums.again(both, state.until_s, state.rougher)
+        sums = state.sums.again(both, state)
         state = replace(state, ratios=np.where(both, 0.0, state.ratios), sums=sums)
     else:
         state = with_load(state, calibration)
@@ -364,11 +265,11 @@ def _waited(state: State, calibration: Calibration, until_s: float) -> State:
     )
 
 
-def _summed(state: State, one: Judged, before: Array, begin_s: float, calibration: Calibration) -> tuple[State, Step]:
+def _summed(state: State, one: Judged, before: State, begin_s: float, calibration: Calibration) -> tuple[State, Step]:
     """Add a stretch to all sums, or begin a sum with it where that is larger; sums below zero begin anew.
 
     The filter takes up a change in part, so that a sum which began too early hardly grows when the ship does change.
-    `before` is `State.rougher` before the stretch.
+    `before` is the state before the stretch.
     """
     sums, score, information = state.sums.added(one)
     m = score.shape[1]
@@ -384,4 +285,4 @@ def _summed(state: State, one: Judged, before: Array, begin_s: float, calibratio
     step = Step(time_s=state.until_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
         sums = sums.first(late & ~ended, one, begin_s, before)
-    return replace(state, ratios=ratios, sums=sums.again(ended, state.until_s, state.rougher)), step
+    return replace(state, ratios=ratios, sums=sums.again(ended, state)), step

@@ -7,6 +7,7 @@ current and steady accelerations, and how much these accelerations grow within t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -122,7 +123,15 @@ def grams_of(
     Raises:
         InputError: batches of different sample times.
     """
-    linear, known, columns, seen, begins = _simulated(ship, record, changes, begins_s, stretch_s)
+    return _grams(_simulated(ship, record, changes, begins_s, stretch_s), changes, noise, stretch_s=stretch_s)
+
+
+Simulated = tuple[LinearisedMotion, Sequence[Disturbance], Array, NDArray[np.bool_], Array]
+"""All stretches: motion, changes, columns X, S, F and e (c, w, s, 4), what is measured, and where batches begin."""
+
+
+def _grams(simulated: Simulated, changes: Sequence[Change], noise: Noise, *, stretch_s: float) -> Grams:
+    linear, known, columns, seen, begins = simulated
     windows = linear.motion.windows
     columns = whitened(columns, seen, linear.transition, noise, step_s=windows.step_s)
     table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
@@ -151,7 +160,7 @@ def _shoal(linear: LinearisedMotion) -> Array:
     return np.asarray((ship.draught_m / windows.depth_m).mean(axis=1))
 
 
-def noise_of(
+def grams_and_noise(
     ship: ExtendedModel,
     record: Record,
     changes: Sequence[Change],
@@ -159,9 +168,15 @@ def noise_of(
     begins_s: Sequence[float],
     stretch_s: float,
     known: Noise | None = None,
-) -> Noise:
-    """The noise within the stretches of a record, the known one where it fits; arguments as of `grams_of`."""
-    linear, acting, columns, seen, _ = _simulated(ship, record, changes, begins_s, stretch_s)
+) -> tuple[Grams, Noise]:
+    """`grams_of` with the noise that the record shows within stretches, the known one where it fits; and that noise."""
+    simulated = _simulated(ship, record, changes, begins_s, stretch_s)
+    noise = _noise_of(simulated, changes, known)
+    return _grams(simulated, changes, noise, stretch_s=stretch_s), noise
+
+
+def _noise_of(simulated: Simulated, changes: Sequence[Change], known: Noise | None) -> Noise:
+    linear, acting, columns, seen, _ = simulated
     keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
     windows, first = linear.motion.windows, len(changes) + STARTS
     columns = np.delete(columns, np.s_[first : first + _ramps(linear)], axis=0)  # they are noise themselves
@@ -173,8 +188,7 @@ def noise_of(
 
 def _simulated(
     ship: ExtendedModel, record: Record, changes: Sequence[Change], begins_s: Sequence[float], stretch_s: float
-) -> tuple[LinearisedMotion, Sequence[Disturbance], Array, NDArray[np.bool_], Array]:
-    """All stretches: motion, changes, columns X, S, F and e (c, w, s, 4), what is measured, and where batches begin."""
+) -> Simulated:
     parts, begins = _whole_stretches(record, begins_s, stretch_s)
     windows = cut_windows(ship.model, parts, longest_s=stretch_s)
     linear = linearise(simulate_from_measured(ship, windows))
@@ -197,6 +211,21 @@ def _whole_stretches(record: Record, begins_s: Sequence[float], stretch_s: float
                 parts.append(batch.cut(part))
                 begins.append(begin_s + part.start * batch.sample_time_s)
     return replace(record, batches=tuple(parts)), np.array(begins)
+
+
+def later_part(
+    record: Record, begins_s: Sequence[float], since_s: float, stretch_s: float
+) -> tuple[Record, tuple[float, ...]]:
+    """The whole stretches of a record since a time [s], with the rest, and when their batches begin [s]."""
+    parts, begins = list[Batch](), list[float]()
+    for batch, begin_s in zip(record.batches, begins_s, strict=True):
+        samples = max(1, round(stretch_s / batch.sample_time_s))
+        over_s = samples * batch.sample_time_s
+        first = samples * max(0, math.ceil((since_s - begin_s) / over_s - 1e-6))
+        if len(batch) - first >= FEWEST_ROWS:
+            parts.append(batch.cut(slice(first, len(batch))))
+            begins.append(begin_s + first * batch.sample_time_s)
+    return replace(record, batches=tuple(parts)), tuple(begins)
 
 
 def _durations(seen: NDArray[np.bool_], sample_s: float) -> Array:

@@ -42,6 +42,11 @@ class Sums:
     information: Array
     stretches: Array  # (n,) that were added
     rougher: Array  # (n, a) `State.rougher` before the first of them
+    # known_s: (n,) when what was known of the force and the load before the first was known [s], infinite where it
+    # was of another ship; mean, covariance: (n, f) and (n, f, f), as in `Known`
+    known_s: Array
+    mean: Array
+    covariance: Array
 
     @property
     def count(self) -> int:
@@ -49,37 +54,47 @@ class Sums:
         return int(self.stretches[0])
 
     @classmethod
-    def begun(cls, count: int, changes: int, forces: int, time_s: float, rougher: Array) -> Sums:
+    def begun(cls, count: int, changes: int, known: Known, time_s: float, rougher: Array) -> Sums:
         """Nothing yet."""
         return cls(
             since_s=np.full(count, time_s),
-            taken=np.zeros((count, forces, changes)),
+            taken=np.zeros((count, len(known.mean), changes)),
             score=np.zeros((count, changes)),
             information=np.zeros((count, changes, changes)),
             stretches=np.zeros(count),
             rougher=np.tile(rougher, (count, 1)),
+            known_s=np.full(count, time_s),
+            mean=np.tile(known.mean, (count, 1)),
+            covariance=np.tile(known.covariance, (count, 1, 1)),
         )
 
     def one(self, place: int) -> Sums:
         """Those of one beginning."""
         return Sums(**{name: values[place : place + 1] for name, values in vars(self).items()})
 
-    def again(self, places: np.ndarray, time_s: float, rougher: Array) -> Sums:
-        """The sums with some (n,) begun anew, at `State.rougher` (a,)."""
+    def again(self, places: np.ndarray, state: State) -> Sums:
+        """The sums with some (n,) begun anew at a state."""
         count, changes = self.score.shape
-        return self._where(places, Sums.begun(count, changes, self.taken.shape[1], time_s, rougher))
+        return self._where(places, Sums.begun(count, changes, state.known, state.until_s, state.rougher))
 
-    def first(self, places: np.ndarray, one: Judged, time_s: float, rougher: Array) -> Sums:
-        """The sums with some (n,) begun with a stretch, before which `State.rougher` was (a,)."""
+    def first(self, places: np.ndarray, one: Judged, time_s: float, before: State) -> Sums:
+        """The sums with some (n,) begun with a stretch at a time, before which the state was another."""
         begun = Sums(
             since_s=np.array([time_s]),
             taken=(one.gain @ one.seen[0])[None],
             score=one.score[None],
             information=one.information[None],
             stretches=np.ones(1),
-            rougher=rougher[None],
+            rougher=before.rougher[None],
+            known_s=np.array([before.until_s]),
+            mean=before.known.mean[None],
+            covariance=before.known.covariance[None],
         )
         return self._where(places, begun)
+
+    def less(self, change: Array) -> Sums:
+        """The sums with a change (m,) moved into the ship's model, and stretches counted anew."""
+        return replace(self, score=self.score - self.information @ change, stretches=np.zeros(len(self.stretches)))
 
     def _where(self, places: np.ndarray, other: Sums) -> Sums:
         return Sums(
@@ -101,13 +116,12 @@ class Sums:
             one.information - cross - np.swapaxes(cross, 1, 2)
             + np.swapaxes(self.taken, 1, 2) @ one.force_information @ self.taken
         )  # fmt: skip
-        after = Sums(
-            since_s=self.since_s,
+        after = replace(
+            self,
             taken=self.taken + one.gain @ (one.seen[0] - one.seen[1] @ self.taken),
             score=self.score + score,
             information=self.information + information,
             stretches=self.stretches + 1.0,
-            rougher=self.rougher,
         )
         return after, score, information
 
@@ -208,10 +222,10 @@ class State:
             rough=rough,
             rougher=rougher,
             ratios=np.zeros(2 * m),
-            sums=Sums.begun(2 * m, m, len(known.mean), time_s, rougher),
+            sums=Sums.begun(2 * m, m, known, time_s, rougher),
             shift=np.zeros(m),
             before=np.zeros(m),
-            whole=Sums.begun(1, m, len(known.mean), time_s, rougher),
+            whole=Sums.begun(1, m, known, time_s, rougher),
             load=Load(since_s=time_s, stay_s=0.0, judged=0, rounds=0, taken=np.zeros(m)),
             budget=Budget.begun(m),
             weather=np.ones(m),

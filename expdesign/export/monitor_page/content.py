@@ -280,22 +280,17 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     return text
 
 
-def known_std(calibration: Calibration) -> Array:
-    """(m,) standard errors of the baseline, with the correlation of neighbouring stretches."""
-    return np.asarray(calibration.baseline_std * np.sqrt(calibration.inflation))
-
-
 def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
     """(m,) differences of the ship from its file in the reference that are clear enough to be said."""
     size = np.abs(calibration.baseline)
-    return np.asarray((size > CLEAR * known_std(calibration)) & (size > LARGE))
+    return np.asarray((size > CLEAR * calibration.baseline_std) & (size > LARGE))
 
 
 def _baseline(content: MonitorContent) -> Iterator[str]:
     c = content.calibration
     off = [(i, content.changes[i]) for i in np.flatnonzero(said_of_reference(c)).tolist()]
     if off:
-        std = known_std(c)
+        std = c.baseline_std
         off.sort(key=lambda one: -abs(c.baseline[one[0]]) / std[one[0]])
         parts = [
             f"{change.words} {change.in_words(c.baseline[i] * change.size, std[i] * change.size)}" for i, change in off

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from expdesign.errors import NotInformative
 from expdesign.step_trials.samples import Delays, StepSample
-from expdesign.step_trials.tuning import TUNING
 from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
@@ -76,8 +75,6 @@ def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
     plateaus = [part for _, part in held]
     sway_std = [part.sway_std if math.isfinite(part.sway_std) else math.inf for part in plateaus]
     std = np.array([[part.std[0], wide, part.std[1]] for part, wide in zip(plateaus, sway_std, strict=True)])
-    usual_s = np.array([_usual_s(samples, channel) for channel in (0, 1, 1)])
-    std *= correlated(np.array([part.duration_s for part in plateaus])[:, None], usual_s)
     steps = [(one, *middle) for one in samples if (middle := _middle(one)) is not None]
     return Evidence(
         steady=States(
@@ -100,42 +97,6 @@ def evidence(samples: Sequence[StepSample], delays: Delays) -> Evidence:
         log_std=np.array([max(error, LEAST_LOG_STD) for *_, error in steps]),
         delay_std_s=np.array([std if math.isfinite(std) else 0.0 for _, std in delays]),
     )
-
-
-def correlated(duration_s: Array, constant_s: Array) -> Array:
-    """Factors on standard errors from the means of blocks, for a state that disturbances move as slowly as commands do.
-
-    Blocks shorter than the time constant T are correlated. With the variance over a time L of the mean of noise of
-    correlation exp(-t / T),
-
-        V(L) = 2 T / L (1 - T / L (1 - exp(-L / T))),
-
-    the blocks' own variance is V(L / b) - V(L), and b - 1 of it stand for V(L).
-
-    Args:
-        duration_s: of means, shape (n, 1).
-        constant_s: of states, shape (m,).
-
-    Returns:
-        (n, m), at least 1.
-
-    Source: M. B. Priestley, Spectral Analysis and Time Series (1981), 5.3.
-    """
-
-    def variance(share: Array) -> Array:
-        return np.asarray(2.0 / share * (1.0 + np.expm1(-share) / share))
-
-    shares, blocks = duration_s / constant_s, TUNING.steady_blocks
-    whole = variance(shares)
-    return np.maximum(np.sqrt((blocks - 1) * whole / (variance(shares / blocks) - whole)), 1.0)
-
-
-def _usual_s(samples: Sequence[StepSample], channel: int) -> float:
-    """Median time constant of the steps of a command that count [s]."""
-    own = [
-        one.response.time_constant_s for one in samples if one.counts and one.hold.channel == channel and one.response
-    ]
-    return float(np.median(own)) if own else SHORTEST_S
 
 
 def _middle(one: StepSample) -> tuple[float, float] | None:

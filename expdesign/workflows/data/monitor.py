@@ -32,7 +32,7 @@ from expdesign.monitoring import (
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
-from expdesign.workflows.data.watched_ship import VESSEL, Asked, Read, check_model, prepared
+from expdesign.workflows.data.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
 from expdesign.workflows.data.watching import (
     HOUR,
     Learning,
@@ -64,7 +64,13 @@ def restored_watch(table: Mapping[str, Any]) -> Watch:
         reading=_reading(table["reading"]),
         phase=_phase(table["phase"]),
         roll=restored_roll(table["roll"]),
+        late=tuple(map(_late, table["late"])),
     )
+
+
+def _late(table: Mapping[str, Any]) -> Late:
+    noise, time_s = restored_noise(table["noise"]), np.array(table["time_s"], float)
+    return Late(text=table["text"], time_s=time_s, offset_s=float(table["offset_s"]), noise=noise)
 
 
 def _phase(table: Mapping[str, Any]) -> Learning | Ready | Watching:

@@ -11,7 +11,17 @@ from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import FileError, InputError
 from expdesign.kinematics import in_stated_time
-from expdesign.monitoring import WHITE, Change, Grams, Noise, grams_of, noise_of, stretch_length, watched_changes
+from expdesign.monitoring import (
+    WHITE,
+    Change,
+    Grams,
+    Noise,
+    grams_and_noise,
+    grams_of,
+    later_part,
+    stretch_length,
+    watched_changes,
+)
 from expdesign.monitoring.yaw import (
     KEY,
     YAW_MODELS,
@@ -80,12 +90,21 @@ def ship_and_changes(
 
 
 def ship_grams(
-    ship: Ship, record: Record, changes: Sequence[Change], *, begins_s: Sequence[float], stretch_s: float, noise: Noise
-) -> Grams:
-    """Inner products of all stretches of a record."""
+    ship: Ship,
+    record: Record,
+    changes: Sequence[Change],
+    *,
+    begins_s: Sequence[float],
+    stretch_s: float,
+    known: Noise | None,
+    fixed: bool = False,
+) -> tuple[Grams, Noise]:
+    """Inner products of all stretches of a record, and the noise within: the known one where it is fixed or fits."""
     if isinstance(ship, YawShip):
-        return yaw_grams(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s)
-    return grams_of(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, noise=noise)
+        return yaw_grams(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s), WHITE
+    if known is not None and fixed:
+        return grams_of(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, noise=known), known
+    return grams_and_noise(ship, record, changes, begins_s=begins_s, stretch_s=stretch_s, known=known)
 
 
 # Pieces of operational data as records with their inner products, which processes may prepare ahead of the watch.
@@ -143,12 +162,38 @@ class Read:
     begins_s: tuple[float, ...]  # time at which each batch begins, in the clock of the file [s]
     grams: Grams  # inner products, linearised at the ship with some changes; times in the clock of the file
     known: Known  # what they are for
+    noise: Noise  # within their stretches
     notes: tuple[str, ...]  # on the ship
 
     def at(self, known: Known, asked: Asked, *, offset_s: float) -> Grams:
         """Inner products for what is known, with times that are later."""
-        grams = self.grams if known.same(self.known) else _linearised(self.record, self.begins_s, known, asked)[0]
+        same = known.same(self.known)
+        grams = self.grams if same else _linearised(self.record, self.begins_s, known, asked)[0]
         return replace(grams, time_s=grams.time_s + offset_s)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Late:
+    """The rows of a piece that was watched, in which a change may have begun that is noticed later."""
+
+    text: str  # header and rows
+    time_s: Array  # (k,) of the rows [s]
+    offset_s: float  # added to these times
+    noise: Noise  # within the stretches
+
+    def record(self, asked: Asked) -> tuple[Record, tuple[float, ...]]:
+        """The rows as a record, and the time at which each batch begins, in the clock of the file [s]."""
+        return _record_of(asked, self.text, self.time_s)
+
+    def since(
+        self, since_s: float, record: Record, begins_s: Sequence[float], known: Known, asked: Asked
+    ) -> Grams | None:
+        """Inner products of the stretches of its record since a time [s]; None where there are none."""
+        part, begins = later_part(record, begins_s, since_s - self.offset_s, asked.stretch_s)
+        if not part.batches:
+            return None
+        grams = _linearised(part, begins, replace(known, noise=self.noise), asked, fixed=True)[0]
+        return replace(grams, time_s=grams.time_s + self.offset_s)
 
 
 @dataclass(frozen=True)
@@ -171,20 +216,25 @@ def prepared(asked: Asked, text: str, time_s: Array, known: Known) -> Read | Unr
     if len(time_s) < FEWEST_LINES:
         return None
     try:
-        with as_file(text) as path:
-            record = measured([path], asked.vessel, velocity=asked.velocity, undo=False)
-            record = in_stated_time(record, asked.vessel.sensors)
+        record, begins = _record_of(asked, text, time_s)
     except FileError as error:
         return Unread(error.key, error.problem)
-    begins = tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
-    grams, known, notes = _linearised(record, begins, known, asked)
-    return Read(record=record, begins_s=begins, grams=grams, known=known, notes=notes)
+    grams, known, noise, notes = _linearised(record, begins, known, asked)
+    return Read(record=record, begins_s=begins, grams=grams, known=known, noise=noise, notes=notes)
+
+
+def _record_of(asked: Asked, text: str, time_s: Array) -> tuple[Record, tuple[float, ...]]:
+    """Rows as a record, and the time at which each batch begins [s]."""
+    with as_file(text) as path:
+        record = measured([path], asked.vessel, velocity=asked.velocity, undo=False)
+        record = in_stated_time(record, asked.vessel.sensors)
+    return record, tuple(float(time_s[batch.first_row - FIRST_ROW]) for batch in record.batches)
 
 
 def _linearised(
-    record: Record, begins_s: Sequence[float], known: Known, asked: Asked
-) -> tuple[Grams, Known, tuple[str, ...]]:
-    """Inner products with what they are for, and notes on the ship.
+    record: Record, begins_s: Sequence[float], known: Known, asked: Asked, *, fixed: bool = False
+) -> tuple[Grams, Known, Noise, tuple[str, ...]]:
+    """Inner products with what they are for, the noise in them, and notes on the ship.
 
     Where no changes are known, those of the ship of this record, and its noise. Where another noise is clear in the
     record, as in another sea, that is the one of the inner products.
@@ -192,18 +242,14 @@ def _linearised(
     ship, changes, notes = ship_and_changes(
         asked.model, asked.vessel, record, known.changes, size=asked.size, stretch_s=asked.stretch_s
     )
-    first, noise = not known.changes, known.noise
-    if not isinstance(ship, YawShip):
-        before = None if first else known.noise
-        noise = noise_of(ship, record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, known=before)
-    if first:
-        known = Known(changes=changes, shift=np.zeros(len(changes)), noise=noise)
+    first, shift = not known.changes, known.shift if known.changes else np.zeros(len(changes))
     effects = {
         change.effect: ship.get(change.effect) + change.size * value
-        for change, value in zip(changes, known.shift.tolist(), strict=True)
+        for change, value in zip(changes, shift.tolist(), strict=True)
         if value
     }
-    found = ship_grams(
-        ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s, noise=noise
-    )
-    return found, known, notes
+    grams, noise = ship_grams(
+        ship.with_effects(effects), record, changes, begins_s=begins_s, stretch_s=asked.stretch_s,
+        known=None if first else known.noise, fixed=fixed,
+    )  # fmt: skip
+    return grams, Known(changes=changes, shift=shift, noise=noise) if first else known, noise, notes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from expdesign.export.monitor_page import Moment
 from expdesign.monitoring import (
     TUNING,
     WHITE,
+    Again,
     Alarm,
     Calibration,
     Change,
@@ -33,8 +35,9 @@ from expdesign.records import STREAM, Piece, Taken
 from expdesign.roll import Run
 from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_source
 from expdesign.signals import Record
+from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Read, Unread
+from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Late, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
 """Time from the end of a file to the beginning of the next, where its times begin again [s]."""
@@ -42,6 +45,8 @@ CORRECTION_S = 120.0
 """Time by which a clock that is put back is taken to have been corrected [s]."""
 MOST_SAVED_ROWS = 7200
 """Largest number of rows saved since a change, for a diagnosis."""
+KEPT_ROWS = 7200
+"""Rows before the last piece that are kept, at least where there are so many: a change may have begun in them."""
 MOST_MOMENTS = 1000
 """Largest number of moments kept for the page."""
 HOUR, DAY = 3600.0, 86_400.0
@@ -115,6 +120,7 @@ class Watch:
     reading: Reading = Reading()  # how far the data have been read
     phase: Learning | Ready | Watching = Learning()  # what is known of the ship
     roll: RollWatch = field(default_factory=RollWatch)  # what is known of its roll
+    late: tuple[Late, ...] = ()  # the last pieces
 
 
 def after_reading(now: Watch, piece: Piece, read: Read | Unread | None) -> Watch:
@@ -256,15 +262,38 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
         return now
     on = now.phase if isinstance(now.phase, Watching) else _begun(now.phase, float(grams.time_s[first]))
     raised = list[Alarm]()
+    late = _latest((*now.late, Late(text=piece.text, time_s=piece.time_s, offset_s=offset_s, noise=read.noise)))
+    again = _again(late, known_of(now), asked)
     while first < len(grams):
         before = on.state
-        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked))
+        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked), again)
         raised += more
         first += used
         if on.state.shift is not before.shift and first < len(grams):
             grams = read.at(replace(known_of(now), shift=on.state.shift), asked, offset_s=offset_s)
     changed = _changed(on, piece, raised, offset_s)[: MOST_SAVED_ROWS + 1]
-    return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed))
+    return replace(now, phase=replace(on, moments=_fewer(on.moments), changed=changed), late=late)
+
+
+def _again(late: Sequence[Late], known: Known, asked: Asked) -> Again:
+    """Stretches of the last pieces, linearised anew."""
+
+    @cache
+    def record(number: int) -> tuple[Record, tuple[float, ...]]:
+        return late[number].record(asked)
+
+    def again(shift: Array, since_s: float) -> Grams:
+        ship = replace(known, shift=shift)
+        parts = [one.since(since_s, *record(number), ship, asked) for number, one in enumerate(late)]
+        return joined([part for part in parts if part is not None])
+
+    return again
+
+
+def _latest(late: Sequence[Late]) -> tuple[Late, ...]:
+    """The last piece, and of those before as many as `KEPT_ROWS` asks for."""
+    rows = np.cumsum([len(one.time_s) for one in late[-2::-1]])
+    return tuple(late[-2 - int(np.searchsorted(rows, KEPT_ROWS)) :])
 
 
 def known_of(now: Watch) -> Known:
@@ -281,9 +310,9 @@ def _begun(ready: Ready, time_s: float) -> Watching:
     )
 
 
-def _hour(on: Watching, grams: Grams, rules: Rules) -> tuple[Watching, list[Alarm], int]:
+def _hour(on: Watching, grams: Grams, rules: Rules, again: Again) -> tuple[Watching, list[Alarm], int]:
     """Watch the stretches of one moment of the page; returns the alarms raised and the number of stretches used."""
-    state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules)
+    state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules, again=again)
     value, std = estimates(state, on.calibration)
     statistic = max((step.statistic for step in steps if step.compared), default=0.0)
     moment = Moment(time_s=state.until_s, statistic=statistic, value=value, std=std)
