@@ -49,7 +49,7 @@ class Style:
         if self.south:
             table |= {"lat": -table["lat"], "lon": -table["lon"]}
         kept = [name for name in NAMES if name not in self.without]
-        cells = {name: f"{{:.{ {'lat': 8, 'lon': 8}.get(name, 4)}f}}".format for name in kept} | {
+        cells = {name: f"{{:.{ {'lat': 8, 'lon': 8}.get(name, 4) }f}}".format for name in kept} | {
             "time": lambda t: f"{when(t):%Y-%m-%dT%H:%M:%S}Z",
             **self.cells,
         }

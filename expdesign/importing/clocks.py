@@ -41,7 +41,13 @@ def clock_of(numbers: Mapping[str, Array], stamps: Mapping[str, Stamps], units: 
         stamps: columns of texts that are times.
         units: of columns, where a row of units says them.
     """
-    for found in (_of_both(stamps), _of_parts(numbers), _of_weeks(numbers), _of_clocks(stamps), _of_numbers(numbers, units)):
+    for found in (
+        _of_both(stamps),
+        _of_parts(numbers),
+        _of_weeks(numbers),
+        _of_clocks(stamps),
+        _of_numbers(numbers, units),
+    ):
         if found is not None:
             break
     else:

@@ -100,7 +100,11 @@ def _place_unit(
     largest, other = float(np.abs(lat.values).max()), float(np.abs(lon.values).max())
     minutes = max(float((np.abs(own.values) % 100.0).max()) for own in (lat, lon))
     if largest <= MOST_DEGREES["lat_deg"] and other <= 2 * MOST_DEGREES["lon_deg"]:
-        if largest <= np.pi / 2 and other <= np.pi + 1e-6 and (ratio := _going_by(lat, lon, channels, chosen)) is not None:
+        if (
+            largest <= np.pi / 2
+            and other <= np.pi + 1e-6
+            and (ratio := _going_by(lat, lon, channels, chosen)) is not None
+        ):
             if ratio.explained > FIT and ratio.value < RADIANS_RATIO:
                 return "rad", f"; in radians, as {ratio.of} moves by what the speed says"
         return "deg", ""
@@ -109,7 +113,11 @@ def _place_unit(
     if largest < 100.0 * MOST_DEGREES["lat_deg"] and other < 100.0 * MOST_DEGREES["lon_deg"] and minutes < 60.0:
         negative = bool((lat.values < 0).any() or (lon.values < 0).any())
         return "ddmm", "; degrees and minutes run together" + ("" if negative else " (scale = -1.0 for S or W)")
-    return ("1e-7 deg", "; in units of 1e-7 degrees") if largest > 1e6 else (SWAPPED, f"; up to {largest:.4g}, no latitude")
+    return (
+        ("1e-7 deg", "; in units of 1e-7 degrees")
+        if largest > 1e6
+        else (SWAPPED, f"; up to {largest:.4g}, no latitude")
+    )
 
 
 def _of_depth(use: Use, channel: Channel) -> Use:

@@ -55,7 +55,15 @@ UNITS = {
     **dict.fromkeys(("min", "mins", "minutes", "minute"), 60.0), **dict.fromkeys(("h", "hr", "hour", "hours"), 3600.0),
     **dict.fromkeys(("d", "days"), DAY_S),
 }  # fmt: skip
-UNIT_WORDS = {1.0: "in s", 1e-3: "in ms", 1e-6: "in us", 1e-9: "in ns", 60.0: "in min", 3600.0: "in h", DAY_S: "in days"}
+UNIT_WORDS = {
+    1.0: "in s",
+    1e-3: "in ms",
+    1e-6: "in us",
+    1e-9: "in ns",
+    60.0: "in min",
+    3600.0: "in h",
+    DAY_S: "in days",
+}
 LONGEST_STEP_S = 20.0
 """Usual step of numbers without unit beyond which these are milliseconds, or a thousandth of that."""
 SHORTEST_STEP_S = 5e-4

@@ -21,6 +21,8 @@ from expdesign.importing.units import counted
 BLOCK_BYTES = 1 << 22  # read at once
 SNIFFED = 400  # lines that a dialect is told from
 MOST_COLUMNS = 2000
+
+
 def read_text(path: Path, sample_time_s: float) -> Log:
     """The log.
 
@@ -107,6 +109,10 @@ def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
         yield f"left out {counted(sentences.garbled, 'line')} with a $ but no whole sentence"
     if sentences.no_numbers:
         yield f"left out {counted(sentences.no_numbers, 'reading')} of transducers (XDR) without a number"
+    for what, count in sentences.doubtful.most_common():
+        yield f"used {counted(count, 'position')} that no satellite gave: {what}"
+    for datum, count in sentences.datums.most_common():
+        yield f"positions are of the datum {datum} by {counted(count, 'sentence')} (DTM), and may be off by 100 m and more"
     if sentences.unchecked:
         yield f"used {counted(sentences.unchecked, 'sentence')} without a checksum"
     if other:
@@ -115,6 +121,7 @@ def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
             if other == 1
             else (f"left out {other} lines that are no sentences")
         )
+
 
 def is_text(path: Path, head: bytes) -> bool:
     """Whether a file may be text: the last reader that is asked."""
