@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.importing import Channel, Sampled, Stretch, cut_by_plan, lag_of
+from expdesign.importing import Channel, Sampled, Stretch, cut_by_plan, lag_of, zone_lag_of
 from expdesign.importing.channels import set_right
 from expdesign.signals import Commands
 from logged_trial import (
@@ -192,6 +192,27 @@ def test_a_computers_clock_is_held_against_what_a_receiver_saw(late_s: float, tm
     _, said, out = run_import(bridge, tmp_path / "plc.csv", options=("--map", str(out / "mapping.toml")))
     assert np.allclose(columns_of(said, out)["reached_rudder1_rad"], before["reached_rudder1_rad"])
     assert not late_s or "are added to its times, as the mapping says" in notes_of(said)
+
+
+@pytest.mark.parametrize(
+    ("late_s", "told"),
+    [
+        (7200.0, "of a zone 2 h after the other's"), (-5 * 3600.0 + 1.3, "of a zone 5 h before the other's"),
+        (5.75 * 3600.0, "of a zone 5.75 h after the other's"), (-1024 * 604800.0, "1 times 1024 weeks behind"),
+        (-1024 * 604800.0 + 3600.0, "and of a zone 1 h after"), (30 * 86400.0, ""), (600.0, ""),
+    ],
+)  # fmt: skip
+def test_a_clock_of_another_zone_or_week_is_set_by_what_both_saw(late_s: float, told: str, trip: Voyage) -> None:
+    part = trip.every(10)
+    own, other = (
+        {"heading_rad": Channel(name="h", source="a", time_s=part.time_s + late, values=part.heading_rad)}
+        for late in (late_s, 0.0)
+    )
+    found = zone_lag_of(own, other)
+    assert (found is not None) == bool(told)
+    if found is not None:
+        assert abs(found[0].offset_s + late_s) < max(0.1, 4 * found[0].std_s)
+        assert told in found[1]
 
 
 def test_lags_of_noisy_series_are_within_their_standard_errors() -> None:
