@@ -157,7 +157,7 @@ def import_logs(
         rejected=tuple(rejected),
         followed=followed(table), sensors=sensor_keys(found), notes=tuple(notes),
         origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-        version=__version__,
+        version=__version__, vessel=str(vessel or "VESSEL.toml"),
     )  # fmt: skip
     progress("writing", 0.95)
     document = import_document(content, folder)
