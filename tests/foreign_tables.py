@@ -1,4 +1,4 @@
-"""A voyage as tables of loggers that write one thing or another their own way: clocks, places, angles, words, headers."""
+"""A voyage as tables of loggers that write some things their own way: clocks, places, angles, words, headers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from logged_trial import Voyage
 
 KNOT = 1852 / 3600
 NAMES = {"time": "Time", "lat": "Latitude", "lon": "Longitude", "sog": "SOG [kn]", "cog": "COG", "hdg": "Heading",
-         "rot": "ROT [deg/min]", "rpm": "RPM", "order": "Rudder order [deg]", "rudder": "Rudder angle [deg]"}  # fmt: skip
+         "rot": "ROT [deg/min]", "rpm": "RPM", "order": "Rudder order [deg]",
+         "rudder": "Rudder angle [deg]"}  # fmt: skip
 Cell = Callable[[float], str]
 
 
@@ -86,6 +87,11 @@ def of_day(t: float) -> float:
     return (when(t) - when(t).replace(hour=0, minute=0, second=0, microsecond=0)) / timedelta(seconds=1)
 
 
+def gps(t: float) -> float:
+    """Seconds since 1980 of the time of GPS, 18 s before UTC."""
+    return (when(t) - datetime(1980, 1, 6, tzinfo=UTC)).total_seconds() + 18.0
+
+
 EAST_2 = timezone(timedelta(hours=2))
 CLOCKS: dict[str, Style] = {
     "ticks of .NET": Style(names={"time": "Timestamp"}, cells={"time": ticks(year(1), 1e7)}),
@@ -104,7 +110,7 @@ CLOCKS: dict[str, Style] = {
     "minutes": Style(dated=False, names={"time": "Time (min)"}, cells={"time": lambda t: f"{of_day(t) / 60:.6f}"}),
     "week and seconds of GPS": Style(
         names={"time": "GPS Week|GPS TOW [s]"},
-        cells={"time": lambda t: "{:.0f}|{:.3f}".format(*divmod((when(t) - datetime(1980, 1, 6, tzinfo=UTC)).total_seconds() + 18, 604800))},
+        cells={"time": lambda t: "{:.0f}|{:.3f}".format(*divmod(gps(t), 604800.0))},
     ),
     "14 digits": Style(cells={"time": lambda t: f"{when(t):%Y%m%d%H%M%S}"}),
     "names of months": Style(cells={"time": lambda t: f"{when(t):%d-%b-%Y %H:%M:%S}"}),
@@ -146,7 +152,8 @@ PLACES: dict[str, Style] = {
     ),
     "the side first": Style(
         south=True,
-        cells={"lat": lambda x: f"S{int(-x)} {60 * (-x % 1):.6f}", "lon": lambda x: f"W{int(-x):03d} {60 * (-x % 1):.6f}"},
+        cells={"lat": lambda x: f"S{int(-x)} {60 * (-x % 1):.6f}",
+        "lon": lambda x: f"W{int(-x):03d} {60 * (-x % 1):.6f}"},
         separator=";",
     ),
     "degrees and minutes in two columns": Style(
@@ -182,7 +189,8 @@ ANGLES: dict[str, Style] = {
 }  # fmt: skip
 WORDS: dict[str, Style] = {
     "German": Style(separator=";", encoding="cp1252", names={
-        "time": "Uhrzeit", "lat": "Breite", "lon": "Länge", "sog": "Fahrt über Grund [kn]", "cog": "Kurs über Grund [°]",
+        "time": "Uhrzeit", "lat": "Breite", "lon": "Länge", "sog": "Fahrt über Grund [kn]",
+        "cog": "Kurs über Grund [°]",
         "hdg": "Steuerkurs [°]", "rot": "Wendegeschwindigkeit [°/min]", "rpm": "Drehzahl [U/min]",
         "order": "Ruder Soll [°]", "rudder": "Ruder Ist [°]"}),
     "French": Style(separator=";", encoding="cp1252", names={
@@ -191,7 +199,8 @@ WORDS: dict[str, Style] = {
         "order": "Barre consigne (°)", "rudder": "Barre mesurée (°)"}),
     "Finnish": Style(separator=";", names={
         "time": "Aika", "lat": "Leveysaste", "lon": "Pituusaste", "sog": "Nopeus pohjan suhteen [kn]",
-        "cog": "Kurssi pohjan suhteen", "hdg": "Keulasuunta", "rot": "Kääntymisnopeus [°/min]", "rpm": "Kierrosluku [rpm]",
+        "cog": "Kurssi pohjan suhteen", "hdg": "Keulasuunta", "rot": "Kääntymisnopeus [°/min]",
+        "rpm": "Kierrosluku [rpm]",
         "order": "Peräsin ohje", "rudder": "Peräsinkulma"}),
     "Swedish": Style(separator=";", names={
         "time": "Tid", "lat": "Latitud", "lon": "Longitud", "sog": "Fart över grund [knop]", "cog": "Kurs över grund",
@@ -214,7 +223,8 @@ WORDS: dict[str, Style] = {
         "cog": "Rotta sul fondo", "hdg": "Prua vera", "rot": "Velocità di accostata [°/min]", "rpm": "Giri [rpm]",
         "order": "Timone comando", "rudder": "Timone"}),
     "Japanese": Style(encoding="cp932", names={
-        "time": "時刻", "lat": "緯度", "lon": "経度", "sog": "対地速力[kn]", "cog": "対地針路[deg]", "hdg": "船首方位[deg]",
+        "time": "時刻", "lat": "緯度", "lon": "経度", "sog": "対地速力[kn]", "cog": "対地針路[deg]",
+        "hdg": "船首方位[deg]",
         "rot": "回頭角速度[deg/min]", "rpm": "プロペラ回転数[rpm]", "order": "命令舵角[deg]", "rudder": "舵角[deg]"}),
     "Chinese": Style(encoding="utf-8-sig", names={
         "time": "时间", "lat": "纬度", "lon": "经度", "sog": "对地航速[kn]", "cog": "对地航向", "hdg": "艏向",

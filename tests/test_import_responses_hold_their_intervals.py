@@ -68,7 +68,8 @@ def test_standard_errors_hold_over_seeds(case: str) -> None:
             assert len(found[name]) <= 1, name
             continue
         assert len(found[name]) >= 18, name  # of one told at three standard errors or more
-        # of 20 standard normal numbers the mean square is 1 +- 0.32; a rate that is read in steps of a fifth of a move
-        # errs by up to 1.5 times as much as is stated
-        assert 0.1 < np.mean(np.square(found[name])) < 2.25, name
-        assert np.mean(np.abs(found[name]) < 2.0) >= 0.8, name
+        # of 20 standard normal numbers the mean square is 1 +- 0.32, and 19 +- 1 are within 2; a slew rate whose
+        # readings are a fifth of a move apart errs by up to 1.6 times as much as is stated
+        coarse = name == "rate" and case.startswith("1 Hz")
+        assert 0.1 < np.mean(np.square(found[name])) < (2.6 if coarse else 2.0), name
+        assert np.mean(np.abs(found[name]) < 2.0) >= (0.7 if coarse else 0.8), name

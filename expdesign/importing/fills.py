@@ -63,7 +63,7 @@ def _fills(values: Array) -> Iterator[float]:
 
 def _at_zero(log: Log) -> Iterator[tuple[int, np.ndarray]]:
     """(identity of a channel, (k,) where latitude and longitude beside each other are both 0)."""
-    places = {"lat_deg": {}, "lon_deg": {}}  # type: dict[str, dict[tuple[str, str], Channel]]
+    places: dict[str, dict[tuple[str, str], Channel]] = {"lat_deg": {}, "lon_deg": {}}
     for channel in log.channels:
         if (column := marked(channel).column) in places:
             places[column].setdefault(family_of(channel), channel)

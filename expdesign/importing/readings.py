@@ -53,7 +53,7 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
             use, unit=unit, why=f"its name; {unit} as stated" if mark.unit else f"its name; size {largest:.3g}"
         )
     if kind == "place":
-        unit, why = (mark.unit, " and unit") if mark.unit else _place_unit(*_places(channel, chosen), channels, chosen)
+        unit, why = (mark.unit, " and unit") if mark.unit else _place_unit(*_places(channel, chosen), chosen)
         return replace(use, column="" if unit == SWAPPED else mark.column, unit=unit, why=f"its name{why}")
     if kind in ("length", "acceleration"):
         return replace(use, unit=mark.unit or {"length": "m", "acceleration": "mps2"}[kind])
@@ -93,20 +93,15 @@ def _places(channel: Channel, chosen: dict[tuple[str, ...], Channel]) -> tuple[C
     return found.get("lat_deg", channel), found.get("lon_deg", channel)
 
 
-def _place_unit(
-    lat: Channel, lon: Channel, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]
-) -> tuple[str, str]:
+def _place_unit(lat: Channel, lon: Channel, chosen: dict[tuple[str, ...], Channel]) -> tuple[str, str]:
     """Unit of latitude and longitude, which is the same, by their sizes, and words on it."""
     largest, other = float(np.abs(lat.values).max()), float(np.abs(lon.values).max())
     minutes = max(float((np.abs(own.values) % 100.0).max()) for own in (lat, lon))
     if largest <= MOST_DEGREES["lat_deg"] and other <= 2 * MOST_DEGREES["lon_deg"]:
-        if (
-            largest <= np.pi / 2
-            and other <= np.pi + 1e-6
-            and (ratio := _going_by(lat, lon, channels, chosen)) is not None
-        ):
-            if ratio.explained > FIT and ratio.value < RADIANS_RATIO:
-                return "rad", f"; in radians, as {ratio.of} moves by what the speed says"
+        small = largest <= np.pi / 2 and other <= np.pi + 1e-6
+        ratio = _going_by(lat, lon, chosen) if small else None
+        if ratio is not None and ratio.explained > FIT and ratio.value < RADIANS_RATIO:
+            return "rad", f"; in radians, as {ratio.of} moves by what the speed says"
         return "deg", ""
     if largest <= MOST_DEGREES["lon_deg"] and other <= MOST_DEGREES["lat_deg"] and lat is not lon:
         return SWAPPED, f"; up to {largest:.4g}, which no latitude is: is it the longitude?"
@@ -162,7 +157,7 @@ def _parts_of_degrees(channel: Channel, chosen: dict[tuple[str, ...], Channel]) 
     if lat is not lon and len(lat) == len(lon) and lat.source == channel.source:
         times, step = _common(channel, lat)
         if times is not None:
-            north, east = _metres(lat, lon, marked(lat).unit or _place_unit(lat, lon, (), chosen)[0])
+            north, east = _metres(lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
             way = _steps(np.interp(times, lat.time_s, north) + 1j * np.interp(times, lat.time_s, east), step)
             at = times[: len(way)] + step * (times[1] - times[0]) / 2
             nearest = values[np.clip(np.searchsorted(channel.time_s, at), 0, len(values) - 1)]
@@ -232,13 +227,11 @@ def _going(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str
     lat, lon = (next((c for key, c in chosen.items() if key[0] == name), None) for name in ("lat_deg", "lon_deg"))
     if lat is None or lon is None or len(lat) != len(lon) or lat.source != channel.source:
         return None
-    return _way(channel, lat, lon, marked(lat).unit or _place_unit(lat, lon, (), chosen)[0])
+    return _way(channel, lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
 
 
-def _going_by(
-    lat: Channel, lon: Channel, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]
-) -> _Ratio | None:
-    """The way over ground, as if places were in degrees, by the integral of the speed, in m/s where nothing says more."""
+def _going_by(lat: Channel, lon: Channel, chosen: dict[tuple[str, ...], Channel]) -> _Ratio | None:
+    """The way over ground, as if places were in degrees, by the integral of the speed; m/s where nothing says more."""
     speed = next((own for key, own in chosen.items() if key[0] in (SOG, "u_mps") and own.source == lat.source), None)
     if speed is None or len(lat) != len(lon) or lat is lon:
         return None

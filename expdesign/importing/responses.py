@@ -3,7 +3,9 @@
     x' = clip((order - x) / 0, -rate, rate)     the position that slews towards the order
     reached(t) + lag reached'(t) = x(t - delay) + offset
 
-which is the response of vessel files (`expdesign.vessel.Response`), fitted to the readings by least squares.
+which is the response of vessel files (`expdesign.vessel.Response`), fitted to the readings by least squares. An order
+that is read at even times was given some time before its reading; that of each move is found beside. Readings a second
+apart give a rate that errs by up to 1.6 times its standard error.
 """
 
 from __future__ import annotations

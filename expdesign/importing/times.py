@@ -27,11 +27,12 @@ MONTHS = {
     for word in words.split()
 }  # fmt: skip
 """First letters of a month's name -> its number."""
+WEEKDAY, MONTH, DATED = r"(?:[A-Za-z]{2,9}[.,]? +)?", r"(?P<mon>[A-Za-z]{3})[a-z]*", r"\b[T,: ]*(?P<rest>.*)"
 NAMED = (
-    re.compile(r"(?:[A-Za-z]{2,9}[.,]? +)?(?P<d>\d{1,2})[-./ ]+(?P<mon>[A-Za-z]{3})[a-z]*[-./, ]+(?P<y>\d{4}|\d\d)\b[T,: ]*(?P<rest>.*)"),
-    re.compile(r"(?:[A-Za-z]{2,9}[.,]? +)?(?P<mon>[A-Za-z]{3})[a-z]*\.? +(?P<d>\d{1,2}),? +(?P<y>\d{4})\b[T,: ]*(?P<rest>.*)"),
-    re.compile(r"(?:[A-Za-z]{2,9}[.,]? +)?(?P<mon>[A-Za-z]{3})[a-z]*\.? +(?P<d>\d{1,2}) +(?P<rest>\d{1,2}:\d\d:\d\d\S*) +(?P<y>\d{4})"),
-)  # fmt: skip
+    re.compile(rf"{WEEKDAY}(?P<d>\d{{1,2}})[-./ ]+{MONTH}[-./, ]+(?P<y>\d{{4}}|\d\d){DATED}"),
+    re.compile(rf"{WEEKDAY}{MONTH}\.? +(?P<d>\d{{1,2}}),? +(?P<y>\d{{4}}){DATED}"),
+    re.compile(rf"{WEEKDAY}{MONTH}\.? +(?P<d>\d{{1,2}}) +(?P<rest>\d{{1,2}}:\d\d:\d\d\S*) +(?P<y>\d{{4}})"),
+)
 """Dates with the name of a month."""
 TIME_NAME = re.compile(
     r"\b(time|utc|timestamp|stamp|datetime|date|epoch|clock|t|secs?|seconds?|received at|doy|julian|mjd|tow|"
@@ -42,13 +43,14 @@ ZONE_NAME = re.compile(r"\b(?:UTC|GMT)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
 EARLIEST_S, LATEST_S = 7.9e8, 2.21e9
 """Of times since 1970: the years 1995 to 2040 [s]."""
 EPOCHS = (
-    (1e-9, 0.0, "ns since 1970"), (1e-6, 0.0, "us since 1970"), (1e-3, 0.0, "ms since 1970"), (1.0, 0.0, "s since 1970"),
+    (1e-9, 0.0, "ns since 1970"), (1e-6, 0.0, "us since 1970"), (1e-3, 0.0, "ms since 1970"),
+    (1.0, 0.0, "s since 1970"),
     (1e-7, 62_135_596_800.0, "ticks of 100 ns since the year 1"),
     (1e-7, 11_644_473_600.0, "ticks of 100 ns since 1601"), (1.0, 2_082_844_800.0, "s since 1904"),
     (DAY_S, 25569.0 * DAY_S, "days of a spreadsheet"), (DAY_S, 719_529.0 * DAY_S, "days of datenum"),
     (DAY_S, 2_440_587.5 * DAY_S, "Julian days"), (DAY_S, 40587.0 * DAY_S, "modified Julian days"),
 )  # fmt: skip
-"""Factor to seconds, seconds from the epoch to 1970, and words; the first that gives a year from 1995 to 2040 counts."""
+"""Factor to seconds, seconds from the epoch to 1970, words; the first that gives a year from 1995 to 2040 counts."""
 UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "seconds", "second"), 1.0), **dict.fromkeys(("ms", "msec", "millis"), 1e-3),
     **dict.fromkeys(("us", "micros"), 1e-6), **dict.fromkeys(("ns", "nanos"), 1e-9),

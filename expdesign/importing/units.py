@@ -9,16 +9,17 @@ import unicodedata
 from expdesign.importing.translations import in_english, without_eastern
 from expdesign.records.file import ANGLE, REVOLUTIONS, SPEED, YAW_RATE
 
-DEGREE = math.pi / 180.0
+DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 FACTORS: dict[str, dict[str, float]] = {
     "angle": {**ANGLE, "°": DEGREE, "degree": DEGREE, "grad": DEGREE, "cdeg": 0.01 * DEGREE, "ddeg": 0.1 * DEGREE},
-    "speed": {**SPEED, "m/sec": 1.0, "mm/s": 1e-3, "km/hr": 1.0 / 3.6, "mph": 0.44704, **dict.fromkeys(("nds", "noeuds", "knop", "knoop", "knopen", "knoten", "solmu", "nudos", "nodi"),
-                                          1852.0 / 3600.0)},
+    "speed": {**SPEED, "m/sec": 1.0, "mm/s": 1e-3, "km/hr": 1.0 / 3.6, "mph": 0.44704,
+              **dict.fromkeys(("nds", "noeuds", "knop", "knoop", "knopen", "knoten", "nudos", "nodi"), KNOT)},
     "rate": {**YAW_RATE, "°/s": DEGREE, "°/min": DEGREE / 60.0, "deg/sec": DEGREE, "degrees/s": DEGREE,
              "deg/m": DEGREE / 60.0, "rad/sec": 1.0, "mrad/s": 1e-3, "r/s": 1.0},
     "place": {"deg": 1.0, "°": 1.0, "degrees": 1.0, "degree": 1.0, "rad": 1.0 / DEGREE, "1e-7 deg": 1e-7, "ddmm": 1.0},
     "length": {"m": 1.0, "km": 1e3, "cm": 0.01, "mm": 1e-3, "ft": 0.3048, "meters": 1.0, "metres": 1.0, "nm": 1852.0},
-    "revolutions": {**REVOLUTIONS, "1/s": 1.0, "r/min": 1.0 / 60.0, "u/min": 1.0 / 60.0, "tr/min": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "min-1": 1.0 / 60.0},
+    "revolutions": {**REVOLUTIONS, "1/s": 1.0, "r/min": 1.0 / 60.0,
+                    **dict.fromkeys(("u/min", "tr/min", "rev/min", "min-1"), 1.0 / 60.0)},
     "acceleration": {"mps2": 1.0, "m/s2": 1.0, "m/s^2": 1.0, "m/s/s": 1.0, "g": 9.80665, "mg": 9.80665e-3},
     "force": {"": 1.0},
 }  # fmt: skip

@@ -18,8 +18,8 @@ WITH_UNIT = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+))\s*([A-Za-z%°º/]+(?:
 SIDED = re.compile(r"\s*(?P<a>[A-Za-z]*)\.?\s*(?P<number>\d+(?:[.,]\d*)?)\s*°?\s*(?P<b>[A-Za-z]*)\s*")
 PLACE = re.compile(
     r"\s*(?P<sign>[+-])?\s*(?P<a>[NSEWO])?\s*(?P<deg>\d{1,3}(?:[.,]\d+)?)"
-    r"(?:\s*[°ºd:\s-]\s*(?P<min>\d{1,2}(?:[.,]\d+)?))?\s*(?:['′’m:\s]\s*(?P<sec>\d{1,2}(?:[.,]\d+)?))?"
-    r"\s*[°º'′’\"″”sm]*\s*(?P<b>[NSEWO])?\s*"
+    r"(?:\s*[°ºd:\s-]\s*(?P<min>\d{1,2}(?:[.,]\d+)?))?\s*(?:['\u2032\u2019m:\s]\s*(?P<sec>\d{1,2}(?:[.,]\d+)?))?"
+    r"\s*[°º'\u2032\u2019\"\u2033\u201dsm]*\s*(?P<b>[NSEWO])?\s*"
 )
 """A latitude or longitude, as `54°30.12'N`, `S 33 51 31.2` or `-33°51'31.2"`."""
 PACKED = re.compile(r"\s*(?P<a>[NSEWO])?\s*(?P<deg>\d{2,3})(?P<min>\d{2}(?:[.,]\d+)?)\s*(?P<b>[NSEWO])?\s*")
@@ -35,8 +35,11 @@ def filled(cells: Sequence[str]) -> list[str]:
 
 
 def kind_of(name: str, cells: Sequence[str]) -> str:
-    """What a column holds: "number", "unit ..." for numbers with that unit, "place", "sided", "side", a kind of stamp
-    (`Stamps.kind`), or "text"."""
+    """What a column holds.
+
+    Returns:
+        "number", "unit ..." for numbers with that unit, "place", "sided", "side", "text", or a kind of `Stamps`.
+    """
     own = filled(cells)
 
     def mostly(count: int) -> bool:

@@ -10,7 +10,6 @@ from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Log, channel
 from expdesign.importing.clocks import Clock, clock_of
 from expdesign.importing.times import TIME_NAME, read_stamps
 from expdesign.importing.units import split_unit, words
-from expdesign.values import Array
 
 MOST_COLUMNS = 64
 """Columns of one array beyond which it is an image or a map."""

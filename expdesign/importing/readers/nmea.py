@@ -56,7 +56,7 @@ MACHINES = {
     "TRD": ("thrusternum", (("rpmresponse", "rpm actual", "rpmmode", "rpm"),
                             ("azimuthresponse", "azimuth actual", "", "deg"))),
 }  # fmt: skip
-"""Sentences on one engine, shaft or thruster of several -> field of its number, and fields with words, mode and unit."""
+"""Sentences on one machine of several -> field of its number, and fields with words, field of the mode, and unit."""
 MAKERS = {"PSXN": ("23", {"roll": 1, "heading": 3}), "PASHR": ("", {"heading": 1, "roll": 3})}
 """Sentences of makers -> first field, and places of what is read: Seapath's motion, and attitude as many send it."""
 DOUBTS = {"GGA": ("quality", {"6": "estimated", "7": "put in by hand", "8": "simulated"}),
@@ -103,8 +103,8 @@ class Sentences:
                 self.garbled += 1
                 continue
             name = found[1]
-            own = MAKERS.get(name)
-            if own and not (own[0] and not line[found.end() :].startswith(f"{own[0]},")):
+            maker = MAKERS.get(name)
+            if maker and not (maker[0] and not line[found.end() :].startswith(f"{maker[0]},")):
                 kept.setdefault(name, []).append((place, line[: found.start()], line[found.start() + 1 :].rstrip(ENDS)))
                 continue
             if name[-3:] not in FIELDS or name[0] == "P":
@@ -139,8 +139,8 @@ class Sentences:
             return [row[at[field]] if at[field] < len(row) else "" for row in rows]
 
         if kind in DOUBTS:
-            field, marks = DOUBTS[kind]
-            self.doubtful.update(f"{marks[mark]} ({name})" for mark in column(field) if mark in marks)
+            doubtful, words = DOUBTS[kind]
+            self.doubtful.update(f"{words[mark]} ({name})" for mark in column(doubtful) if mark in words)
         if kind == "DTM":
             self.datums.update(datum for datum in column("datum") if datum not in WGS84)
         elif kind in MACHINES:

@@ -112,7 +112,8 @@ def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
     for what, count in sentences.doubtful.most_common():
         yield f"used {counted(count, 'position')} that no satellite gave: {what}"
     for datum, count in sentences.datums.most_common():
-        yield f"positions are of the datum {datum} by {counted(count, 'sentence')} (DTM), and may be off by 100 m and more"
+        told = counted(count, "sentence")
+        yield f"positions are of the datum {datum} by {told} (DTM), and may be off by 100 m and more"
     if sentences.unchecked:
         yield f"used {counted(sentences.unchecked, 'sentence')} without a checksum"
     if other:
