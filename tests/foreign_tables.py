@@ -210,6 +210,10 @@ WORDS: dict[str, Style] = {
         "time": "Tid", "lat": "Bredde", "lon": "Lengde", "sog": "Fart over grunn [knop]", "cog": "Kurs over grunn",
         "hdg": "Heading", "rot": "Girhastighet [°/min]", "rpm": "Turtall [rpm]", "order": "Ror ordre",
         "rudder": "Rorvinkel"}),
+    "Danish": Style(separator=";", names={
+        "time": "Tid", "lat": "Breddegrad", "lon": "Længdegrad", "sog": "Fart over grund [knob]",
+        "cog": "Kurs over grund", "hdg": "Styret kurs", "rot": "Drejehastighed [°/min]", "rpm": "Omdrejninger [rpm]",
+        "order": "Ror ordre", "rudder": "Ror målt"}),
     "Dutch": Style(separator=";", names={
         "time": "Tijd", "lat": "Breedtegraad", "lon": "Lengtegraad", "sog": "Snelheid over de grond [kn]",
         "cog": "Grondkoers", "hdg": "Koers voorliggend", "rot": "Draaisnelheid [°/min]", "rpm": "Toerental [rpm]",

@@ -28,7 +28,7 @@ LATIN = {
     "rudder": "ruderlage|ruderwinkel|ruder|angle de barre|barre|safran|gouvernail|perasinkulma|perasin|rodervinkel|"
     "rorvinkel|roder|ror|roerhoek|roerstand|roer|angulo de timon|timon|angolo di timone|timone",
     "order": "soll|sollwert|consigne|ohje|asetusarvo|borvarde|ordre|gewenst|gewenste|orden|comando",
-    "actual": "istwert|ist|mesuree?|reelle?|mitattu|toteutunut|arvarde|gemeten|medido|reale|misurato",
+    "actual": "istwert|ist|malt|mesuree?|reelle?|mitattu|toteutunut|arvarde|gemeten|medido|reale|misurato",
     "time": "uhrzeit|zeit|zeitstempel|heure|horodatage|aika|aikaleima|tid|tidpunkt|tidspunkt|tijd|tijdstip|hora|ora",
     "date": "datum|paivays|paivamaara|pvm|dato|fecha",
     "roll": "krangung|rollwinkel|gite|roulis|kallistus|keinunta|krangning|rullning|rulling|helling|escora|"

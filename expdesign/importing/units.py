@@ -13,7 +13,7 @@ DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 FACTORS: dict[str, dict[str, float]] = {
     "angle": {**ANGLE, "°": DEGREE, "degree": DEGREE, "grad": DEGREE, "cdeg": 0.01 * DEGREE, "ddeg": 0.1 * DEGREE},
     "speed": {**SPEED, "m/sec": 1.0, "mm/s": 1e-3, "km/hr": 1.0 / 3.6, "mph": 0.44704,
-              **dict.fromkeys(("nds", "noeuds", "knop", "knoop", "knopen", "knoten", "nudos", "nodi"), KNOT)},
+              **dict.fromkeys(("nds", "noeuds", "knop", "knob", "knoop", "knopen", "knoten", "nudos", "nodi"), KNOT)},
     "rate": {**YAW_RATE, "°/s": DEGREE, "°/min": DEGREE / 60.0, "deg/sec": DEGREE, "degrees/s": DEGREE,
              "deg/m": DEGREE / 60.0, "rad/sec": 1.0, "mrad/s": 1e-3, "r/s": 1.0},
     "place": {"deg": 1.0, "°": 1.0, "degrees": 1.0, "degree": 1.0, "rad": 1.0 / DEGREE, "1e-7 deg": 1e-7, "ddmm": 1.0},
