@@ -150,6 +150,8 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
         "{0:%m/%d/%Y},{0:%H:%M:%S.%f},",
         "cnav\t{0:%Y:%j:%H:%M:%S.%f}\t",
         "[{0:%d.%m.%Y %H:%M:%S.%f}] ",
+        "s330 {0:%Y-%m-%d:%H:%M:%S.%f} ",
+        "{0:%d-%b-%Y %H:%M:%S.%f} ",
         "{1:.3f} ",
         "{2:.0f};",
         "\\s:gps,c:{1:.0f}*55\\",
@@ -188,6 +190,20 @@ SENTENCES = {
     "IIRSA,-12.3,V,4.5,A": {"IIRSA.portangle": 4.5},
     "IIRPM,S,1,-120.5,80,A": {"IIRPM.rpm shaft 1 starboard": -120.5},
     "IIRPM,E,2,1500,80,A": {"IIRPM.rpm engine 2 port": 1500.0},
+    "IIROR,12.5,A,-3.0,A,B": {"IIROR.rudder order starboard": 12.5, "IIROR.rudder order port": -3.0},
+    "IIROR,12.5,V,,V,B": {},
+    "IIPRC,50.0,A,90.0,R,,V,B,1": {"IIPRC.rpm order engine 1 starboard": 90.0},
+    "IIPRC,50.0,A,75.0,P,,V,B,0": {"IIPRC.rpm order engine 0": 75.0},
+    "IITRC,1,120.0,R,,V,,B,A": {"IITRC.rpm order thruster 1 bow": 120.0},
+    "IITRC,2,80.0,P,,V,345.5,B,A": {
+        "IITRC.rpm order thruster 2 stern": 80.0, "IITRC.azimuth order thruster 2 stern": 345.5,
+    },
+    "IITRD,2,118,R,,V,344": {
+        "IITRD.rpm actual thruster 2 stern": 118.0, "IITRD.azimuth actual thruster 2 stern": 344.0,
+    },
+    "PSXN,23,-2.82,1.00,235.18,-1.66": {"PSXN.roll": -2.82, "PSXN.heading": 235.18},
+    "PSXN,20,1,0,0,0": {},
+    "PASHR,120000.50,235.18,T,-2.82,+1.00,-1.66,0.1,0.1,0.2,1": {"PASHR.heading": 235.18, "PASHR.roll": -2.82},
     "TIROT,-45.7,A": {"TIROT.rot": -45.7},
     "TIROT,-45.7,V": {},
     "HEHDT,271.25,T": {"HEHDT.headingT": 271.25},
@@ -220,6 +236,21 @@ def test_each_sentence_is_read_as_its_definition_says(body: str, tmp_path: Path)
     assert {channel.name: channel.values[0] for channel in log.channels} == pytest.approx(SENTENCES[body], abs=1e-9)
     assert all(abs(channel.time_s[0] - 1_760_011_200.0) < 1e-6 for channel in log.channels)
     assert log.clock == "satellite time"
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("GPDTM,OHI,,0.0,N,0.0,E,0.0,W84", "positions are of the datum OHI by 2 sentences (DTM)"),
+        ("GPGGA,120000.00,3722.4,N,12258.9,W,8,12,0.7,0.82,M,,M,,", "no satellite gave: simulated (GPGGA)"),
+        ("GPGGA,120000.00,3722.4,N,12258.9,W,6,12,0.7,0.82,M,,M,,", "no satellite gave: estimated (GPGGA)"),
+        ("GPRMC,120000.00,A,3722.4,N,12258.9,W,0.1,1.0,091025,,,M", "no satellite gave: put in by hand (GPRMC)"),
+    ],
+)
+def test_doubts_that_sentences_state_are_told(body: str, told: str, tmp_path: Path) -> None:
+    clock = ["GPZDA,120000.00,09,10,2025,00,00", "GPZDA,120001.00,09,10,2025,00,00"]
+    (tmp_path / "a.log").write_text("\n".join(map(sentence, [clock[0], body, clock[1], body])) + "\n")
+    assert told in "\n".join(read_log(tmp_path / "a.log").notes)
 
 
 def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.cli.app import app
 from expdesign.errors import FileError
 from expdesign.export import vessel_toml
 from expdesign.importing import Channel, sampled, sensor_keys
@@ -190,3 +191,55 @@ def test_velocities_every_five_seconds_give_the_parameters(tmp_path: Path) -> No
     errors = [relative_errors(imported_bridge(tmp_path, seed, **how)) for seed in range(5)]
     # each of these has a standard deviation of 1 to 2 per cent
     assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 0.05
+
+
+SCENARIO = """[scenario]
+vessel = "ship.toml"
+dictionary = "none.toml"
+area = "none.toml"
+[design]
+total_s = 600
+{prior}
+[start]
+north_m = 0
+east_m = 0
+heading_deg = 0
+[goal]
+north_m = 0
+east_m = 0
+heading_deg = 0
+"""
+COMMANDS = {
+    "estimate": "estimate log0/a.csv --vessel ship.toml", "diagnose": "diagnose log0/a.csv --vessel ship.toml",
+    "indices": "indices log0/a.csv --vessel ship.toml", "mine": "mine log0/a.csv --vessel ship.toml --keep 1",
+    "monitor": "monitor log0/a.csv --vessel ship.toml", "folder": "estimate log0 --vessel ship.toml",
+    "identify-steps": "identify-steps log0/a.csv --vessel ship.toml",
+    "watch-steps": "watch-steps log0/a.csv --vessel ship.toml --steps none.csv",
+    "roll": "roll log0/a.csv --vessel ship.toml --loads none.toml",
+    "replan": "replan scenario.toml --data log0/a.csv",
+    "replan, vessel": "replan scenario.toml --data log0/a.csv --vessel ship.toml",
+    **{name: f"{name} prior.toml" for name in ("durations", "score", "plan", "run", "foresee", "validate")},
+    "whatif": "whatif prior.toml prior.toml",
+}  # fmt: skip
+"""Every command that reads measured data, with data in log0."""
+WITHOUT = {"import", "new", "nominal", "roll-plan", "export", "check-route", "simulate", "incline", "explain", "web"}
+"""Commands that read none: logs, plans and particulars only."""
+
+
+@pytest.mark.parametrize("case", COMMANDS)
+def test_every_command_that_reads_measured_data_reads_what_an_import_tells_beside_it(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders(tmp_path, SHIP, "[sensors]\nheading = 0.1\n")  # a key that is none, so that reading it is refused
+    (tmp_path / "log0" / "a.csv").write_text("time_s,u_mps\n0,1\n1,1\n")
+    (tmp_path / "scenario.toml").write_text(SCENARIO.format(prior=""))
+    (tmp_path / "prior.toml").write_text(SCENARIO.format(prior='prior_data = ["log0/a.csv"]'))
+    monkeypatch.chdir(tmp_path)
+    assert main([*COMMANDS[case].split(), "--quiet"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "log0/instruments.toml: sensors.heading: is not a known key" in line
+
+
+def test_no_command_is_forgotten() -> None:
+    known = {words.split()[0] for words in COMMANDS.values()} | WITHOUT
+    assert {info.name or info.callback.__name__.replace("_", "-") for info in app.registered_commands} == known

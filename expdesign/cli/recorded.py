@@ -70,8 +70,8 @@ def import_(
     """Turn logs, as ships and craft record them, into runs that the other commands read.
 
     Writes a CSV file for each run, mapping.toml with all decisions, instruments.toml with what the logs tell of
-    sensors and actuators, import.json and import.html. estimate, diagnose, mine, monitor and indices take the folder,
-    and use instruments.toml where the vessel file says nothing.
+    sensors and actuators, import.json and import.html. Every command that reads measured runs takes the folder,
+    and uses instruments.toml where the vessel file says nothing.
 
     Example: expdesign import bridge.nmea rudder.csv --vessel ship.toml
     """

@@ -44,6 +44,7 @@ class ImportContent:
     dated: bool  # whether it counts from 1970
     # command, version: to reproduce it
     command: str
+    vessel: str  # file that was given, or a word for one
     version: str
 
 
@@ -154,8 +155,8 @@ def _text(value: str) -> str:
 def instruments_toml(content: ImportContent) -> str:
     """What the logs tell of actuators and sensors, which commands read that are given the folder."""
     lines = [
-        "# What the logs tell of sensors and actuators, by keys of vessel files. estimate, diagnose, mine, monitor and",
-        "# indices use it where the vessel file says nothing, and say so. Change or delete what is wrong.",
+        "# What the logs tell of sensors and actuators, by keys of vessel files. Commands that read the runs use it",
+        "# where the vessel file says nothing, and say so. Change or delete what is wrong.",
         f"# Made by: {content.command}",
     ]
     if content.sensors:
@@ -269,7 +270,11 @@ def import_document(content: ImportContent, folder: Path) -> Document:
                 ),
             ),
             *parts,
-            *([section("Next", Listing((f"expdesign estimate {folder} --vessel VESSEL.toml",)))] if steered else []),
+            *(
+                [section("Next", Listing((f"expdesign estimate {folder} --vessel {content.vessel}",)))]
+                if steered
+                else []
+            ),
         ),
         notes=content.notes,
         command=content.command,

@@ -21,6 +21,10 @@ from expdesign.values import Array
 
 BLOCKS = 8
 FEWEST = 4  # blocks that must agree
+SAME = 0.8  # least squared correlation of one quantity that tells a zone
+QUARTER_S, FARTHEST_ZONE_S = 900.0, 14.5 * 3600.0  # of which zones are multiples, and the farthest of them
+ROLLOVER_S = 1024 * 7 * 86400.0
+"""After so long a receiver that knows ten bits of the week begins anew."""
 STEP_S = (0.05, 1.0)  # of the series that are compared, at least and at most [s]
 NEAR_S = 120.0  # by which a computer's clock may be off [s]
 LIKE = 0.3  # least squared correlation that tells a lag
@@ -63,6 +67,25 @@ def lag_of(own: Mapping[str, Channel], other: Mapping[str, Channel], *, near: bo
         if lag is not None:
             found.append(lag)
     return max(found, key=lambda lag: (lag.explained > LIKE, -lag.std_s), default=None)
+
+
+def zone_lag_of(own: Mapping[str, Channel], other: Mapping[str, Channel]) -> tuple[Lag, str] | None:
+    """What is to be added to a dated clock that is of another zone, or weeks of GPS behind, and words; None for none.
+
+    A lag counts only where both saw the same, and where it is whole quarters of an hour, or 1024 weeks, but for what a
+    computer's clock may be off.
+    """
+    lag = lag_of(own, other, near=False)
+    if lag is None or lag.explained < SAME:
+        return None
+    weeks = round(lag.offset_s / ROLLOVER_S)
+    late_s = lag.offset_s - weeks * ROLLOVER_S
+    quarters = round(late_s / QUARTER_S)
+    if abs(late_s) > FARTHEST_ZONE_S or abs(late_s - quarters * QUARTER_S) > NEAR_S or not (weeks or quarters):
+        return None
+    words = [f"{abs(weeks)} times 1024 weeks {'behind' if weeks > 0 else 'ahead'}, as receivers count after a rollover"]
+    hours = f"of a zone {abs(quarters) / 4:g} h {'after' if quarters < 0 else 'before'} the other's"
+    return lag, ", and ".join([*words * bool(weeks), *[hours] * bool(quarters)])
 
 
 def _pairs(own: Mapping[str, Channel], other: Mapping[str, Channel]) -> Iterator[tuple[_Series, _Series, str]]:

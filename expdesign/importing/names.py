@@ -21,9 +21,9 @@ RULES = (
     ("wind_angle_rad", 0, r"\bawa\b|mwv angle r\b|(rel\w*|app\w*|vane)?.*wind (angle|dir\w*)"),
     ("wind_speed_mps", 0, r"\baws\b|mwv speed r\b|(rel\w*|app\w*)?.*wind (speed|spd)"),
     ("lat_deg", 0, r"\b(gga|gns|gps|fix|global position)\b.*\b(lat\w*)\b"),
-    ("lat_deg", 1, r"\b(lat|latitude|breite|breitengrad)\b"),
+    ("lat_deg", 1, r"\b(lat|latitude)\b"),
     ("lon_deg", 0, r"\b(gga|gns|gps|fix|global position)\b.*\b(lon\w*|lng)\b"),
-    ("lon_deg", 1, r"\b(lon|lng|long|longitude|laenge|lange|langengrad)\b"),
+    ("lon_deg", 1, r"\b(lon|lng|long|longitude)\b"),
     ("roll_rate_radps", 0, r"\b(roll ?(rate|speed)|rollspeed|gyr\w* x|angular velocity x|xgyro|gx|rx)\b"),
     ("r_radps", 0, r"\b(rot|rate of turn|yaw ?rate|rate yaw|yawspeed|turn rate|r)$|\brot\b"),
     ("r_radps", 1, r"\b(gyr\w* z|angular velocity z|zgyro|gz|rz)\b"),
@@ -31,7 +31,7 @@ RULES = (
     ("imu_lateral_mps2", 0, r"\b(acc\w* y|linear acceleration y|yacc|ay|lateral acceleration)\b"),
     (MAGNETIC, 2, r"\b(heading|hdg|hding) (m|mag\w*)\b|\b(magnetic|mag) (heading|hdg)\b"),
     (VARIATION, 0, r"\b(variation|mv|declination|magvar)\b"),
-    (COG, 0, r"\b(kurs uber grund|course over ground|course made good)\b"),
+    (COG, 0, r"\b(course over ground|course made good)\b"),
     ("heading_rad", 0, r"\b(heading t|headt|true (heading|hdg)|(heading|hdg|hding) true|hdt|ths|gyro heading)\b"),
     ("heading_rad", 1, r"\b(att|attitude) (yaw|heading)\b|\b(heading|hdg|hding|psi|kurs|hdg t)\b"),
     ("heading_rad", 2, r"\b(yaw|compass|gyro)\b"),
@@ -39,18 +39,18 @@ RULES = (
     (NORTHWARD, 0, r"\b(vn|vel n|v north|velocity north)\b|\blocal position ned vx\b|global position int vx"),
     (EASTWARD, 0, r"\b(ve|vel e|v east|velocity east)\b|\blocal position ned vy\b|global position int vy"),
     (SOG, 0, r"\b(sogn|sog|speed over ground|ground ?speed|gps speed|gps spd|rmc spd)\b"),
-    (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit( uber grund)?|velocity|groundspeed)$"),
+    (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit|nopeus|velocity|groundspeed)$"),
     ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge speed)$"),
     ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway speed)$"),
-    ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth|tiefe)\b"),
+    ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth)\b"),
     ("north_m", 2, r"\b(north|northing|pn)\b"),
     ("east_m", 2, r"\b(east|easting|pe)\b"),
-    ("rudder", 0, r"\b(rudder\d*|rsa|rud|helm|steering|ruder|ruderlage|ruderwinkel|nozzle|roer)\b"),
+    ("rudder", 0, r"\b(rudder\d*|rsa|rud|helm|steering|nozzle)\b"),
     ("a", 0, r"\b(azi|azimuth|azim|pod angle|thruster angle|azi angle)\b"),
     (
         "n",
         0,
-        r"\b(rpm\d*|rps|drehzahl|revs|revolutions|shaft speed|prop(eller)? speed)\b|^(?!.*\bpos).*(^|\s)n( ?\d+)?$",
+        r"\b(rpm\d*|rps|revs|revolutions|shaft speed|prop(eller)? speed)\b|^(?!.*\bpos).*(^|\s)n( ?\d+)?$",
     ),
     ("throttle", 0, r"\b(throttle|thrust|thruster|motor|engine order|power lever|lever)\b"),
 )
@@ -58,8 +58,8 @@ RULES = (
 first column of all, "", is of what is no measurement of the ship's own motion."""
 ACTUATORS = ("rudder", "a", "n", "throttle")
 ACTUATOR_RULES = tuple(rule for rule in RULES if rule[0] in ACTUATORS)
-ORDER = r"\b(order\w*|cmd|command\w*|set|setpoint|sp|demand|dem|req\w*|soll|desired|des|ref)\b"
-REACHED = r"\b(act|actual|fb|fbk|feedback|meas\w*|resp\w*|ist|rsa|reached|pos|position)\b"
+ORDER = r"\b(order\w*|cmd|command\w*|set|setpoint|sp|demand|dem|req\w*|desired|des|ref|target|tgt|wanted)\b"
+REACHED = r"\b(act|actual|fb|fbk|feedback|meas\w*|resp\w*|rsa|reached|pos|position)\b"
 PORT, STARBOARD = r"\b(p|port|portangle|ps|bb|left|l)\b", r"\b(s|stbd|stbdangle|sb|starboard|stb|right|r)\b"
 BOW = r"\b(bow|bt|tunnel|thr bow|fwd|forward)\b"
 BESIDE = ("roll_rad", "roll_rate_radps", "depth_m", "wind_speed_mps", "wind_angle_rad", "imu_lateral_mps2")

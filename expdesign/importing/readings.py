@@ -18,6 +18,10 @@ RADIANS = {"heading_rad": 6.4, MAGNETIC: 6.4, COG: 6.4, "roll_rad": 1.6, "rudder
            "wind_angle_rad": 6.4}  # fmt: skip
 """Largest size of an angle in radians, by column or kind."""
 MOST_DEGREES = {"lat_deg": 90.0, "lon_deg": 180.0}
+TURN_DEG = 360.5
+SWAPPED = "no place"
+RADIANS_RATIO = 0.1
+"""Way by positions over that by speed below which positions, read in degrees, are in radians."""
 DECIMALS = 2  # most decimals of an angle that is taken for degrees
 SURE = 0.9  # share that a comparison must explain before it questions a unit that is stated
 FIT = 0.3  # share that a comparison must explain before it tells a unit
@@ -49,8 +53,8 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
             use, unit=unit, why=f"its name; {unit} as stated" if mark.unit else f"its name; size {largest:.3g}"
         )
     if kind == "place":
-        unit, why = _place_unit(mark.column, channel.values)
-        return replace(use, unit=unit, why=f"its name{why}")
+        unit, why = (mark.unit, " and unit") if mark.unit else _place_unit(*_places(channel, chosen), chosen)
+        return replace(use, column="" if unit == SWAPPED else mark.column, unit=unit, why=f"its name{why}")
     if kind in ("length", "acceleration"):
         return replace(use, unit=mark.unit or {"length": "m", "acceleration": "mps2"}[kind])
     if kind == "rate":
@@ -70,6 +74,9 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
             return replace(use, unit=like[0], why=f"its name; {like[0]}, in which it is near {like[1]}")
         rounded = bool((channel.values == np.round(channel.values, DECIMALS)).all())
         unit = "deg" if largest > RADIANS[mark.column] or rounded or _degrees_beside(channel, channels) else "rad"
+        if mark.column in DIRECTIONS and largest > TURN_DEG:
+            unit, why = _parts_of_degrees(channel, chosen)
+            return replace(use, unit=unit, why=f"its name; up to {largest:.4g}, {why}")
         few = "" if largest > RADIANS[mark.column] or not rounded else " and of few decimals"
         return replace(use, unit=unit, why=f"its name; up to {largest:.4g}{few}, so {unit}")
     if kind == "revolutions":
@@ -80,14 +87,32 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
     return replace(use, unit="mps")
 
 
-def _place_unit(column: str, values: Array) -> tuple[str, str]:
-    """Unit of a latitude or longitude, by its size, and words on it."""
-    largest, most = float(np.abs(values).max()), MOST_DEGREES[column]
-    if largest <= most:
+def _places(channel: Channel, chosen: dict[tuple[str, ...], Channel]) -> tuple[Channel, Channel]:
+    """Latitude and longitude, of which a channel is one."""
+    found = {key[0]: own for key, own in chosen.items() if key[0] in MOST_DEGREES}
+    return found.get("lat_deg", channel), found.get("lon_deg", channel)
+
+
+def _place_unit(lat: Channel, lon: Channel, chosen: dict[tuple[str, ...], Channel]) -> tuple[str, str]:
+    """Unit of latitude and longitude, which is the same, by their sizes, and words on it."""
+    largest, other = float(np.abs(lat.values).max()), float(np.abs(lon.values).max())
+    minutes = max(float((np.abs(own.values) % 100.0).max()) for own in (lat, lon))
+    if largest <= MOST_DEGREES["lat_deg"] and other <= 2 * MOST_DEGREES["lon_deg"]:
+        small = largest <= np.pi / 2 and other <= np.pi + 1e-6
+        ratio = _going_by(lat, lon, chosen) if small else None
+        if ratio is not None and ratio.explained > FIT and ratio.value < RADIANS_RATIO:
+            return "rad", f"; in radians, as {ratio.of} moves by what the speed says"
         return "deg", ""
-    if largest < 100.0 * most:
-        return "ddmm", "; degrees and minutes run together (scale = -1.0 for S or W)"
-    return "1e-7 deg", "; in units of 1e-7 degrees"
+    if largest <= MOST_DEGREES["lon_deg"] and other <= MOST_DEGREES["lat_deg"] and lat is not lon:
+        return SWAPPED, f"; up to {largest:.4g}, which no latitude is: is it the longitude?"
+    if largest < 100.0 * MOST_DEGREES["lat_deg"] and other < 100.0 * MOST_DEGREES["lon_deg"] and minutes < 60.0:
+        negative = bool((lat.values < 0).any() or (lon.values < 0).any())
+        return "ddmm", "; degrees and minutes run together" + ("" if negative else " (scale = -1.0 for S or W)")
+    return (
+        ("1e-7 deg", "; in units of 1e-7 degrees")
+        if largest > 1e6
+        else (SWAPPED, f"; up to {largest:.4g}, no latitude")
+    )
 
 
 def _of_depth(use: Use, channel: Channel) -> Use:
@@ -120,6 +145,35 @@ def _as_beside(mark: Mark, channel: Channel, channels: Sequence[Channel]) -> tup
             near = min(apart, key=lambda unit: apart[unit])
             return (near, other.name) if apart[near] < NEAR_RAD else None
     return None
+
+
+def _parts_of_degrees(channel: Channel, chosen: dict[tuple[str, ...], Channel]) -> tuple[str, str]:
+    """The unit of a direction beyond a turn, and words on it: degrees that count on, tenths or hundredths of them.
+
+    By the way of the positions where they show one; else by where it goes round, or begins.
+    """
+    values, units = channel.values, {"deg": 1.0, "ddeg": 0.1, "cdeg": 0.01}
+    lat, lon = _places(channel, chosen)
+    if lat is not lon and len(lat) == len(lon) and lat.source == channel.source:
+        times, step = _common(channel, lat)
+        if times is not None:
+            north, east = _metres(lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
+            way = _steps(np.interp(times, lat.time_s, north) + 1j * np.interp(times, lat.time_s, east), step)
+            at = times[: len(way)] + step * (times[1] - times[0]) / 2
+            nearest = values[np.clip(np.searchsorted(channel.time_s, at), 0, len(values) - 1)]
+            if (total := float(np.abs(way).sum())) > 0:
+                fits = {
+                    unit: float((way * np.exp(-1j * np.radians(share * nearest))).real.sum()) / total
+                    for unit, share in units.items()
+                }
+                best = max(fits, key=lambda unit: fits[unit])
+                if fits[best] > SURE:
+                    return best, f"so {best}, by the way of the positions"
+    largest, jump = float(values.max()), float(np.abs(np.diff(values)).max(initial=0.0))
+    for turn, unit in ((10 * TURN_DEG, "ddeg"), (100 * TURN_DEG, "cdeg")):
+        if values.min() >= 0.0 and turn / 10.0 < largest <= turn and (jump > turn / 2 or values[0] > turn / 10.0):
+            return unit, f"so {unit}"
+    return "deg", "so deg that count on"
 
 
 @dataclass(frozen=True)
@@ -173,11 +227,22 @@ def _going(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str
     lat, lon = (next((c for key, c in chosen.items() if key[0] == name), None) for name in ("lat_deg", "lon_deg"))
     if lat is None or lon is None or len(lat) != len(lon) or lat.source != channel.source:
         return None
-    lat_deg, lon_deg = (
-        Use(file="", channel="", column=name, unit=_place_unit(name, one.values)[0]).applied(one).values
-        for name, one in (("lat_deg", lat), ("lon_deg", lon))
-    )
-    north, east = 111195.0 * lat_deg, 111195.0 * lon_deg * np.cos(np.radians(lat_deg[0]))
+    return _way(channel, lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
+
+
+def _going_by(lat: Channel, lon: Channel, chosen: dict[tuple[str, ...], Channel]) -> _Ratio | None:
+    """The way over ground, as if places were in degrees, by the integral of the speed; m/s where nothing says more."""
+    speed = next((own for key, own in chosen.items() if key[0] in (SOG, "u_mps") and own.source == lat.source), None)
+    if speed is None or len(lat) != len(lon) or lat is lon:
+        return None
+    ratio = _way(speed, lat, lon, "deg")
+    unit = marked(speed).unit
+    return None if ratio is None else replace(ratio, value=ratio.value / FACTORS["speed"].get(unit, 1.0))
+
+
+def _way(channel: Channel, lat: Channel, lon: Channel, unit: str) -> _Ratio | None:
+    """The way over ground by the integral of a speed, with places in a unit."""
+    north, east = _metres(lat, lon, unit)
     times, step = _common(channel, lat)
     if times is None:
         return None
@@ -185,6 +250,15 @@ def _going(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str
     area = np.concatenate([[0.0], np.cumsum((channel.values[1:] + channel.values[:-1]) / 2 * np.diff(channel.time_s))])
     going = np.abs(_steps(place, step))
     return _ratio(_steps(np.interp(times, channel.time_s, area), step), going, "the position", offset=False)
+
+
+def _metres(lat: Channel, lon: Channel, unit: str) -> tuple[Array, Array]:
+    """North and east [m] of places in a unit."""
+    lat_deg, lon_deg = (
+        Use(file="", channel="", column=name, unit=unit).applied(one).values
+        for name, one in (("lat_deg", lat), ("lon_deg", lon))
+    )
+    return 111195.0 * lat_deg, 111195.0 * lon_deg * np.cos(np.radians(lat_deg[0]))
 
 
 def _common(one: Channel, other: Channel) -> tuple[Array | None, int]:

@@ -30,6 +30,7 @@ SETTLED = 0.02  # change of speed over a pause, by the largest speed, below whic
 LONGEST_SETTLING = 20.0  # pauses after a change of the engine order in which the speed may go on changing
 WHOLE = 0.8  # share of a stretch that acts from which it is one run
 LEAST_SPEED = 0.1  # m/s
+LONGEST_NAME = 40  # letters of a family in the name of a file
 FOUND = 0.5  # squared correlation from which a plan's commands are found in a record
 
 
@@ -185,4 +186,7 @@ def _orders(columns: Mapping[str, Array]) -> dict[str, Array]:
 def file_name(number: int, run: Run) -> str:
     """Of a run's CSV: its number and family, letters and digits only."""
     words = "".join(c if c.isalnum() else "-" for c in (run.name or run.family or "run").lower())
-    return f"{number:02d}-{'-'.join(part for part in words.split('-') if part)[:40]}.csv"
+    parts = [part for part in words.split("-") if part]
+    while len("-".join(parts)) > LONGEST_NAME and len(parts) > 1:
+        parts.pop()
+    return f"{number:02d}-{'-'.join(parts)[:LONGEST_NAME]}.csv"

@@ -13,25 +13,68 @@ from expdesign.importing.channels import COMPUTER, DAY_S, GNSS, OWN
 from expdesign.values import Array
 
 STAMP = re.compile(
-    r"\s*(?:(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}/\d{1,2}/\d{2}|\d{8}(?=T))"
-    r"(?:[T ,_]+|$))?"
-    r"(?:(?P<h>\d{1,2}):?(?P<m>\d{2})(?::?(?P<s>\d{2}(?:[.,]\d*)?))?\s*(?P<half>[AaPp][Mm])?)?"
-    r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2})?\s*"
+    r"\s*(?:(?P<date>\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}[/.]\d{1,2}[/.]\d{2}|\d{8}(?=T)"
+    r"|\d{4}:\d{3}(?=:))(?:[T ,_:]+|$))?"
+    r"(?:(?P<h>\d{1,2})[:.]?(?P<m>\d{2})(?:[:.]?(?P<s>\d{2}(?:[.,]\d*|:\d{3})?))?\s*(?P<half>[AaPp][Mm])?)?"
+    r"\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?\s*"
 )
+MONTHS = {
+    word: number
+    for number, words in enumerate(
+        ("jan", "feb fev", "mar mrz mae", "apr avr abr", "may mai maj mag", "jun", "jul lug", "aug ago", "sep set",
+         "oct okt ott", "nov", "dec dez des dic"), start=1,
+    )
+    for word in words.split()
+}  # fmt: skip
+"""First letters of a month's name -> its number."""
+WEEKDAY, MONTH, DATED = r"(?:[A-Za-z]{2,9}[.,]? +)?", r"(?P<mon>[A-Za-z]{3})[a-z]*", r"\b[T,: ]*(?P<rest>.*)"
+NAMED = (
+    re.compile(rf"{WEEKDAY}(?P<d>\d{{1,2}})[-./ ]+{MONTH}[-./, ]+(?P<y>\d{{4}}|\d\d){DATED}"),
+    re.compile(rf"{WEEKDAY}{MONTH}\.? +(?P<d>\d{{1,2}}),? +(?P<y>\d{{4}}){DATED}"),
+    re.compile(rf"{WEEKDAY}{MONTH}\.? +(?P<d>\d{{1,2}}) +(?P<rest>\d{{1,2}}:\d\d:\d\d\S*) +(?P<y>\d{{4}})"),
+)
+"""Dates with the name of a month."""
 TIME_NAME = re.compile(
-    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|zeit|uhrzeit|datum|clock|t|secs?|seconds?|received at)\b"
+    r"\b(time|utc|timestamp|stamp|datetime|date|epoch|clock|t|secs?|seconds?|received at|doy|julian|mjd|tow|"
+    r"decimal (hours?|day))\b"
 )
-SCALES = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "us"), (1e11, 1e-3, "ms"), (5e8, 1.0, "s"))
-"""Least size of a number that is a time since 1970 in a unit, factor to seconds, unit."""
-UNITS = {"s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "millis": 1e-3, "us": 1e-6, "micros": 1e-6,
-         "ns": 1e-9, "nanos": 1e-9, "min": 60.0, "h": 3600.0}  # fmt: skip
-UNIT_WORDS = {1.0: "in s", 1e-3: "in ms", 1e-6: "in us", 1e-9: "in ns", 60.0: "in min", 3600.0: "in h"}
-LATEST = 4.2e9
-"""Seconds since 1970 beyond which a number is no time."""
-EXCEL_DAY, MATLAB_DAY = 25569.0, 719529.0
-"""The first of January 1970 in days of spreadsheets and of datenum."""
+ZONE_NAME = re.compile(r"\b(?:UTC|GMT)\s*([+-])\s*(\d{1,2})(?::?(\d{2}))?")
+"""A zone in the name of a column, as `Time (UTC+2)`."""
+EARLIEST_S, LATEST_S = 7.9e8, 2.21e9
+"""Of times since 1970: the years 1995 to 2040 [s]."""
+EPOCHS = (
+    (1e-9, 0.0, "ns since 1970"), (1e-6, 0.0, "us since 1970"), (1e-3, 0.0, "ms since 1970"),
+    (1.0, 0.0, "s since 1970"),
+    (1e-7, 62_135_596_800.0, "ticks of 100 ns since the year 1"),
+    (1e-7, 11_644_473_600.0, "ticks of 100 ns since 1601"), (1.0, 2_082_844_800.0, "s since 1904"),
+    (DAY_S, 25569.0 * DAY_S, "days of a spreadsheet"), (DAY_S, 719_529.0 * DAY_S, "days of datenum"),
+    (DAY_S, 2_440_587.5 * DAY_S, "Julian days"), (DAY_S, 40587.0 * DAY_S, "modified Julian days"),
+)  # fmt: skip
+"""Factor to seconds, seconds from the epoch to 1970, words; the first that gives a year from 1995 to 2040 counts."""
+UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "seconds", "second"), 1.0), **dict.fromkeys(("ms", "msec", "millis"), 1e-3),
+    **dict.fromkeys(("us", "micros"), 1e-6), **dict.fromkeys(("ns", "nanos"), 1e-9),
+    **dict.fromkeys(("min", "mins", "minutes", "minute"), 60.0), **dict.fromkeys(("h", "hr", "hour", "hours"), 3600.0),
+    **dict.fromkeys(("d", "days"), DAY_S),
+}  # fmt: skip
+UNIT_WORDS = {
+    1.0: "in s",
+    1e-3: "in ms",
+    1e-6: "in us",
+    1e-9: "in ns",
+    60.0: "in min",
+    3600.0: "in h",
+    DAY_S: "in days",
+}
 LONGEST_STEP_S = 20.0
 """Usual step of numbers without unit beyond which these are milliseconds, or a thousandth of that."""
+SHORTEST_STEP_S = 5e-4
+"""Usual step of numbers without unit below which these are days: no log has 2,000 rows a second."""
+WEEK_S = 7 * DAY_S
+GPS_EPOCH_S = 315_964_800.0
+LEAP_S = ((1_483_228_800.0, 18.0), (1_435_708_800.0, 17.0), (1_341_100_800.0, 16.0), (1_230_768_000.0, 15.0),
+          (1_136_073_600.0, 14.0), (0.0, 13.0))  # fmt: skip
+"""Seconds since 1970 from which the time of GPS was so many seconds before UTC (IERS Bulletin C)."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +101,7 @@ def read_stamps(texts: Sequence[str], *, day_first: bool = True) -> Stamps:
     days: dict[str, float] = {}
     day, second = np.full(len(texts), np.nan), np.full(len(texts), np.nan)
     for row, text in enumerate(texts):
-        found = STAMP.fullmatch(text)
+        found = STAMP.fullmatch(text) or STAMP.fullmatch(_with_number_of_month(text))
         if found is None or not (found["date"] or found["h"]):
             continue
         if found["date"] is None and ":" not in text:
@@ -70,39 +113,69 @@ def read_stamps(texts: Sequence[str], *, day_first: bool = True) -> Stamps:
             day[row] = known
         if found["h"]:
             hour = int(found["h"]) % 12 + 12 * (found["half"].lower() == "pm") if found["half"] else int(found["h"])
-            second[row] = 3600.0 * hour + 60.0 * int(found["m"]) + float((found["s"] or "0").replace(",", "."))
+            parts = float(re.sub("[,:]", ".", found["s"] or "0"))
+            second[row] = 3600.0 * hour + 60.0 * int(found["m"]) + parts
             if found["zone"] and found["zone"][0] in "+-":
-                sign = -1.0 if found["zone"][0] == "+" else 1.0
-                second[row] += sign * (3600.0 * int(found["zone"][1:3]) + 60.0 * int(found["zone"][-2:]))
+                second[row] -= _zone_s(found["zone"][0], found["zone"][1:3], found["zone"][3:].lstrip(":"))
     return Stamps(day, second)
+
+
+def _zone_s(sign: str, hours: str, minutes: str | None) -> float:
+    return (-1.0 if sign == "-" else 1.0) * (3600.0 * int(hours) + 60.0 * int(minutes or 0))
+
+
+def zone_of(name: str) -> float:
+    """How much later than UTC the zone in a column's name is [s]; 0 where it says none."""
+    found = ZONE_NAME.search(name)
+    return _zone_s(found[1], found[2], found[3]) if found else 0.0
+
+
+def _with_number_of_month(text: str) -> str:
+    """A date with a month's name, as a date of numbers; other texts as they are."""
+    if not re.search("[A-Za-z]{3}", text):
+        return text
+    for form in NAMED:
+        found = form.fullmatch(text.strip())
+        if found and (month := MONTHS.get(found["mon"].lower())):
+            year = int(found["y"])
+            return f"{year + 2000 * (year < 100)}-{month}-{found['d']} {found['rest']}".rstrip()
+    return text
 
 
 def tells_month_first(texts: Sequence[str]) -> bool:
     """Whether dates such as 12/31/2024 show that the month comes first."""
-    parts = (re.match(r"\s*(\d{1,2})[-/.](\d{1,2})[-/.]\d{2,4}", text) for text in texts)
-    return any(int(found[2]) > 12 for found in parts if found)
+    parts = (re.match(r"\s*\d{1,2}(?:[-/](\d{1,2})[-/]\d{2,4}|\.(\d{1,2})\.\d{4})", text) for text in texts)
+    return any(12 < int(found[1] or found[2]) < 32 for found in parts if found)
 
 
 def _day(text: str, day_first: bool) -> float:
-    numbers = [int(part) for part in re.split("[-/.]", text)]
-    if len(numbers) == 1:
-        numbers = [numbers[0] // 10000, numbers[0] // 100 % 100, numbers[0] % 100]
-    elif len(text) - max(text.rfind(c) for c in "-/.") == 5:
-        numbers = [numbers[2], *(numbers[1::-1] if day_first else numbers[:2])]
-    elif len(text) - text.rfind("/") == 3 and numbers[0] < 100:  # a year of two digits
-        numbers = [2000 + numbers[2], *(numbers[1::-1] if day_first else numbers[:2])]
+    numbers = [int(part) for part in re.split("[-/.:]", text)]
     try:
+        if len(numbers) == 2:  # a year and its day
+            return float(date(numbers[0], 1, 1).toordinal() + numbers[1] - 1 - date(1970, 1, 1).toordinal())
+        if len(numbers) == 1:
+            numbers = [numbers[0] // 10000, numbers[0] // 100 % 100, numbers[0] % 100]
+        elif numbers[0] < 100:  # the year is last
+            year = numbers[2] + 2000 * (numbers[2] < 100)
+            numbers = [year, *(numbers[1::-1] if day_first else numbers[:2])]
         return float(date(*numbers).toordinal() - date(1970, 1, 1).toordinal())
     except ValueError:
         return float("nan")
 
 
-def over_midnight(second: Array) -> Array:
-    """Seconds of the day that go on counting past midnight."""
+def over_midnight(second: Array, period_s: float = DAY_S) -> Array:
+    """Seconds of the day, or of another period, that go on counting past its end."""
     known = np.flatnonzero(np.isfinite(second))
     days = np.zeros(len(second))
-    days[known[1:]] = np.cumsum(np.diff(second[known]) < -DAY_S / 2.0)
-    return np.asarray(second + DAY_S * days)
+    days[known[1:]] = np.cumsum(np.diff(second[known]) < -period_s / 2.0)
+    return np.asarray(second + period_s * days)
+
+
+def utc_of_gps(week: Array, second: Array) -> Array:
+    """Times since 1970 UTC [s] of weeks since 1980, as counted on, and seconds of the week of GPS time."""
+    gps = GPS_EPOCH_S + WEEK_S * week + second
+    late = next(leap for since, leap in LEAP_S if float(np.nanmedian(gps)) > since)
+    return np.asarray(gps - late)
 
 
 def read_numbers(values: Array, name: str, *, unit: str = "") -> tuple[Array, str, str]:
@@ -117,19 +190,43 @@ def read_numbers(values: Array, name: str, *, unit: str = "") -> tuple[Array, st
     size, steps = float(np.median(np.abs(known))), np.diff(known)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     said = UNITS.get(unit.lower(), UNITS.get(name.split(" ")[-1], 0.0))
-    for least, factor, word in SCALES:
-        if size > least and factor * size < LATEST and (not said or said == factor):
-            return factor * values, COMPUTER, f"{word} since 1970"
+    if 1.97e13 < size < 2.11e13 and not said and (whole := _of_digits(values)) is not None:
+        return whole, COMPUTER, "date and time run together"
+    for factor, since_s, word in EPOCHS:
+        since_1970 = factor * size - since_s
+        if EARLIEST_S < since_1970 < LATEST_S and (not said or said == factor) and factor * step < DAY_S / 2:
+            return factor * values - since_s, COMPUTER, word
     if said:
-        return said * values, OWN, UNIT_WORDS.get(said, f"units of {said:g} s")
+        return _wrapped(said * values), OWN, UNIT_WORDS.get(said, f"units of {said:g} s")
     if _is_hhmmss(known) and step >= 0.01:
         clock = np.floor(values / 1e4) * 3600 + np.floor(values / 100 % 100) * 60 + values % 100
         return over_midnight(clock), GNSS if "utc" in name else OWN, "hhmmss"
-    for origin, word in ((EXCEL_DAY, "days of a spreadsheet"), (MATLAB_DAY, "days of datenum")):
-        if 0.6 * origin < size < 2.2 * origin and step < 1e-2 and (known % 1 > 0).any():
-            return (values - origin) * DAY_S, COMPUTER, word
+    if step < SHORTEST_STEP_S:
+        return over_midnight(values * DAY_S), OWN, "days, by their steps"
     factor = 1.0 if step <= LONGEST_STEP_S else 1e-3 if step <= LONGEST_STEP_S * 1e3 else 1e-6
-    return factor * values, OWN, {1.0: "seconds", 1e-3: "ms, by their steps", 1e-6: "us, by their steps"}[factor]
+    how = {1.0: "seconds", 1e-3: "ms, by their steps", 1e-6: "us, by their steps"}[factor]
+    return _wrapped(factor * values), OWN, how
+
+
+def _wrapped(second: Array) -> Array:
+    """The same, past the end of a day or a week where they begin anew there."""
+    known = second[np.isfinite(second)]
+    for period_s in (DAY_S, WEEK_S):
+        inside = len(known) and known.min() >= 0.0 and known.max() <= period_s
+        if inside and np.diff(known).min(initial=0.0) < -0.9 * period_s:
+            return over_midnight(second, period_s)
+    return second
+
+
+def _of_digits(values: Array) -> Array | None:
+    """Times since 1970 [s] of numbers as 20251009085320; None where they are none."""
+    day, clock = np.divmod(values, 1e6)
+    days = {value: _day(f"{value:.0f}", True) for value in np.unique(day[np.isfinite(day)]).tolist()}
+    parts = np.floor(clock / 1e4), np.floor(clock / 100 % 100), clock % 100
+    if not all(np.isfinite(list(days.values()))) or np.nanmax(parts[1]) >= 60 or np.nanmax(parts[2]) > 61:
+        return None
+    whole = np.array([days.get(value, np.nan) for value in day.tolist()])
+    return np.asarray(whole * DAY_S + parts[0] * 3600 + parts[1] * 60 + parts[2])
 
 
 def _is_hhmmss(known: Array) -> bool:

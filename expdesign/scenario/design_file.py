@@ -62,7 +62,7 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
         robust=table.robust,
         prior_samples=(table.prior_samples or 20) if table.robust != "nominal" else 0,
         prior=table.prior,
-        prior_data=_files(table.prior_data, entry.at("prior_data")),
+        prior_data=named_files(table.prior_data, entry.at("prior_data")),
         least_s=dict(table.least_s),
         most_s=dict(table.most_s),
         required=tuple(table.required),
@@ -206,5 +206,10 @@ def _budget(table: BudgetTable, primitives: tuple[str, ...], entry: Entry) -> Bu
     return BudgetSettings(name=table.name, limit=table.limit, cost_per_s=dict(table.cost_per_s))
 
 
-def _files(given: list[str], entry: Entry) -> tuple[Path, ...]:
+def named_files(given: list[str], entry: Entry) -> tuple[Path, ...]:
+    """The files that a list of an entry names.
+
+    Raises:
+        FileError: one does not exist.
+    """
     return tuple(entry.item(index).file(name) for index, name in enumerate(given, start=1))

@@ -27,7 +27,7 @@ TOLD = ("rate", "lag_s", "delay_s")  # fields of a response
 
 
 class InstrumentsFile(Table):
-    """What an import leaves beside its runs; `estimate`, `diagnose`, `mine`, `monitor` and `indices` read it."""
+    """What an import leaves beside its runs; all commands that read measured data take it."""
 
     topic: ClassVar[str] = "instruments"
 
@@ -59,17 +59,18 @@ def load_instruments(path: Path) -> InstrumentsFile:
     return file
 
 
-def equipped_vessel(path: Path, folders: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
+def equipped_vessel(path: Path, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
     """The vessel of a file, with what imports tell of sensors and actuators where the file is silent, and notes.
 
     Args:
         path: of the vessel file.
-        folders: of data; those without the file of an import tell nothing.
+        data: files, or folders of them; those without the file of an import beside them tell nothing.
 
     Raises:
         FileError: a file is wrong.
     """
     ship = load_vessel(path)
+    folders = dict.fromkeys(own if own.is_dir() else own.parent for own in data)
     files = [folder / INSTRUMENTS for folder in folders if (folder / INSTRUMENTS).is_file()]
     if not files:
         return ship, ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,12 +18,13 @@ from expdesign.errors import FileError, NoPlan
 from expdesign.plan.control import capability
 from expdesign.plan.values import PathsName, PlannerName, PlanSettings, UnderWay
 from expdesign.scenario.charts import Latitude, Longitude, load_area
-from expdesign.scenario.design_file import design_settings
+from expdesign.scenario.design_file import design_settings, named_files
 from expdesign.scenario.design_tables import DesignTable
 from expdesign.scenario.dictionaries import NAME, NAME_RULE, load_dictionary
+from expdesign.scenario.instruments_file import equipped_vessel
 from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, check_table, read_toml, shown
 from expdesign.scenario.values import Scenario
-from expdesign.scenario.vessels import EnvironmentTable, build_environment, load_vessel
+from expdesign.scenario.vessels import EnvironmentTable, build_environment
 from expdesign.sea_area import SeaArea
 from expdesign.values import Array
 from expdesign.vessel import Vessel, column_name
@@ -139,12 +140,13 @@ class ScenarioFile(Table):
     plan: PlanTable = Field(default=PlanTable(), description="the clearance, safety and repositioning legs of the plan")
 
 
-def load_scenario(path: Path | str, *, vessel: Path | None = None) -> Scenario:
+def load_scenario(path: Path | str, *, vessel: Path | None = None, data: Sequence[Path] = ()) -> Scenario:
     """Read a scenario file and the vessel, dictionary, area and chart it names.
 
     Args:
         path: a TOML file with `[scenario]`, `[design]`, `[start]`, `[goal]` and optionally `[environment]`, `[plan]`.
         vessel: a vessel file in place of the one it names.
+        data: measured since; an import beside it, or beside design.prior_data, tells of sensors and actuators.
 
     Raises:
         FileError: a file is unreadable, an entry is wrong, missing or unknown, or start or goal has no room.
@@ -159,7 +161,7 @@ def load_scenario(path: Path | str, *, vessel: Path | None = None) -> Scenario:
             "has only some keys of a scenario, as variants have; expected a whole scenario, or the variant after its "
             f"scenario: expdesign whatif SCENARIO.toml {entry.path}",
         )
-    return build_scenario(content, entry, vessel=vessel)
+    return build_scenario(content, entry, vessel=vessel, data=data)
 
 
 def _is_variant(content: Mapping[str, Any]) -> bool:
@@ -170,19 +172,24 @@ def _is_variant(content: Mapping[str, Any]) -> bool:
     return bool(content) and set(content) <= set(ScenarioFile.model_fields) and sum(needed) <= 2
 
 
-def build_scenario(content: Mapping[str, Any], entry: Entry, *, vessel: Path | None = None) -> Scenario:
+def build_scenario(
+    content: Mapping[str, Any], entry: Entry, *, vessel: Path | None = None, data: Sequence[Path] = ()
+) -> Scenario:
     """A scenario from the tables of its file; raises as `load_scenario` does.
 
     Args:
         content: the tables, unchecked.
         entry: the file, to which the files it names are relative.
         vessel: a vessel file in place of the one it names.
+        data: measured since, as of `load_scenario`.
     """
     file = check_table(ScenarioFile, content, entry)
     places = {"start": file.start, "goal": file.goal}
     for key, place in places.items():
         _check_position(place, entry.at(key))
-    ship = load_vessel(vessel or entry.at("scenario.vessel").file(file.scenario.vessel))
+    ship_file = vessel or entry.at("scenario.vessel").file(file.scenario.vessel)
+    before = named_files(file.design.prior_data, entry.at("design.prior_data"))
+    ship, told = equipped_vessel(ship_file, (*before, *data))
     dictionary = load_dictionary(entry.at("scenario.dictionary").file(file.scenario.dictionary))
     plan = PlanSettings(**file.plan.model_dump())
     area = load_area(entry.at("scenario.area").file(file.scenario.area), draught_m=ship.draught_m)
@@ -204,6 +211,7 @@ def build_scenario(content: Mapping[str, Any], entry: Entry, *, vessel: Path | N
         under_way=_under_way(file.start, ship, entry.at("start")),
         start=berths["start"].pose,
         goal=berths["goal"].pose,
+        told=told,
     )
 
 

@@ -86,6 +86,7 @@ class Scenario:
     goal: Array
     environment: Environment  # forecast
     under_way: UnderWay | None = None  # how the ship moves at the start; None where it is at rest through the water
+    told: tuple[str, ...] = ()  # notes on what imports of measured data tell of the vessel
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
@@ -108,6 +109,7 @@ class Scenario:
         if len(certain) == len(model.names):
             known = f"every parameter of the model: {known}"
         return (
+            *self.told,
             *(["environment.wind_to moves no ship here: no term of the vessel's model reads the wind"]
               if wind and not {"u_q", "v_q"} & model.read_signals() else []),
             *(f"environment.current_to does not act on {name}: no term of {name} in the vessel's model reads {name}"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from expdesign.errors import FileError
 from expdesign.importing.channels import Log, Reader
+from expdesign.importing.fills import cleaned
 from expdesign.importing.readers.ardupilot import is_ardupilot, read_ardupilot
 from expdesign.importing.readers.matlab import read_matlab, read_matlab73
 from expdesign.importing.readers.n2k import is_n2k, read_n2k
@@ -112,7 +113,7 @@ def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
         raise FileError(path, "", f"is {what}")
     reader = next(one for one in READERS if one.fits(path, head))
     try:
-        return reader.read(path, sample_time_s)
+        return cleaned(reader.read(path, sample_time_s))
     except ModuleNotFoundError as error:
         hint = f"needs {error.name}: pip install 'expdesign[{reader.extra or 'logs'}]'"
         raise FileError(path, "", f"is {reader.name}, which {hint}") from None

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Log, channels_of
-from expdesign.importing.times import TIME_NAME, read_numbers, read_stamps
+from expdesign.importing.clocks import Clock, clock_of
+from expdesign.importing.times import TIME_NAME, read_stamps
 from expdesign.importing.units import split_unit, words
-from expdesign.values import Array
 
 MOST_COLUMNS = 64
 """Columns of one array beyond which it is an image or a map."""
@@ -26,7 +26,8 @@ def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: f
     channels, notes, unused, clocks = [], [], [], set()
     for group in _groups(columns):
         own = {name: columns[name] for name in group}
-        name, times, clock, how = _clock(own, columns)
+        found = _clock(own, columns)
+        name, times, clock, how = found.name, found.times, found.kind, found.how
         if times is None and sample_time_s > 0:
             times, clock = np.asarray(np.arange(len(next(iter(own.values())))) * sample_time_s), OWN
             how = f"{', '.join(own)}: count as {sample_time_s:g} s apart, as the mapping says"
@@ -36,11 +37,12 @@ def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: f
                 f"{', '.join(own)}: no clock, expected sample_time_s under [[file]] in the mapping, where rows are "
                 "evenly spaced"
             )
-        texts = [key for key, values in own.items() if values.dtype.kind not in "biuf" and key != name]
-        numbers = {key: np.asarray(v, dtype=float) for key, v in own.items() if key != name and key not in texts}
+        left = {key: values for key, values in own.items() if key not in found.taken}
+        texts = [key for key, values in left.items() if values.dtype.kind not in "biuf"]
+        numbers = {key: np.asarray(values, dtype=float) for key, values in left.items() if key not in texts}
         units = {key: split_unit(key)[1] for key in numbers}
-        found, more = channels_of(numbers, np.asarray(times), source=source, units=units, what=name)
-        channels += found
+        own_channels, more = channels_of(numbers, np.asarray(times), source=source, units=units, what=name)
+        channels += own_channels
         notes += [how, *more]
         unused += texts
         clocks.add(clock)
@@ -67,20 +69,23 @@ def _groups(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
     return list(groups.values())
 
 
-def _clock(own: Mapping[str, np.ndarray], every: Mapping[str, np.ndarray]) -> tuple[str, Array | None, str, str]:
-    """Name of the column of times, its times, kind of clock and how they were read; one of another group if need be."""
+def _clock(own: Mapping[str, np.ndarray], every: Mapping[str, np.ndarray]) -> Clock:
+    """The clock of a group of columns, or else of one of another group that is as long."""
     rows = len(next(iter(own.values())))
-    for name, values in [*own.items(), *((key, v) for key, v in every.items() if len(v) == rows and key not in own)]:
-        if values.dtype.kind == "M":
-            whole = values.astype("datetime64[ns]").astype(np.int64) / 1e9
-            return name, np.where(np.isnat(values), np.nan, whole), COMPUTER, f"time is {name}, date and time"
-        if not TIME_NAME.search(words(name.rpartition(".")[2])):
-            continue
-        if values.dtype.kind in "USO":
-            stamps = read_stamps([str(text) for text in values])
-            if stamps.kind == "both":
-                return name, stamps.day * 86400.0 + stamps.second, COMPUTER, f"time is {name}, date and time"
-        elif values.dtype.kind in "iuf" and np.ptp(values) > 0:
-            times, clock, how = read_numbers(values.astype(float), words(name), unit=split_unit(name)[1])
-            return name, times, clock, f"time is {name}, {how}"
-    return "", None, NONE, ""
+    beside = {name: values for name, values in every.items() if len(values) == rows and name not in own}
+    for table in (own, beside):
+        for name, values in table.items():
+            if values.dtype.kind == "M":
+                whole = values.astype("datetime64[ns]").astype(np.int64) / 1e9
+                times = np.where(np.isnat(values), np.nan, whole)
+                return Clock(frozenset({name}), times, COMPUTER, f"time is {name}, date and time", name)
+        texts = {name: read_stamps([str(text) for text in v]) for name, v in table.items() if v.dtype.kind in "USO"}
+        numbers = {name: v.astype(float) for name, v in table.items() if v.dtype.kind in "iuf"}
+        last = {name: name.rpartition(".")[2] for name in (*numbers, *texts)}  # a clock is named in its structure
+        found = clock_of(
+            {name: v for name, v in numbers.items() if table is own or TIME_NAME.search(words(last[name]))},
+            {name: stamps for name, stamps in texts.items() if stamps.kind}, {},
+        )  # fmt: skip
+        if found.times is not None:
+            return found
+    return Clock(frozenset(), None, NONE, "")

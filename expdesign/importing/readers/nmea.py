@@ -38,22 +38,45 @@ FIELDS = {
     "DPT": "depth:m offset:m",
     "DBT": "depthm:m",
     "HSC": "cmdheadingT:deg",
+    "ROR": "stbdrudderorder:deg:stbdrudderstatus portrudderorder:deg:portrudderstatus",
+    "PRC": "",
+    "TRC": "",
+    "TRD": "",
+    "DTM": "",
     "XDR": "",
     "ZDA": "",
 }
 """Sentence -> fields that are read, each with its unit, the field that gives its sign, and that which must be valid."""
+ORDERS = {"stbdrudderorder": "rudder order starboard", "portrudderorder": "rudder order port"}
+"""Fields of orders and their words."""
+MACHINES = {
+    "RPM": ("engineshaftnum", (("rpm", "rpm", "", "rpm"),)),
+    "PRC": ("engineshaftnum", (("rpmdemand", "rpm order", "rpmdemandstatus", "rpm"),)),
+    "TRC": ("thrusternum", (("dmdrpm", "rpm order", "rpmmode", "rpm"), ("dmdazimuth", "azimuth order", "", "deg"))),
+    "TRD": ("thrusternum", (("rpmresponse", "rpm actual", "rpmmode", "rpm"),
+                            ("azimuthresponse", "azimuth actual", "", "deg"))),
+}  # fmt: skip
+"""Sentences on one machine of several -> field of its number, and fields with words, field of the mode, and unit."""
+MAKERS = {"PSXN": ("23", {"roll": 1, "heading": 3}), "PASHR": ("", {"heading": 1, "roll": 3})}
+"""Sentences of makers -> first field, and places of what is read: Seapath's motion, and attitude as many send it."""
+DOUBTS = {"GGA": ("quality", {"6": "estimated", "7": "put in by hand", "8": "simulated"}),
+          "RMC": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"}),
+          "GNS": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"})}  # fmt: skip
+"""Sentence -> field, and its marks of positions that no satellite gave."""
+WGS84 = ("", "W84", "P90", "999")
 PLACES = {name: {field: place for place, field in enumerate(NMEA_PAYLOADS_GET[name])} for name in FIELDS}
 INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}
 """Marks of a reading that is not valid."""
 TIMED = ("RMC", "GGA", "GNS", "GLL", "ZDA")
 WIND_UNITS = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}
 XDR_UNITS = {"D": "deg", "M": "m", "N": "", "P": "percent"}
+ENDS = '"\r\n \x00'
 SENTENCE = re.compile(r"[$!]([A-Z]{2,4}[A-Z]{3}|P[A-Z0-9]+),")
 DATE_AND_TIME = re.compile(
-    r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4})[T ,;_\t]+"
+    r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})[T ,;:_\t]+"
     r"(\d{1,2}:\d{2}:\d{2}(?:\.\d*)?\s*(?:Z|[+-]\d{2}:?\d{2})?)"
 )
-TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:\.\d*)?")
+TIME_OF_DAY = re.compile(r"(?<![\d:-])\d{1,2}:\d{2}:\d{2}(?:\.\d*)?")
 DAY_OF_YEAR = re.compile(r"\b(\d{4}):(\d{3}):(\d{2}:\d{2}:\d{2}(?:\.\d+)?)")
 TAG_TIME = re.compile(r"\\[^\\]*\bc:(\d{9,16})[^\\]*\\")
 
@@ -68,6 +91,8 @@ class Sentences:
         self.unread: Counter[str] = Counter()
         self.no_numbers = 0  # readings of transducers
         self.count = 0
+        self.doubtful: Counter[str] = Counter()
+        self.datums: Counter[str] = Counter()
 
     def add(self, lines: Sequence[tuple[int, str]]) -> None:
         """Take lines with a "$" or a "!", each with its place in the file."""
@@ -78,10 +103,14 @@ class Sentences:
                 self.garbled += 1
                 continue
             name = found[1]
+            maker = MAKERS.get(name)
+            if maker and not (maker[0] and not line[found.end() :].startswith(f"{maker[0]},")):
+                kept.setdefault(name, []).append((place, line[: found.start()], line[found.start() + 1 :].rstrip(ENDS)))
+                continue
             if name[-3:] not in FIELDS or name[0] == "P":
                 self.unread[name] += 1
                 continue
-            body = line[found.start() + 1 :].rstrip('"\r\n \x00')
+            body = line[found.start() + 1 :].rstrip(ENDS)
             kept.setdefault(name, []).append((place, line[: found.start()], body))
         for name, group in kept.items():
             self._take(name, group)
@@ -97,13 +126,25 @@ class Sentences:
         self.count += len(group)
         rows = [body.partition("*")[0].split(",")[1:] for _, _, body in group]
         places = np.array([place for place, _, _ in group], dtype=float)
+        if name in MAKERS:
+            for what, place in MAKERS[name][1].items():
+                values = _numbers([row[place] if place < len(row) else "" for row in rows])
+                good = np.isfinite(values)
+                self._keep(f"{name}.{what}", "deg", places[good], values[good])
+            self._received([prefix for _, prefix, _ in group], places)
+            return
         kind, at = name[-3:], PLACES[name[-3:]]
 
         def column(field: str) -> list[str]:
             return [row[at[field]] if at[field] < len(row) else "" for row in rows]
 
-        if kind == "RPM":
-            self._by_shaft(name, rows, places, column)
+        if kind in DOUBTS:
+            doubtful, words = DOUBTS[kind]
+            self.doubtful.update(f"{words[mark]} ({name})" for mark in column(doubtful) if mark in words)
+        if kind == "DTM":
+            self.datums.update(datum for datum in column("datum") if datum not in WGS84)
+        elif kind in MACHINES:
+            self._by_machine(name, rows, places, column)
         elif kind == "XDR":
             self._transducers(name, rows, places)
         else:
@@ -123,7 +164,7 @@ class Sentences:
                     good &= ~np.isin(column(valid[0]), list(INVALID))
                 for mark in marks[1:] or marks:
                     own = good & (np.array(column("reference")) == mark[1:]) if mark else good
-                    self._keep(f"{name}.{field}{mark}", unit, places[own], values[own])
+                    self._keep(f"{name}.{ORDERS.get(field, field)}{mark}", unit, places[own], values[own])
         if kind in TIMED:
             self._anchor(kind, places, column)
         self._received([prefix for _, prefix, _ in group], places)
@@ -133,17 +174,24 @@ class Sentences:
             self.blocks.add(f"{name}|{unit}|place", places)
             self.blocks.add(f"{name}|{unit}|value", values)
 
-    def _by_shaft(self, name: str, rows: list[list[str]], places: Array, column: Callable[[str], list[str]]) -> None:
-        """Revolutions of each engine or shaft by its number: odd ones are to starboard, even ones to port."""
-        values = _numbers([row[2] if len(row) > 2 else "" for row in rows])
-        good = np.isfinite(values) & ~np.isin([row[4] if len(row) > 4 else "" for row in rows], list(INVALID))
-        keys = np.array(["".join(row[:2]) for row in rows])
-        for key in np.unique(keys):
-            number = int(key[1:]) if key[1:].isdecimal() else 0
-            side = "" if not number else " starboard" if number % 2 else " port"
-            own = good & (keys == key)
-            what = "shaft" if key.startswith("S") else "engine"
-            self._keep(f"{name}.rpm {what} {number}{side}", "rpm", places[own], values[own])
+    def _by_machine(self, name: str, rows: list[list[str]], places: Array, column: Callable[[str], list[str]]) -> None:
+        """Revolutions and azimuth of each engine, shaft or thruster by its number.
+
+        Odd engines are to starboard, even ones to port; odd thrusters are at the bow, even ones at the stern.
+        """
+        number, parts = MACHINES[name[-3:]]
+        sources = column("source") if name[-3:] == "RPM" else ["T" if number == "thrusternum" else "E"] * len(rows)
+        keys = np.array([f"{source}{own}" for source, own in zip(sources, column(number), strict=True)])
+        for field, words, mode, unit in parts:
+            values = _numbers(column(field))
+            modes = np.array(column(mode or "status") if mode or name[-3:] == "RPM" else [""] * len(rows))
+            good = np.isfinite(values) & ~np.isin(modes, list(INVALID))
+            for key in np.unique(keys):
+                for per_cent in (False, True):
+                    own = good & (keys == key) & ((modes == "P") == per_cent)
+                    self._keep(
+                        f"{name}.{words} {_machine(key)}", "percent" if per_cent else unit, places[own], values[own]
+                    )
 
     def _transducers(self, name: str, rows: list[list[str]], places: Array) -> None:
         """Each transducer by its name."""
@@ -225,6 +273,15 @@ class Sentences:
                 values = self.blocks.joined(key)[known]
                 found.append(Channel(name=name, source=self.source, unit=unit, time_s=time_s[known], values=values))
         return found
+
+
+def _machine(key: str) -> str:
+    """Words on an engine, shaft or thruster of a kind and number, as `S1`."""
+    number = int(key[1:]) if key[1:].isdecimal() else 0
+    if key[0] == "T":
+        return f"thruster {number}{' bow' if number % 2 else ' stern'}"
+    side = "" if not number else " starboard" if number % 2 else " port"
+    return f"{'shaft' if key[0] == 'S' else 'engine'} {number}{side}"
 
 
 def _stamp_in(prefix: str) -> str:

@@ -14,7 +14,6 @@ from expdesign.export.pages import document_html
 from expdesign.export.step_trial_page import StepTrialContent, Validated, step_model_json, step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
-from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.step_trials import (
     Sailed,
@@ -30,7 +29,7 @@ from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
 from expdesign.workflows.data.step_list import listed_steps
 from expdesign.workflows.outcome import Outcome, command_text
-from expdesign.workflows.steps.measured import data_files
+from expdesign.workflows.steps.measured import data_files, equipped
 
 SIMULATED_STEP_S = 0.5
 """Least time between samples of a simulation that is compared with data [s]."""
@@ -70,7 +69,7 @@ def identify_steps(
         if path in data:
             raise InputError(f"{path} is given to identify and to test, expected only one of them")
     progress("reading the data", 0.0)
-    ship = None if vessel is None else load_vessel(vessel)
+    ship, told = (None, ()) if vessel is None else equipped(vessel, data)
     record = _record(data, ship, velocity)
     names = record.batches[0].input_names
     controls = controls_of(names, throttle, rudder)
@@ -85,7 +84,7 @@ def identify_steps(
         nominal=None if ship is None else _nominal(ship, trial, names),
         own=tuple(_validated(trial, batch) for batch in trial.batches),
         tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
-        notes=record.notes,
+        notes=(*told, *record.notes),
         command=_command(data, vessel, throttle, rudder, tests, steps, velocity, seed),
         version=__version__,
     )

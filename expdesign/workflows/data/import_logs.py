@@ -52,6 +52,7 @@ from expdesign.importing import (
     sensor_keys,
     sides,
     typical_length_m,
+    zone_lag_of,
 )
 from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
@@ -156,7 +157,7 @@ def import_logs(
         rejected=tuple(rejected),
         followed=followed(table), sensors=sensor_keys(found), notes=tuple(notes),
         origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-        version=__version__,
+        version=__version__, vessel=str(vessel or "VESSEL.toml"),
     )  # fmt: skip
     progress("writing", 0.95)
     document = import_document(content, folder)
@@ -245,6 +246,11 @@ def _one_time_scale(
         if table and own and not (stated and log.source in clocks):
             near = log.clock != OWN and order[0].clock != OWN
             lag = lag_of(own, table, near=near)
+            zone = zone_lag_of(own, table) if lag is None and near else None
+            if zone is not None:
+                lag, what = zone
+                notes.append(f"{log.source}: its clock is {what}")
+                near = False
             if lag is None and not near:
                 raise NothingToWrite(
                     f"{log.source} has {log.clock} and saw nothing that another log saw (turn, speed, roll, rudder), "

@@ -30,7 +30,6 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
 from expdesign.records.limits import check_limits, column_limits
-from expdesign.scenario import load_vessel
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,
@@ -45,6 +44,7 @@ from expdesign.step_trials.live import (
 from expdesign.vessel import Actuator, Limit, column_name
 from expdesign.workflows.data.step_list import listed_steps
 from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.steps.measured import equipped
 
 STATE = "watch-steps-state.json"
 TO_DO = "steps-to-do.csv"
@@ -116,7 +116,7 @@ def watch_steps(
     """
     if learn_s is not None and not 0 < learn_s < math.inf:
         raise InputError(f"--learn-s is {learn_s:g}, expected more than 0")
-    ship = load_vessel(vessel)
+    ship, told = equipped(vessel, [] if data == STREAM else [data])
     controls = controls_of(ship.model.inputs, throttle, rudder)
     wanted = listed_steps(steps, ship.model.inputs, controls, ship)
     learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if learn_s is None else learn_s
@@ -129,6 +129,7 @@ def watch_steps(
     folder = out or Path("runs") / ("watch-steps" if data == STREAM else data.stem)
     work = _Work(setup=setup, folder=folder, command=command, actuators=ship.model.actuators)
     now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))
+    now = replace(now, notes=tuple(dict.fromkeys((*told, *now.notes))))
     now = _through(now, data, work, tell, progress)
     _check_learnt(now.state, setup)
     content = _content(now, work)

@@ -54,8 +54,8 @@ MAPPINGS = (
     "used. Of percent, share and pwm (1000 to 2000 us, 1500 in the middle) scale is what the largest order is."
 )
 INSTRUMENTS_TEXT = (
-    "expdesign import leaves it beside its runs, with what the logs tell. estimate, diagnose, mine, monitor and "
-    "indices use it where the vessel file says nothing, and say so; what the vessel file states counts, and a "
+    "expdesign import leaves it beside its runs, with what the logs tell. Every command that reads the runs "
+    "uses it where the vessel file says nothing, and says so; what the vessel file states counts, and a "
     "difference is told. Change or delete what is wrong."
 )
 REFUSED = (

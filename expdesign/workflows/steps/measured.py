@@ -38,9 +38,9 @@ def data_files(data: Sequence[Path]) -> tuple[Path, ...]:
 def equipped(vessel: Path, data: Sequence[Path]) -> tuple[Vessel, tuple[str, ...]]:
     """The vessel of a file, with what imports beside the data tell of sensors and actuators, and notes on that.
 
-    Errors as of `equipped_vessel`.
+    Errors as of `equipped_vessel` and `data_files`.
     """
-    return equipped_vessel(vessel, list(dict.fromkeys(path.parent for path in data_files(data))))
+    return equipped_vessel(vessel, data_files(data))
 
 
 def measured(

@@ -18,7 +18,7 @@ from expdesign.plan.values import UnderWay
 from expdesign.progress import Progress, silent
 from expdesign.records import Fix, last_fix
 from expdesign.reduction import reduced
-from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.scenario import Scenario, load_scenario
 from expdesign.scenario.scenario_file import berth_problem, build_berth
 from expdesign.shortest_day import AccuracySettings
 from expdesign.signals import Batch, Record
@@ -26,7 +26,7 @@ from expdesign.simulation import Environment, acting_response, delivered_at_samp
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 from expdesign.workflows.steps.known import updated
-from expdesign.workflows.steps.measured import measured
+from expdesign.workflows.steps.measured import data_files, equipped, measured
 
 MOTION_S, MOTION_ROWS = 5.0, 3
 """Time before the last row whose velocities tell how the ship moves there, and the fewest that must be known."""
@@ -69,9 +69,11 @@ def present_state(
     """
     if not data:
         raise InputError("no data files are given, expected one or more CSV files after --data")
-    first = load_scenario(scenario)
-    ship = first.vessel if vessel is None else _same_ship(load_vessel(vessel), first, vessel)
-    record = measured(data, ship)
+    first = load_scenario(scenario, data=data_files(data))
+    ship, told = (first.vessel, first.told) if vessel is None else equipped(vessel, data)
+    if vessel is not None:
+        ship = _same_ship(ship, first, vessel)
+    record = measured(data, ship, told=told)
     pose = present_pose(last_fix(data[-1]), ship, first)
     sailed_s = float(sum(len(batch) * batch.sample_time_s for batch in record.batches))
     left_s = _left(first, sailed_s, remaining_s)

@@ -30,10 +30,11 @@ from expdesign.roll import (
     roll_frequency,
 )
 from expdesign.roll.record import planned_everywhere, roll_run
-from expdesign.scenario import LoadCases, load_cases, load_vessel
+from expdesign.scenario import LoadCases, load_cases
 from expdesign.signals import Batch
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.steps.measured import equipped
 
 
 def roll(
@@ -69,7 +70,7 @@ def roll(
     if scale is not None and not 0 < scale < float("inf"):
         raise InputError(f"--scale is {scale:g}, expected more than 0")
     progress("reading the data", 0.0)
-    ship = None if vessel is None else load_vessel(vessel)
+    ship, told = (None, ()) if vessel is None else equipped(vessel, data)
     known = load_cases(loads, ship)
     if len(known.loads) != len(data):
         raise InputError(
@@ -79,6 +80,7 @@ def roll(
         if sum(path.resolve() == other.resolve() for other in data) > 1:
             raise InputError(f"{path}: is given more than once, expected each data file once")
     cases, notes = _cases(data, known, rudder, ship)
+    notes = (*told, *notes)
     filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=lowpass_hz)
     problem = build_problem(
         known.body, prepared(cases, filter_), beam_m=known.beam_m, roll_hz=1.0 / known.period_s, known=known.known,

@@ -1,0 +1,135 @@
+"""How a table is written: encoding, separator, decimal sign, and the rows above the first row of data."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from expdesign.errors import FileError
+from expdesign.importing.readers.cells import NUMBER, SHARE, WITH_UNIT, is_place, side_of
+from expdesign.importing.times import read_stamps
+from expdesign.importing.translations import is_foreign
+from expdesign.importing.units import KNOWN, split_unit, unit_word
+
+SEPARATORS = (";", "\t", "|", ",", " ")
+COMMENT = "#%/"
+EASTERN = ("cp932", "cp949", "gb18030")
+"""Encodings of Japanese, Korean and Chinese, one of which is taken where a word that is known stands in it."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How rows are written."""
+
+    separator: str
+    comma: bool  # whether numbers have decimal commas
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    header: int  # lines up to the first row of data that are no rows
+
+    def rows(self, lines: Sequence[str]) -> Iterator[list[str]]:
+        """Cells of each line."""
+        if self.separator == " ":
+            return (line.split() for line in lines)
+        return csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
+
+
+def encoding_of(path: Path) -> str:
+    """Of a text.
+
+    Raises:
+        FileError: it is none.
+    """
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    for first, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(head) > 20 and head[first::2].count(0) > 0.9 * len(head[first::2]) and 0 not in head[1 - first :: 2]:
+            return name
+    strange = sum(byte < 9 or 13 < byte < 32 for byte in head) / max(len(head), 1)
+    if strange > 0.02:
+        raise FileError(path, "", "is not text, and begins like no format that is read (see expdesign explain import)")
+    try:
+        head[:-4].decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return next((name for name in EASTERN if is_foreign(head.decode(name, "ignore"))), "cp1252")
+    return "utf-8-sig"
+
+
+def sniffed(lines: Sequence[str]) -> Dialect | None:
+    """The dialect of a table among lines of text; None where there is none."""
+    best: tuple[float, Dialect] | None = None
+    for separator in SEPARATORS:
+        comma = separator != "," and _decimal_commas(lines, separator)
+        draft = Dialect(separator, comma, (), (), 0)
+        try:
+            rows = [(line, row) for line in lines if (row := next(iter(draft.rows([line])), []))]
+        except csv.Error:
+            continue
+        widths = Counter(len(row) for _, row in rows if _is_data(row))
+        if not widths:
+            continue
+        width, count = widths.most_common(1)[0]
+        if width < 2 or count < 2:
+            continue
+        score = count / len(rows) + 0.01 * (separator in ";\t") + 0.02 * comma - 0.05 * (separator == " ")
+        if best is None or score > best[0]:
+            first = next(k for k, (_, row) in enumerate(rows) if len(row) == width and _is_data(row))
+            above = [row if separator != " " else _of_columns(line, width) for line, row in rows[:first]]
+            best = score, Dialect(separator, comma, *_header(above, width), first)
+    return None if best is None else best[1]
+
+
+def _of_columns(line: str, width: int) -> list[str]:
+    """Names above columns that blanks part: of single words, or of several with two blanks or more between."""
+    single = line.split()
+    return single if len(single) == width else re.split(r"\s{2,}", line.strip())
+
+
+def _decimal_commas(lines: Sequence[str], separator: str) -> bool:
+    cells = [cell for line in lines for cell in (line.split() if separator == " " else line.split(separator))]
+    commas = sum(bool(re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell)) for cell in cells)
+    points = sum(bool(re.fullmatch(r"\s*[+-]?\d+\.\d+\s*", cell)) for cell in cells)
+    return commas > points
+
+
+def _is_data(row: Sequence[str]) -> bool:
+    filled = [cell for cell in row if cell.strip()]
+    known = sum(bool(NUMBER.fullmatch(cell)) or is_place(cell) or side_of(cell) is not None for cell in filled)
+    known += sum(bool((found := WITH_UNIT.fullmatch(cell)) and unit_word(found[2]) in KNOWN) for cell in filled)
+    known += sum(bool(np.isfinite([*(own := read_stamps([cell])).day, *own.second]).any()) for cell in filled)
+    return len(filled) > 0 and known >= max(1.0, SHARE * len(filled)) and known > 0
+
+
+def _header(before: Sequence[Sequence[str]], width: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names and units from the rows before the first row of data."""
+    rows = [[cell.strip(' "') for cell in row] for row in before if len(row) == width]
+    rows = [[row[0].lstrip(COMMENT).strip(), *row[1:]] for row in rows]
+    if not rows:
+        return tuple(f"column {k}" for k in range(1, width + 1)), ("",) * width
+    names, units, rest = rows[-1], [""] * width, rows[:-1]
+    if rest and sum(bool(split_unit(f"x [{cell.strip('[]()')}]")[1]) for cell in names if cell) > width / 3:
+        names, units, rest = rest[-1], [cell.strip("[]()") for cell in names], rest[:-1]
+    if rest and 1 < sum(map(bool, rest[-1])) < width:  # a row of groups, as of cells that were merged
+        group = ""
+        for k, above in enumerate(rest[-1]):
+            group = above or group
+            names[k] = f"{group} {names[k]}".strip()
+    return _once([name or f"column {k}" for k, name in enumerate(names, start=1)]), tuple(units)
+
+
+def _once(names: Sequence[str]) -> tuple[str, ...]:
+    """The same, those that come again with their count: hdg, hdg (2)."""
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return tuple(found)
