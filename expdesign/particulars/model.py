@@ -15,6 +15,8 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 EQUATIONS = {"u": "X", "v": "Y", "r": "N"}
+SAMPLES = 8
+"""While she sails her length."""
 OWN_SCATTER = 0.03
 """Standard deviation of each parameter by itself, by its value: what a projection on few terms leaves out."""
 RANGES = (
@@ -83,9 +85,12 @@ def _thruster(thruster: Thruster, number: int, rps: float) -> Actuator:
 
 
 def sample_time(card: Card) -> float:
-    """Time between samples [s]: about a thirtieth of the time in which she sails her length."""
+    """Time between samples [s]: about an eighth of the time in which she sails her length.
+
+    Motion is integrated in smaller steps, so this only says how often commands and measurements come.
+    """
     usual = (0.1, 0.2, 0.5, 1.0, 2.0)
-    return min(usual, key=lambda step: abs(math.log(step * 30 * design_speed(card) / card.hull.length_m)))
+    return min(usual, key=lambda step: abs(math.log(step * SAMPLES * design_speed(card) / card.hull.length_m)))
 
 
 def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> Vessel:
