@@ -83,20 +83,25 @@ def calibration(case: Scenario, *, seed: int) -> Scenario:
 
 def _slowed(spec: PrimitiveSpec, most_mps: float | None) -> PrimitiveSpec:
     """The specification with speeds of at most so much, all of them by the same share."""
-    speeds = {name: value for name, value in spec.settings.items() if name.endswith("speed_mps") and value}
+    speeds = _speeds(spec)
     fastest = max(speeds.values(), default=0.0)
     if most_mps is None or fastest <= most_mps:
         return spec
     return replace(spec, settings={**spec.settings, **{k: v * most_mps / fastest for k, v in speeds.items()}})
 
 
+def _speeds(spec: PrimitiveSpec) -> dict[str, float]:
+    return {name: value for name, value in spec.settings.items() if name.endswith("speed_mps") and value}
+
+
 def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     """Settings with a speed and a turning radius of legs that most ships of the prior reach.
 
-    The speed is that of full ahead on a straight course; the radius that of the helm as far over as legs use it. Where
-    the file states a slower speed or a wider radius, that stays.
+    The speed is that of full ahead on a straight course, or of the fastest run; the radius that of the helm as far over
+    as legs use it. Where the file states a slower speed or a wider radius, that stays.
     """
     vessel, plan = case.vessel, case.plan
+    fastest_run = max((speed for spec in case.dictionary for speed in _speeds(spec).values()), default=np.inf)
     ship = capability(vessel, plan, current_mps=float(np.hypot(*case.environment.current_to)))
     if not isinstance(ship, HelmShip):
         return plan
@@ -123,7 +128,7 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     widest = min(float(np.quantile(radii.max(axis=0), ABLE)), WIDEST * vessel.length_m)
     return replace(
         plan,
-        transit_speed_mps=min(ship.transit_speed_mps, USABLE_SHARE * fastest),
+        transit_speed_mps=min(ship.transit_speed_mps, USABLE_SHARE * fastest, fastest_run),
         turning_radius_m=max(ship.turning_radius_m, widest),
     )
 
