@@ -25,9 +25,9 @@ PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a s
 REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
 REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
 ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
-# distance from the start within which helm-steered ships keep the heading, not the track: there they drift; as many
-# times longer as starts are less exact
-STEADY_HULLS = 2.0
+# distance from the start within which helm-steered ships keep the heading, not the track: there they drift. Where starts
+# are less exact it is as many times longer, as far as so many tolerances of the position
+STEADY_HULLS, STEADY_ROOM = 2.0, 2.0
 # of the tolerances within which a ship at a standstill begins; the whole ones after half of the waiting time
 STANDSTILL_SHARE = 0.5
 SIDEWAYS_SHARE = 0.5  # of an azimuth's thrust ahead or astern, below which it counts as to the side
@@ -358,7 +358,8 @@ class Guidance:
         """(k,) whether ships (k,) are so near that they begin on the planned heading."""
         helm = self._helm
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
-        near = STEADY_HULLS * self._water.start_tolerance * helm.vessel.length_m / sample_m
+        least_m, most_m = STEADY_HULLS * helm.vessel.length_m, STEADY_ROOM * self._within.position_m
+        near = np.clip(most_m, least_m, self._water.start_tolerance * least_m) / sample_m
         return np.asarray(self._end[ships] - self._at[ships] <= near)
 
     @property

@@ -28,7 +28,7 @@ from expdesign.vessel import VesselModel
 from expdesign.vessel.hull import covering_discs
 
 WIDE = 0.25  # median standard deviation of parameters, in their values, from which a prior is wide
-NEAR_HULLS = 0.75  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
+NEAR_HULLS = 1.5  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
 KEPT = 0.9  # share of the ships that do
 ABLE = 0.95  # share of the ships that reach the speed and the turning radius of legs
 DRAWN = 200  # ships drawn of each run
@@ -37,7 +37,7 @@ SHORTEST = 0.15  # share of a run below which it is left out
 SPEEDS = 200  # between rest and top speed, at which the thrust of drawn ships is compared with their resistance
 WIDEST = 20.0  # hull lengths of the turning radius of legs at most
 START_TOLERANCE = 3.0  # so many times less exactly than usual its runs begin, and its goal is reached
-TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
+TIME_SHARE = 0.4  # of the scenario's informative time that a first trial takes
 
 
 def is_wide(model: VesselModel) -> bool:
