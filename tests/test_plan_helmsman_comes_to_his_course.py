@@ -52,9 +52,7 @@ def test_a_ship_steered_by_azimuths_keeps_her_course_while_they_push_astern(azim
     """Turned thrust acts the other way round astern: a helm that did not know would turn her broadside."""
     ship = capability(azimuths, PlanSettings())
     helm, speed = Helmsman(vessel=azimuths, environment=CALM, ship=ship), ship.transit_speed_mps
-    truths = Truths(
-        parameters=azimuths.model.parameters[None], current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2))
-    )
+    truths = Truths(parameters=azimuths.model.parameters[None], current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2)))
     start = np.array([0.0, 0.0, side * np.radians(2.0), speed, 0.0, 0.0])
     standing = np.array(ship.approach.inputs)
     fleet = Fleet(azimuths, CALM, truths, state=start, standing=standing, rng=np.random.default_rng(0))

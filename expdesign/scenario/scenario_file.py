@@ -97,8 +97,9 @@ class PlanTable(Table):
         default=PlanSettings.start_tolerance,
         ge=1,
         le=4,
-        description="a factor on how far heading, speed and yaw rate may be off where a run begins, and on the distance "
-        "from the goal at which a trial has reached it: a ship of which little is known does not come closer",
+        description="a factor on how far heading, speed and yaw rate may be off where a run begins, on how far its "
+        "place may where there is room, and on the distance from the goal at which a trial has reached it: a ship of "
+        "which little is known does not come closer",
     )
     time_budget_s: Positive = Field(
         default=PlanSettings.time_budget_s,

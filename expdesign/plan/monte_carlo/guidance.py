@@ -20,13 +20,14 @@ PAST_START_HULLS = 1.0  # hull lengths past the start over which a reference con
 # a ship may take so many times as long as planned for a reference or a path, and so many time constants of the return
 # to a reference besides
 PATIENCE, WAITING_TIME_CONSTANTS = 3.0, 10.0
+LONGEST_ATTEMPTS = 2.0  # times that a first attempt may take, which a leg may take in any case
 LEAST_STEP = 0.2  # movement of a slow reference per sample, in that at transit speed
 PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a ship may sail beside the leg before it
 REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
 REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
 ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
-# distance from the start within which helm-steered ships keep the heading, not the track: there they drift. Where starts
-# are less exact it is as many times longer, as far as so many tolerances of the position
+# distance from the start within which helm-steered ships keep the heading, not the track: there they drift; longer where
+# starts are less exact, as far as so many tolerances of the position
 STEADY_HULLS, STEADY_ROOM = 2.0, 2.0
 # of the tolerances within which a ship at a standstill begins; the whole ones after half of the waiting time
 STANDSTILL_SHARE = 0.5
@@ -75,12 +76,12 @@ class Guidance:
             sailing: (n,) ships that take part.
             inputs: (m,) commands with which the run begins: azimuths keep near their angles.
             last: whether the leg leads to the goal, where the position alone counts.
-            longest: samples on it after which a trial is aborted.
+            longest: samples on it after which a trial is aborted, if so many are more than some attempts may take.
         """
         after_m = 0.0 if last else max(PAST_START_HULLS * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
-        self._longest, self._arrived_m = longest, water.start_tolerance * ARRIVED_HULLS * helm.vessel.length_m
+        self._arrived_m = water.start_tolerance * ARRIVED_HULLS * helm.vessel.length_m
         self._free = np.array(helm.vessel.turns_freely, dtype=float)
         self._desired, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
@@ -96,6 +97,7 @@ class Guidance:
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
         self._deadline = np.full(n, self._allowed(len(track)))
+        self._longest = max(longest, LONGEST_ATTEMPTS * self._allowed(len(track)))
 
     def sail(self, fleet: Fleet, unexplained: Array) -> Approach:
         """Until every ship has begun or aborted, from the estimates of unexplained acceleration so far (n, 3)."""

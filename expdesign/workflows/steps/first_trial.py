@@ -8,7 +8,7 @@ its goal is reached, less exactly than usual. What it tells narrows the prior, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +35,7 @@ DRAWN = 200  # ships drawn of each run
 CUT = (0.5, 0.9)  # least and most share of a run that is tried next
 SHORTEST = 0.15  # share of a run below which it is left out
 SPEEDS = 200  # between rest and top speed, at which the thrust of drawn ships is compared with their resistance
-WIDEST = 20.0  # hull lengths of the turning radius of legs at most
+WIDEST = 8.0  # hull lengths of the turning radius of legs at most
 START_TOLERANCE = 3.0  # so many times less exactly than usual its runs begin, and its goal is reached
 TIME_SHARE = 0.4  # of the scenario's informative time that a first trial takes
 
