@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,8 @@ RANGES = (
     (re.compile(r"X_n\d+(_astern)?|Y_(side_)?n\d+"), (0.0, math.inf)),  # thrust
 )
 """Parameters whose sign physics gives: a hull that is driven by its own drag runs away."""
+STEERING = re.compile(r"[YN]_ua\d+|N_(u|n\d+)rudder\d+|N_turn_n\d+|N_n\d+")
+"""Parameters that keep their sign, which place and side of the actuator give: a helm turns her to its side."""
 
 
 def parameters(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> dict[Term, float]:
@@ -93,6 +96,12 @@ def sample_time(card: Card) -> float:
     return min(usual, key=lambda step: abs(math.log(step * SAMPLES * design_speed(card) / card.hull.length_m)))
 
 
+def _sides(found: Mapping[Term, float]) -> dict[str, tuple[float, float]]:
+    """Ranges of parameters that keep their sign."""
+    steering = {term.name: value for term, value in found.items() if STEERING.fullmatch(term.name) and value}
+    return {name: (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0) for name, value in steering.items()}
+
+
 def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> Vessel:
     """The vessel with these factors, parameters without scatter."""
     found = parameters(card, driving, deviations)
@@ -101,9 +110,9 @@ def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> 
     model = VesselModel(
         terms=tuple(found), parameters=np.array([*found.values()]), parameter_std=np.zeros(len(found)),
         form="continuous", sample_time_s=step, actuators=actuators(card, driving),
-        parameter_range={
+        parameter_range={**_sides(found), **{
             term.name: ends for term in found for names, ends in RANGES if names.fullmatch(term.name)
-        },
+        }},
     )  # fmt: skip
     return Vessel(
         name=card.name, length_m=hull.length_m, beam_m=hull.beam_m, draught_m=hull.draught_m, sample_time_s=step,
