@@ -61,8 +61,8 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
             no_helm = str(error)
     if yaw is None:
         raise NoPlan(
-            f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model, and no helm "
-            f"was found: {no_helm}"
+            f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model, and no "
+            f"helm was found: {no_helm}"
         )
     yaw = min(yaw, LATERAL_MPS2 / transit / USABLE_SHARE)
     if settings.turning_radius_m is not None and settings.turning_radius_m < transit / yaw:

@@ -174,7 +174,7 @@ class HelmController:
             self.vessel.model.accelerations(
                 motion, motion[:2], tuple(np.moveaxis(helm.rows(order, self.approach.angle_rad + angle), -1, 0))
             )[2]
-            for angle in (self.approach.starboard * tilt, -self.approach.starboard * tilt)
+            for angle in self.approach.starboard * np.array([[tilt], [-tilt]])
         ]
         found = (sides[0] - sides[1]) / (2 * tilt)
         least = HELM_SLOWEST**2 * self._helm_effect

@@ -26,8 +26,8 @@ PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a s
 REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
 REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
 ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
-# distance from the start within which helm-steered ships keep the heading, not the track: there they drift; longer where
-# starts are less exact, as far as so many tolerances of the position
+# distance from the start within which helm-steered ships keep the heading, not the track: there they drift; longer
+# where starts are less exact, as far as so many tolerances of the position
 STEADY_HULLS, STEADY_ROOM = 2.0, 2.0
 # of the tolerances within which a ship at a standstill begins; the whole ones after half of the waiting time
 STANDSTILL_SHARE = 0.5
