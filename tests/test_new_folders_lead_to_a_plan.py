@@ -1,6 +1,7 @@
 """`new` makes a folder of each kind whose trial is planned and verified, and says what acts in it and what does not."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from expdesign.workflows.steps.first_trial import (
     NEAR_HULLS,
     calibration,
     first_note,
+    half_as_wide,
     is_wide,
     legs_for_most,
 )
@@ -180,6 +182,65 @@ def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Pat
             draws=300,
         )
         assert apart[-1] <= 1.1 * NEAR_HULLS * case.vessel.length_m
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_drawn_ships_of_a_wide_prior_are_driven_and_steered_to_the_side_of_the_nominal_one(
+    kind: str, tmp_path: Path
+) -> None:
+    model = load_vessel(new(tmp_path / "trial", kind=kind).files[-1].parent / "vessel.toml").model
+    wide = replace(model, parameter_std=0.5 * np.abs(model.parameters))
+    drawn = wide.drawn_parameters(500, np.random.default_rng(0))
+    pushes = [index for index, name in enumerate(wide.names) if name in wide.parameter_range]
+    assert len(pushes) >= 7
+    assert (drawn[:, pushes] * wide.parameters[pushes] >= 0.0).all()
+
+
+def test_half_as_wide_a_prior_has_half_the_deviations_also_where_none_is_stated(tmp_path: Path) -> None:
+    case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
+    model = replace(case.vessel.model, unstated_std={"X_vr": 0.5})
+    model = replace(model, parameter_std=np.where(np.array(model.names) == "X_vr", 0.0, model.parameter_std))
+    case = replace(case, vessel=replace(case.vessel, model=model))
+    np.testing.assert_allclose(half_as_wide(case).vessel.model.drawn_std, model.drawn_std / 2)
+
+
+def _with_values(path: Path, table: str, values: dict[str, float]) -> None:
+    """Other values in a table of a vessel file."""
+    head, _, rest = path.read_text("utf-8").partition(f"[model.{table}]\n")
+    rest = rest[rest.index("\n[") :]
+    rows = "".join(f"{name} = {value!r}\n" for name, value in values.items())
+    path.write_text(f"{head}[model.{table}]\n{rows}{rest}", "utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_from_a_wide_prior_by_a_first_trial_to_the_whole_plan(
+    share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The true ship is drawn from the wide prior; the first trial narrows it, and the rest is planned and verified."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "wide", "--kind", "propeller-rudder", "--quiet"]) == 0
+    path = Path("wide/vessel.toml")
+    model = load_vessel(path).model
+    stated = dict(zip(model.names, (share * np.abs(model.parameters)).tolist(), strict=True))
+    _with_values(path, "parameter_std", stated)
+    assert main(["run", "wide/scenario.toml", "--out", "first", "--quiet"]) == 0
+    plan = json.loads(Path("first/plan.json").read_text("utf-8"))
+    assert plan["verified"] is True
+    model = load_vessel(path).model
+    drawn = model.drawn_parameters(1, np.random.default_rng(1))[0]
+    shutil.copy(path, "wide/true.toml")
+    _with_values(Path("wide/true.toml"), "parameters", dict(zip(model.names, drawn.tolist(), strict=True)))
+    for command in (
+        "simulate first/plan.json --truth wide/true.toml --out sailed",
+        "estimate sailed/measured.csv --vessel wide/vessel.toml --method oe --out estimate",
+        "replan wide/scenario.toml --data sailed/measured.csv --vessel estimate/vessel-estimated.toml --remaining 640 "
+        "--stopped --out rest",
+    ):
+        assert main([*command.split(), "--quiet"]) == 0, command
+    found = load_vessel("estimate/vessel-estimated.toml").model
+    assert np.median(found.parameter_std / np.abs(found.parameters)) < 0.5 * share
+    assert json.loads(Path("rest/plan.json").read_text("utf-8"))["verified"] is True
 
 
 def test_the_note_on_a_first_trial_counts_the_runs_that_it_slows(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from expdesign.cli import main
 from expdesign.indices import standard_results
 from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
 from expdesign.particulars.fit import Problem, fitted
+from expdesign.particulars.model import SAMPLES, STEERING
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
 
@@ -245,3 +246,21 @@ def test_units_of_a_card_are_a_mariners() -> None:
     assert by_source["speeds[1].speed_kn"].value == pytest.approx(6.8 * 1852 / 3600)
     assert by_source["speeds[1].speed_kn"].trial.order == 0.5
     assert card.drives[0].angle_rate_radps == pytest.approx(math.radians(12.0))
+
+
+@pytest.mark.parametrize("kind", ["propeller", "azimuth", "podded"])
+def test_drawn_ships_are_steered_to_the_side_of_the_nominal_one_and_sampled_some_times_a_length(kind: str) -> None:
+    stern = replace(COASTER.thrusters[0], kind=kind, starboard_m=2.0)
+    tunnel = Thruster(kind="tunnel", forward_m=30.0, power_w=2e5)
+    rudders = COASTER.rudders if kind == "propeller" else ()
+    ship = Problem(replace(COASTER, thrusters=(stern, tunnel), rudders=rudders)).ship
+    model = ship.model
+    steering = [name for name in model.names if STEERING.fullmatch(name)]
+    assert steering
+    wide = replace(model, parameter_std=0.5 * np.abs(model.parameters))
+    drawn = wide.drawn_parameters(50, np.random.default_rng(0))
+    for name in steering:
+        index = model.names.index(name)
+        assert (drawn[:, index] * model.parameters[index] >= 0.0).all()
+    samples = ship.length_m / COASTER.top_speed_mps / ship.sample_time_s
+    assert SAMPLES / 2 < samples < 2 * SAMPLES

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -8,9 +9,13 @@ import pytest
 from expdesign.errors import NoPlan
 from expdesign.plan.control.capability import capability
 from expdesign.plan.values import PlanSettings
-from expdesign.scenario import load_vessel
+from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import STRUCTURES
+from expdesign.workflows.steps.planned import leg_remarks
 from plan_case import VESSELS, ship
+
+SCENARIOS = VESSELS.parent
+capability_module = importlib.import_module("expdesign.plan.control.capability")
 
 
 def test_top_speed_is_the_steady_speed_at_full_thrust():
@@ -47,3 +52,19 @@ def test_a_ship_without_a_yaw_equation_cannot_be_steered():
     model = replace(vessel.model, terms=terms, parameters=np.array([-0.2, 0, 0, 0.01]), parameter_std=np.zeros(4))
     with pytest.raises(NoPlan, match="no r equation"):
         capability(replace(vessel, model=model), PlanSettings())
+
+
+def test_a_ship_that_should_be_steered_by_a_helm_but_has_none_is_planned_by_her_thrusters_and_that_is_said(monkeypatch):
+    case = load_scenario(SCENARIOS / "helsinki.toml")
+    assert capability(case.vessel, case.plan).note == ""
+    assert leg_remarks(case) == ()
+
+    def refused(*_: object) -> None:
+        raise NoPlan("no steady turn to both sides")
+
+    monkeypatch.setattr(capability_module, "WIDEST_WITHOUT_DRIFT", 0.0)
+    monkeypatch.setattr(capability_module, "_helm_ship", refused)
+    (said,) = leg_remarks(case)
+    assert said == capability(case.vessel, case.plan).note
+    assert "no helm for legs was found (no steady turn to both sides)" in said
+    assert "on the spot" in said

@@ -14,9 +14,9 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
-from expdesign.plan.monte_carlo import trials
+from expdesign.plan.monte_carlo import guidance, trials
 from expdesign.plan.monte_carlo.guidance import ARRIVED_HULLS, GO_AROUNDS, PARALLEL_SHARE, STANDSTILL_SHARE, Guidance
-from expdesign.plan.monte_carlo.procedure import tolerances
+from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
 from expdesign.plan.monte_carlo.trials import CollisionCheck, Trials, sail_trials
 from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
@@ -197,6 +197,37 @@ def test_a_long_leg_to_a_run_that_begins_sideways_takes_no_longer_than_one_to_a_
         found = guidance.sail(fleet, np.zeros((20, 3)))
         took[angle] = np.median(found.samples[found.begun])
     assert took[-np.pi / 2] < 1.1 * took[0.0]
+
+
+def test_a_ship_that_does_not_arrive_is_given_up_when_the_plan_would_be_over(monkeypatch: pytest.MonkeyPatch):
+    water = leg_water(OPEN, clearance_m=5.0)
+    task = LegTask(
+        start=at_rest(0, 0, 0.0), end=at_rest(60, 0, 0.0), start_inputs=np.zeros(4), end_inputs=np.zeros(4), seed=1
+    )
+    track = water.sail(task.start, find_leg(task, water))
+    helm = Helmsman(vessel=water.vessel, environment=CALM, ship=water.ship)
+    idle = 0.0 * water.vessel.model.parameters[None]  # nothing moves this ship
+    truths = Truths(parameters=idle, current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2)))
+    took = {}
+    for attempts, longest in ((0.0, 100.0), (0.2, 10.0), (0.0, np.inf)):
+        monkeypatch.setattr(guidance, "LONGEST_ATTEMPTS", attempts)
+        fleet = Fleet(water.vessel, CALM, truths, state=task.start, standing=np.zeros(4), rng=np.random.default_rng(0))
+        sailed = Guidance(
+            helm,
+            water,
+            np.hstack([track.pose, track.velocity]),
+            within=tolerances(water),
+            sailing=np.ones(1, dtype=bool),
+            inputs=np.zeros(4),
+            last=False,
+            longest=longest,
+        ).sail(fleet, np.zeros((1, 3)))
+        assert not sailed.begun.any()
+        assert ABORT_CAUSES[sailed.abort_cause[0]] == "time"
+        took[longest] = int(sailed.samples[0])
+    assert took[100.0] == 101
+    assert 11 < took[10.0] < took[np.inf]  # a share of an attempt has its time in any case
+    assert took[np.inf] > 200
 
 
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():

@@ -45,3 +45,15 @@ def test_a_ship_that_keeps_its_way_for_minutes_begins_within_a_tenth_of_its_spee
     water = replace(leg_water(OPEN), vessel=case.vessel, ship=ship)
     assert speed_decay_s(case.vessel, ship.transit_speed_mps) > 100.0
     assert tolerances(water).speed_mps == pytest.approx(0.1 * ship.transit_speed_mps)
+
+
+def test_starts_are_as_many_times_less_exact_as_the_plan_allows():
+    water = leg_water(OPEN)
+    usual, wider = (tolerances(replace(water, start_tolerance=times), 1e6) for times in (1.0, 3.0))
+    assert wider.position_m == pytest.approx(3 * usual.position_m)
+    assert wider.heading_rad == pytest.approx(3 * usual.heading_rad)
+    assert wider.yaw_rate_radps == pytest.approx(3 * usual.yaw_rate_radps)
+    assert tolerances(replace(water, start_tolerance=3.0), 2.0).position_m == tolerances(water, 2.0).position_m  # room
+    slow = tolerances(water).speed_mps, tolerances(replace(water, start_tolerance=3.0)).speed_mps
+    assert slow[1] >= slow[0]
+    assert slow[1] >= 0.3 * water.ship.transit_speed_mps * (1 - 1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
 EQUATIONS = {"u": "X", "v": "Y", "r": "N"}
+SAMPLES = 8
+"""While she sails her length."""
 OWN_SCATTER = 0.03
 """Standard deviation of each parameter by itself, by its value: what a projection on few terms leaves out."""
 RANGES = (
@@ -23,6 +26,8 @@ RANGES = (
     (re.compile(r"X_n\d+(_astern)?|Y_(side_)?n\d+"), (0.0, math.inf)),  # thrust
 )
 """Parameters whose sign physics gives: a hull that is driven by its own drag runs away."""
+STEERING = re.compile(r"[YN]_ua\d+|N_(u|n\d+)rudder\d+|N_turn_n\d+|N_n\d+")
+"""Parameters that keep their sign, which place and side of the actuator give: a helm turns her to its side."""
 
 
 def parameters(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> dict[Term, float]:
@@ -83,9 +88,18 @@ def _thruster(thruster: Thruster, number: int, rps: float) -> Actuator:
 
 
 def sample_time(card: Card) -> float:
-    """Time between samples [s]: about a thirtieth of the time in which she sails her length."""
+    """Time between samples [s]: about an eighth of the time in which she sails her length.
+
+    Motion is integrated in smaller steps, so this only says how often commands and measurements come.
+    """
     usual = (0.1, 0.2, 0.5, 1.0, 2.0)
-    return min(usual, key=lambda step: abs(math.log(step * 30 * design_speed(card) / card.hull.length_m)))
+    return min(usual, key=lambda step: abs(math.log(step * SAMPLES * design_speed(card) / card.hull.length_m)))
+
+
+def _sides(found: Mapping[Term, float]) -> dict[str, tuple[float, float]]:
+    """Ranges of parameters that keep their sign."""
+    steering = {term.name: value for term, value in found.items() if STEERING.fullmatch(term.name) and value}
+    return {name: (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0) for name, value in steering.items()}
 
 
 def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> Vessel:
@@ -96,9 +110,9 @@ def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> 
     model = VesselModel(
         terms=tuple(found), parameters=np.array([*found.values()]), parameter_std=np.zeros(len(found)),
         form="continuous", sample_time_s=step, actuators=actuators(card, driving),
-        parameter_range={
+        parameter_range={**_sides(found), **{
             term.name: ends for term in found for names, ends in RANGES if names.fullmatch(term.name)
-        },
+        }},
     )  # fmt: skip
     return Vessel(
         name=card.name, length_m=hull.length_m, beam_m=hull.beam_m, draught_m=hull.draught_m, sample_time_s=step,

@@ -174,6 +174,7 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
         corners=CHART.corners if finer == 1.0 else MORE_CORNERS,
+        start_tolerance=problem.settings.start_tolerance,
         paths=problem.settings.paths,
     )
 

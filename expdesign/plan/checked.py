@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from expdesign.errors import NoPlan
 from expdesign.plan.legs import LegWater
@@ -30,6 +31,8 @@ PROMISE = 0.8
 TRIALS_STREAM = 1  # random stream of the drawn trials, apart from other draws of the same seed
 # random stream, and number, of the trials whose time decides which of several days is expected to be the shortest
 LATENESS_STREAM, LATENESS_TRIALS = 2, 60
+# trials that show early that too many fail, and the share of the plans at their limits that these trials leave
+FEW_TRIALS, GIVEN_UP_RARELY = 20, 0.95
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,3 +135,15 @@ def promising(problem: PlanProblem, water: LegWater, sailed: SailedTrial, *, bud
     trials = sail_trials(water, sailed, draws=LATENESS_TRIALS, rng=rng)
     budget.sailed(trials.samples_sailed)
     return shares_allowed(trials.shares(), problem.settings.confidence)
+
+
+def may_be_verified(problem: PlanProblem, water: LegWater, sailed: SailedTrial) -> bool:
+    """Whether drawn trials may yet call a plan verified: few of them do not show that too many fail.
+
+    A plan at its limits is given up in about one case of twenty.
+    """
+    rng, settings = np.random.default_rng((problem.seed, TRIALS_STREAM)), problem.settings
+    trials = sail_trials(water, sailed, draws=FEW_TRIALS, rng=rng)
+    most = scipy.stats.binom.ppf(GIVEN_UP_RARELY, FEW_TRIALS, [1.0 - settings.confidence, settings.aborted_most])
+    failed = [int(some.any(axis=0).sum()) for some in (trials.left, trials.aborted)]
+    return bool((np.array(failed) <= most).all())

@@ -59,11 +59,12 @@ BOUND_REACH = 0.6
 Planned = TypeVar("Planned")
 
 
-def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
+def plan_trial(problem: PlanProblem, *, advise: bool = True, progress: Progress = silent) -> Plan:
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Args:
         problem: the trial.
+        advise: whether a refusal tries which changes help, which takes as long as several plans.
         progress: of the planning.
 
     Raises:
@@ -73,7 +74,7 @@ def plan_trial(problem: PlanProblem, *, progress: Progress = silent) -> Plan:
     try:
         return _in_water(problem, never_falling(progress), _planned)
     except NoPlan as error:
-        raise with_advice(problem, error, progress) from None
+        raise with_advice(problem, error, progress) if advise else error from None
 
 
 def plan_drafted(problem: PlanProblem, draft: Draft, *, progress: Progress = silent) -> Plan:

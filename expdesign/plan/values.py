@@ -24,6 +24,9 @@ class PlanSettings:
     # share of drawn trials that must stay in allowed water from start to goal, between 0 and 1
     confidence: float = 0.95
     aborted_most: float = 0.1  # share of drawn trials that may be aborted in a plan that counts as verified
+    # factor on how far heading, speed, yaw rate and, where there is room, place may be off where a run begins, and on
+    # the distance from the goal at which a trial has reached it
+    start_tolerance: float = 1.0
     # for tries of other places where a leg or a run fails: one for every two seconds, fewer where legs cost more [s].
     # Work is counted, so that a slow machine finds the same plan as a fast one; by the clock a search that is stuck
     # ends after five times the budget. A plan whose drawn trials leave the water is made anew once, and a second time

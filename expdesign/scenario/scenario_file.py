@@ -94,6 +94,14 @@ class PlanTable(Table):
         description="the share of these trials that may be aborted because a run cannot be begun or the goal is not "
         "reached; a plan with more of them is written, but not called verified, and none is from half of them on",
     )
+    start_tolerance: float = Field(
+        default=PlanSettings.start_tolerance,
+        ge=1,
+        le=4,
+        description="a factor on how far heading, speed and yaw rate may be off where a run begins, on how far its "
+        "place may where there is room, and on the distance from the goal at which a trial has reached it: a ship of "
+        "which little is known does not come closer",
+    )
     time_budget_s: Positive = Field(
         default=PlanSettings.time_budget_s,
         description="the work budget for other placements [s] on a usual computer; work is counted, not timed, so that "

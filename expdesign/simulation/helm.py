@@ -102,6 +102,18 @@ class Helm:
         return row
 
     @property
+    def turns_thrust(self) -> bool:
+        """Whether the helm turns thrust, so that it acts the other way round with the engines astern."""
+        return self.means in ("azimuth", "force")
+
+    def drives(self, inputs: Array) -> Array:
+        """(n,) engine orders of commands (n, m) whose thrust is turned: those of the first actuator that steers."""
+        actuator = self.steering[0]
+        column, limit = self.vessel.model.inputs.index(actuator.signals[0]), actuator.limits[0]
+        thrust = inputs[:, column]
+        return np.asarray(thrust / np.where(thrust < 0.0, -min(limit.low, -1e-300), max(limit.high, 1e-300)))
+
+    @property
     def drive_rate(self) -> float:
         """Largest change of the engine order per second."""
         thrust = [a for a in self.vessel.actuators if a.kind in ("propeller", "azimuth", "force")]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 
 import numpy as np
 
@@ -54,24 +53,32 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
     if top is None:
         raise NoPlan(f"vessel {vessel.name!r} cannot hold any speed ahead with its actuators and nominal model")
     transit = _transit_speed(vessel, settings, top, current_mps)
-    yaw = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m)
+    yaw, no_helm = _largest(lambda r: _holds(vessel, (transit, 0.0, r)), start=1e-4 * transit / vessel.length_m), ""
     if yaw is None or transit / yaw > WIDEST_WITHOUT_DRIFT * vessel.length_m:
-        with suppress(NoPlan):  # without a helm she turns as wide as she does, or where she is
+        try:
             return _helm_ship(vessel, settings, current_mps)
+        except NoPlan as error:  # without a helm she turns as wide as she does, or where she is
+            no_helm = str(error)
     if yaw is None:
-        raise NoPlan(f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model")
+        raise NoPlan(
+            f"vessel {vessel.name!r} cannot turn at {transit:.3g} m/s with its actuators and nominal model, and no "
+            f"helm was found: {no_helm}"
+        )
     yaw = min(yaw, LATERAL_MPS2 / transit / USABLE_SHARE)
     if settings.turning_radius_m is not None and settings.turning_radius_m < transit / yaw:
         raise NoPlan(
             f"plan.turning_radius_m is {settings.turning_radius_m:g}, at {transit:.3g} m/s vessel {vessel.name!r} "
-            f"needs {transit / yaw:.4g} m or more",
+            f"needs {transit / yaw:.4g} m or more" + (f"; no helm for legs was found ({no_helm})" if no_helm else ""),
             what="radius",
         )
     spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
     agile = pushed_everywhere(vessel.model) and spot > transit / vessel.length_m / 10
     radius = settings.turning_radius_m or max(transit / (USABLE_SHARE * yaw), 1.5 * vessel.length_m)
     rate = min(USABLE_SHARE * yaw, 2.0 * transit / radius)
+    turns = "on the spot and sideways" if agile else f"in arcs of {radius:.3g} m"
+    note = f"no helm for legs was found ({no_helm}), so she is planned to turn {turns}" if no_helm else ""
     return (AgileShip if agile else DubinsShip)(
+        note=note,
         top_speed_mps=top,
         transit_speed_mps=transit,
         turning_radius_m=radius,

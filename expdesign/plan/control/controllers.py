@@ -18,6 +18,7 @@ from expdesign.vessel import Allocator, Vessel, required_push
 COURSE_FREQUENCY, COURSE_DAMPING = 1.2, 0.9
 COARSE = 1e-2  # acceleration that commands may miss, in those of full thrust: the next sample makes it good
 HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
+HELM_TILT_RAD = 0.1  # to both sides, by which the effect of thrust that is turned is measured
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 
 
@@ -32,6 +33,7 @@ class Demand:
     moving: Array  # (n, 3) velocity through water in the b-frame
     unexplained: Array  # (n, 3) acceleration that the nominal model does not explain
     near: Array  # (n, m) commands to whose angles azimuths keep
+    standing: Array  # (n, m) commands that stand
 
 
 class Controller(Protocol):
@@ -99,7 +101,7 @@ class HelmController:
         """(n, m) desired actuator values."""
         speed, course = self._pointed(demand)
         desired = np.column_stack([speed, course - demand.states[:, 2], demand.reference[:, 5]])
-        angle = self._helm(desired, demand.moving, demand.unexplained)
+        angle = self._helm(desired, demand.moving, demand.unexplained, demand.standing)
         drive = self._drive(desired[:, 0], demand.moving, angle, demand.unexplained[:, 0])
         return np.asarray(self.approach.helm.rows(drive, angle))
 
@@ -122,7 +124,7 @@ class HelmController:
         """Time of a hull length at transit speed [s]."""
         return self.vessel.length_m / self.transit_speed_mps
 
-    def _helm(self, desired: Array, moving: Array, unexplained: Array) -> Array:
+    def _helm(self, desired: Array, moving: Array, unexplained: Array, standing: Array) -> Array:
         """(n,) helm angles: those of steady turns, and more or less by what is missing in heading and yaw rate."""
         approach = self.approach
         quick = COURSE_FREQUENCY / self._pace_s
@@ -131,6 +133,8 @@ class HelmController:
         missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
         effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, HELM_SLOWEST) ** 2
         change = np.interp(desired[:, 2], *self._turns) + missing / effect
+        if self.approach.helm.turns_thrust:
+            change *= effect / self._effects_of_thrust(moving, standing)
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
 
     def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
@@ -161,6 +165,20 @@ class HelmController:
             for side in (1, -1)
         ]
         return max(float(sides[0] - sides[1]) / (2 * tilt), 1e-12)
+
+    def _effects_of_thrust(self, moving: Array, standing: Array) -> Array:
+        """(n,) yaw acceleration per helm angle of thrust that is turned: none at idle, the other way round astern."""
+        helm, tilt = self.approach.helm, HELM_TILT_RAD
+        order, motion = helm.drives(standing), tuple(moving.T)
+        sides = [
+            self.vessel.model.accelerations(
+                motion, motion[:2], tuple(np.moveaxis(helm.rows(order, self.approach.angle_rad + angle), -1, 0))
+            )[2]
+            for angle in self.approach.starboard * np.array([[tilt], [-tilt]])
+        ]
+        found = (sides[0] - sides[1]) / (2 * tilt)
+        least = HELM_SLOWEST**2 * self._helm_effect
+        return np.asarray(np.where(found < 0.0, np.minimum(found, -least), np.maximum(found, least)))
 
     @cached_property
     def _own_damping(self) -> float:

@@ -37,6 +37,7 @@ class Capability(ABC):
     acceleration_mps2: float  # mean surge acceleration between rest and transit speed
     lateral_mps2: float = LATERAL_MPS2  # largest surge speed times yaw rate on legs
     spot_rate_radps: float = 0.0  # yaw rate of turns at little speed; 0 for ships that do not turn there
+    note: str = ""  # how it is steered on legs, where that is not what its thrusters suggest
 
     @property
     def turn_rate_radps(self) -> float:

@@ -141,6 +141,7 @@ class Helmsman:
             moving=self._in_body(states),
             unexplained=np.zeros((len(states), 3)) if unexplained is None else unexplained,
             near=before if near is None else near,
+            standing=before,
         )
         return self._commanded(self.controller.commands(demand), before, delivered)
 

@@ -100,6 +100,7 @@ class LegWater:
     clearance_m: float  # least distance of the hull from anything forbidden
     field: ClearanceField  # the same water on a grid
     corners: Corners = CHART.corners  # that paths may bend at, as `Tuning.corners` of charts
+    start_tolerance: float = PlanSettings.start_tolerance  # of runs and goal, as `PlanSettings.start_tolerance`
     paths: PathsName = PlanSettings.paths  # what finds paths that bend, as `PlanSettings.paths`
 
     @cached_property

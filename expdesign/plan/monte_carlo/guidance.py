@@ -20,13 +20,15 @@ PAST_START_HULLS = 1.0  # hull lengths past the start over which a reference con
 # a ship may take so many times as long as planned for a reference or a path, and so many time constants of the return
 # to a reference besides
 PATIENCE, WAITING_TIME_CONSTANTS = 3.0, 10.0
+LONGEST_ATTEMPTS = 2.0  # times that a first attempt may take, which a leg may take in any case
 LEAST_STEP = 0.2  # movement of a slow reference per sample, in that at transit speed
 PARALLEL_SHARE = 0.5  # of the tolerance of a run's start position, by which a ship may sail beside the leg before it
 REJOIN_SAMPLES = 5  # samples between the points at which a return to the leg is checked against the shore
 REJOIN_SHARE = 0.5  # of a leg's time within which a ship must be able to return to it
 ARRIVED_HULLS = 1.5  # distance from the goal at which a trial has reached it
-# distance from the start within which helm-steered ships keep the heading, not the track: there they drift
-STEADY_HULLS = 2.0
+# distance from the start within which helm-steered ships keep the heading, not the track: there they drift; longer
+# where starts are less exact, as far as so many tolerances of the position
+STEADY_HULLS, STEADY_ROOM = 2.0, 2.0
 # of the tolerances within which a ship at a standstill begins; the whole ones after half of the waiting time
 STANDSTILL_SHARE = 0.5
 SIDEWAYS_SHARE = 0.5  # of an azimuth's thrust ahead or astern, below which it counts as to the side
@@ -63,6 +65,7 @@ class Guidance:
         sailing: np.ndarray,
         inputs: Array,
         last: bool,
+        longest: float = np.inf,
     ) -> None:
         """Ships stand wherever they are.
 
@@ -73,10 +76,12 @@ class Guidance:
             sailing: (n,) ships that take part.
             inputs: (m,) commands with which the run begins: azimuths keep near their angles.
             last: whether the leg leads to the goal, where the position alone counts.
+            longest: samples on it after which a trial is aborted, if so many are more than some attempts may take.
         """
         after_m = 0.0 if last else max(PAST_START_HULLS * helm.vessel.length_m, within.position_m)
         n, planned, runs_up = len(sailing), planned_stretch(helm, track, after_m), run_up(helm, water, track, after_m)
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
+        self._arrived_m = water.start_tolerance * ARRIVED_HULLS * helm.vessel.length_m
         self._free = np.array(helm.vessel.turns_freely, dtype=float)
         self._desired, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
@@ -92,6 +97,7 @@ class Guidance:
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
         self._deadline = np.full(n, self._allowed(len(track)))
+        self._longest = max(longest, LONGEST_ATTEMPTS * self._allowed(len(track)))
 
     def sail(self, fleet: Fleet, unexplained: Array) -> Approach:
         """Until every ship has begun or aborted, from the estimates of unexplained acceleration so far (n, 3)."""
@@ -150,6 +156,9 @@ class Guidance:
         if over.any():
             over &= self.doing[ships] == TRACKING
             self._go_around(ships[over], states[over])
+        if self._sample > self._longest:
+            sails = ships[self.doing[ships] < BEGUN]
+            self.doing[sails], self._abort_cause[sails] = ABORTED, ABORT_CAUSES.index("time")
 
     def _passed(self, ships: np.ndarray, states: Array, on: np.ndarray) -> np.ndarray:
         """(k,) whether ships on a reference are as near to the start as this time; those in tolerance begin."""
@@ -184,7 +193,7 @@ class Guidance:
     def _at_goal(self, states: Array) -> np.ndarray:
         """(k,) whether ships at states (k, 6) of the leg to the goal have reached it: their place alone counts."""
         off_m = lengths(states[:, :2] - self._desired[:2])
-        return np.asarray(off_m <= ARRIVED_HULLS * self._helm.vessel.length_m)
+        return np.asarray(off_m <= self._arrived_m)
 
     def _run_up(self, ships: np.ndarray) -> None:
         self.doing[ships], self._shift[ships] = TRACKING, 0.0
@@ -351,7 +360,8 @@ class Guidance:
         """(k,) whether ships (k,) are so near that they begin on the planned heading."""
         helm = self._helm
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
-        near = STEADY_HULLS * helm.vessel.length_m / sample_m
+        least_m, most_m = STEADY_HULLS * helm.vessel.length_m, STEADY_ROOM * self._within.position_m
+        near = np.clip(most_m, least_m, self._water.start_tolerance * least_m) / sample_m
         return np.asarray(self._end[ships] - self._at[ships] <= near)
 
     @property

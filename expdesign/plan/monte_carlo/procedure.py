@@ -9,7 +9,8 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
 3. At the planned start of the next run it begins the run if position, heading, speed and yaw rate are within
    `Tolerances`.
 4. Otherwise it goes around: by the shortest path in safe water to the beginning of a run-up, then up to the start
-   again, steady on the planned heading and speed; `GO_AROUNDS` times at most. Then the trial is aborted.
+   again, steady on the planned heading and speed; `GO_AROUNDS` times at most. Then the trial is aborted, as it is where
+   this takes longer than the whole planned trial.
 """
 
 from __future__ import annotations
@@ -71,23 +72,24 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
     Information does not depend on where a run begins, and the next leg begins where the run ends. So where there is
     room, the position may use a share of it, at most some hull lengths. A speed that differs at the start soon decays
     to that of the run, and its information is nearly all told after that: so the speed may differ by what moves the
-    run by a share of the position's tolerance.
+    run by a share of the position's tolerance. Heading, speed, yaw rate and the most room for the position are as many
+    times wider as the plan's settings ask.
     """
-    ship, length_m = water.ship, water.vessel.length_m
+    ship, length_m, wider = water.ship, water.vessel.length_m, water.start_tolerance
     position_m = float(
         np.clip(
             POSITION_ROOM * spare_m,
             POSITION_HULLS * length_m,
-            POSITION_MOST_HULLS * length_m,
+            wider * POSITION_MOST_HULLS * length_m,
         )
     )
     moved_mps = SPEED_MOVES * position_m / speed_decay_s(water.vessel, ship.transit_speed_mps)
-    least, most = SPEED_SHARE, SPEED_MOST_SHARE
+    least, most = wider * SPEED_SHARE, max(SPEED_MOST_SHARE, wider * SPEED_SHARE)
     return Tolerances(
         position_m=position_m,
-        heading_rad=MONTE_CARLO.heading_rad,
+        heading_rad=wider * MONTE_CARLO.heading_rad,
         speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
-        yaw_rate_radps=YAW_RATE_SHARE * ship.turn_rate_radps,
+        yaw_rate_radps=wider * YAW_RATE_SHARE * ship.turn_rate_radps,
     )
 
 

@@ -237,6 +237,7 @@ def _sail_part(
                 sailing=sailing,
                 inputs=values[-1],
                 last=index == len(legs) - 1,
+                longest=len(commands),
             )
             found = guidance.sail(fleet, unexplained)
             unexplained, poses, begun = found.unexplained, found.poses, found.begun

@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, efficiencies
-from expdesign.errors import InputError, NoAnswer
+from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.export.document import Table
 from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
@@ -20,6 +20,7 @@ from expdesign.memory import Memory, memory_in_use, recalled, remembering
 from expdesign.plan.assembly import check_start, ship_on_legs
 from expdesign.plan.control import capability
 from expdesign.plan.problem import PlanProblem
+from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import Plan, PlanSettings
 from expdesign.processes import begin, in_order, reported_together
 from expdesign.progress import Progress, in_phases, silent
@@ -27,7 +28,7 @@ from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.vessel import VesselModel
 from expdesign.workflows.steps.design_problem import design_summary, designed
-from expdesign.workflows.steps.first_trial import calibration, first_note, is_wide, whole_trial
+from expdesign.workflows.steps.first_trial import calibration, first_note, half_as_wide, is_wide, whole_trial
 from expdesign.workflows.steps.planned import plan_problem, planned
 from expdesign.workflows.steps.scored import STEM, scored
 
@@ -103,26 +104,48 @@ def _first_day(
 ) -> Day:
     """The trial of a ship with a wide prior: as asked for where that is verified, or else a first one of shorter runs.
 
+    Where neither is verified, a first trial of ships that differ half as much is tried, and what came of it is told.
+
     Raises:
-        NoAnswer: neither has a plan; what the one that is asked for says.
+        NoAnswer: there is no plan of a first trial.
     """
-    trying, cutting, again = in_phases(progress, 0.4, 0.1, 0.5)
+    trying, first, advising = in_phases(progress, 0.4, 0.5, 0.1)
     whole = whole_trial(plan_problem(case, information, design, seed=seed), trying)
     if whole is not None and (whole.verified or whole.draft):
         return Day(information=information, design=design, plan=whole)
     try:
-        cutting("cutting runs to what is safe for all ships of the prior", 0.0)
-        first = calibration(case, seed=seed)
-        told = scored(first)
-        shared = designed(first, told, stated=stated, seed=seed)
-        plan = planned(first, told, shared, seed=seed, progress=again)
-    except NoAnswer:
-        plan = planned(case, information, design, seed=seed, progress=again) if whole is None else whole
-        return Day(information=information, design=design, plan=plan)
-    if whole is not None and not plan.verified:  # shorter runs do not help; the refusal is that of what was asked for
-        return Day(information=information, design=design, plan=whole)
+        day = _calibrated(case, stated, seed, first)
+    except NoAnswer as error:
+        raise NoPlan(f"{error}; {_with_narrower_prior(case, stated, seed, advising)}") from error
+    if day.plan.verified:
+        return day
+    return replace(day, note=f"{day.note}; {_with_narrower_prior(case, stated, seed, advising)}")
+
+
+def _calibrated(case: Scenario, stated: VesselModel | None, seed: int, progress: Progress) -> Day:
+    """The first trial of a ship with a wide prior.
+
+    Raises:
+        NoAnswer: there is none.
+    """
+    progress("cutting runs to what is safe for all ships of the prior", 0.0)
+    first = calibration(case, seed=seed)
+    told = scored(first)
+    shared = designed(first, told, stated=stated, seed=seed)
+    plan = recalled(plan_trial, plan_problem(first, told, shared, seed=seed), advise=False, progress=progress)
     note = first_note([item.primitive for item in told], case.dictionary)
     return Day(information=told, design=shared, plan=plan, note=note)
+
+
+def _with_narrower_prior(case: Scenario, stated: VesselModel | None, seed: int, progress: Progress) -> str:
+    """Whether a first trial of ships that differ half as much is verified, in words."""
+    try:
+        helps = _calibrated(half_as_wide(case), stated, seed, progress).plan.verified
+    except NoAnswer:
+        helps = False
+    if helps:
+        return "with half the standard deviations of parameters (model.parameter_std) a first trial is verified"
+    return "half the standard deviations of parameters (model.parameter_std), tried as a remedy, do not help either"
 
 
 def checked_day(

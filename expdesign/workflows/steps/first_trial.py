@@ -2,26 +2,25 @@
 
 Where the standard deviations of the parameters are wide, runs as long as a dictionary asks for lead the ships of the
 prior too far apart to be safe, or to come to the next run. The first trial then takes each run only as long as these
-ships keep to its planned track, at a speed that they reach, and its legs turn as wide as they do. What it tells narrows
-the prior, and `replan` goes on with longer runs.
+ships keep to its planned track, at a speed that they reach, and its legs turn as wide as they do. Its runs begin, and
+its goal is reached, less exactly than usual. What it tells narrows the prior, and `replan` goes on with longer runs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive
 from expdesign.errors import InputError, NoAnswer, NoPlan, Unreachable
-from expdesign.plan.checked import promising
+from expdesign.plan.checked import may_be_verified
 from expdesign.plan.control import HELM_SHARE, STEADY_HULLS, USABLE_SHARE, HelmShip, capability
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import dispersion_m
 from expdesign.plan.solve import draft_trial, plan_drafted
 from expdesign.plan.values import Plan, PlanSettings
-from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario
 from expdesign.simulation import simulate_many
@@ -29,15 +28,16 @@ from expdesign.vessel import VesselModel
 from expdesign.vessel.hull import covering_discs
 
 WIDE = 0.25  # median standard deviation of parameters, in their values, from which a prior is wide
-NEAR_HULLS = 0.75  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
+NEAR_HULLS = 1.5  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial
 KEPT = 0.9  # share of the ships that do
 ABLE = 0.95  # share of the ships that reach the speed and the turning radius of legs
 DRAWN = 200  # ships drawn of each run
 CUT = (0.5, 0.9)  # least and most share of a run that is tried next
 SHORTEST = 0.15  # share of a run below which it is left out
 SPEEDS = 200  # between rest and top speed, at which the thrust of drawn ships is compared with their resistance
-WIDEST = 20.0  # hull lengths of the turning radius of legs at most
-TIME_SHARE = 0.5  # of the scenario's informative time that a first trial takes
+WIDEST = 8.0  # hull lengths of the turning radius of legs at most
+START_TOLERANCE = 3.0  # so many times less exactly than usual its runs begin, and its goal is reached
+TIME_SHARE = 0.4  # of the scenario's informative time that a first trial takes
 
 
 def is_wide(model: VesselModel) -> bool:
@@ -50,11 +50,18 @@ def whole_trial(problem: PlanProblem, progress: Progress) -> Plan | None:
     """The trial as asked for, or None where few drawn trials already say that it would be refused."""
     try:
         draft = draft_trial(problem, progress=progress)
-        work = WorkBudget(most_s=problem.settings.time_budget_s)
-        likely = problem.settings.draft or promising(problem, draft.water, draft.sailed, budget=work)
+        likely = problem.settings.draft or may_be_verified(problem, draft.water, draft.sailed)
         return plan_drafted(problem, draft, progress=progress) if likely else None
     except NoPlan:
         return None
+
+
+def half_as_wide(case: Scenario) -> Scenario:
+    """The scenario with half the standard deviations of parameters."""
+    model = case.vessel.model
+    unstated = {name: std / 2 for name, std in model.unstated_std.items()}
+    halved = replace(model, parameter_std=model.parameter_std / 2, unstated_std=unstated)
+    return replace(case, vessel=replace(case.vessel, model=halved))
 
 
 def calibration(case: Scenario, *, seed: int) -> Scenario:
@@ -64,7 +71,8 @@ def calibration(case: Scenario, *, seed: int) -> Scenario:
         NoAnswer: no run is safe for so long that it tells anything.
     """
     rng = np.random.default_rng((seed, len(case.dictionary)))
-    case = replace(case, plan=legs_for_most(case, rng))
+    plan = legs_for_most(case, rng)
+    case = replace(case, plan=replace(plan, start_tolerance=max(plan.start_tolerance, START_TOLERANCE)))
     case = replace(case, dictionary=tuple(_slowed(spec, case.plan.transit_speed_mps) for spec in case.dictionary))
     cut = [spec for given in case.dictionary if (spec := _cut(case, given, rng)) is not None]
     if not cut:
@@ -75,19 +83,25 @@ def calibration(case: Scenario, *, seed: int) -> Scenario:
 
 def _slowed(spec: PrimitiveSpec, most_mps: float | None) -> PrimitiveSpec:
     """The specification with speeds of at most so much, all of them by the same share."""
-    speeds = {name: value for name, value in spec.settings.items() if name.endswith("speed_mps") and value}
+    speeds = _speeds(spec)
     fastest = max(speeds.values(), default=0.0)
     if most_mps is None or fastest <= most_mps:
         return spec
     return replace(spec, settings={**spec.settings, **{k: v * most_mps / fastest for k, v in speeds.items()}})
 
 
-def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
-    """Settings with a speed and a turning radius of legs that most ships of the prior reach, where the file has none.
+def _speeds(spec: PrimitiveSpec) -> dict[str, float]:
+    return {name: value for name, value in spec.settings.items() if name.endswith("speed_mps") and value}
 
-    The speed is that of full ahead on a straight course; the radius that of the helm as far over as legs use it.
+
+def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
+    """Settings with a speed and a turning radius of legs that most ships of the prior reach.
+
+    The speed is that of full ahead on a straight course, or of the fastest run; the radius that of the helm as far over
+    as legs use it. Where the file states a slower speed or a wider radius, that stays.
     """
     vessel, plan = case.vessel, case.plan
+    fastest_run = max((speed for spec in case.dictionary for speed in _speeds(spec).values()), default=np.inf)
     ship = capability(vessel, plan, current_mps=float(np.hypot(*case.environment.current_to)))
     if not isinstance(ship, HelmShip):
         return plan
@@ -114,8 +128,8 @@ def legs_for_most(case: Scenario, rng: np.random.Generator) -> PlanSettings:
     widest = min(float(np.quantile(radii.max(axis=0), ABLE)), WIDEST * vessel.length_m)
     return replace(
         plan,
-        transit_speed_mps=plan.transit_speed_mps or min(ship.transit_speed_mps, USABLE_SHARE * fastest),
-        turning_radius_m=plan.turning_radius_m or max(ship.turning_radius_m, widest),
+        transit_speed_mps=min(ship.transit_speed_mps, USABLE_SHARE * fastest, fastest_run),
+        turning_radius_m=max(ship.turning_radius_m, widest),
     )
 
 
@@ -167,9 +181,6 @@ def first_note(runs: Sequence[Primitive], asked: Sequence[PrimitiveSpec]) -> str
     return (
         "a first trial: the standard deviations of the parameters are too wide for the runs asked for, so "
         f"{len(runs)} of {len(asked)} are taken{slower}, none longer than ships of the prior keep within "
-        f"{NEAR_HULLS:g} hull lengths of the track; expdesign replan goes on with what it tells"
+        f"{NEAR_HULLS:g} hull lengths of the track. Legs are as slow and turn as wide as most of these ships need, and "
+        f"runs may begin {START_TOLERANCE:g} times less exactly than usual. expdesign replan goes on with what it tells"
     )
-
-
-def _is_slower(own: Mapping[str, float], asked: Mapping[str, float]) -> bool:
-    return any(abs(own[name]) < abs(asked[name]) for name in asked if name.endswith("speed_mps") and name in own)

@@ -31,7 +31,7 @@ from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled
 from expdesign.plan.assembly import check_start_speed
-from expdesign.plan.control import capability
+from expdesign.plan.control import capability, needs_helm
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import plan_trial
 from expdesign.plan.values import LatticeProof, Plan, RiskEstimate
@@ -126,7 +126,15 @@ def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
     """What the files state and the trial does not use, or takes as certain; one line each."""
     what = "run or leg of this plan"
     told = actuation_remarks(case.vessel, [plan.commands], what), speed_remarks(case.vessel, [plan.trajectory], what)
-    return (*case.remarks, *told[0], *told[1])
+    return (*case.remarks, *leg_remarks(case), *told[0], *told[1])
+
+
+def leg_remarks(case: Scenario) -> tuple[str, ...]:
+    """How the ship is steered on legs, where her thrusters suggest another way."""
+    if needs_helm(case.vessel):
+        return ()
+    note = capability(case.vessel, case.plan, current_mps=float(np.hypot(*case.environment.current_to))).note
+    return (note,) if note else ()
 
 
 def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
