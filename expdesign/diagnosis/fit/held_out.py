@@ -131,8 +131,6 @@ def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut,
 @lru_cache(maxsize=16)
 def _times_drawn(count: int, seed: int) -> Array:
     """(draws, count) how often each unit is drawn."""
-    if not count:
-        return np.zeros((BOOTSTRAP_DRAWS, 0))
     rng = np.random.default_rng(seed)
     return rng.multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS).astype(float)
 

@@ -207,8 +207,14 @@ def compared_with(
 
 
 def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
-    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap."""
+    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap.
+
+    All are nan where no unit could be fitted for both.
+    """
     one, other = on_common_units(before, after)
+    if not len(one.squared_error):
+        share, low, high = np.full((3, one.squared_error.shape[1]), np.nan)
+        return share, low, high
     drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0)) / 2
