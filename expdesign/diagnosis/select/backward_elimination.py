@@ -154,10 +154,15 @@ def improves_held_out(
     if not shows_for_certain(held[0], held[1], seed):
         improves[0] = _shows_otherwise(found, held, (better[0], gains[0][1]), (windows, re_estimated), seed)
     for index, step in enumerate(found.steps[1:], 1):
-        if better[index] and not shown[index] and not step.chosen.is_block:
+        if better[index] and not shown[index] and not _may_be_many(step):
             share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
             improves[index] = least > 0.0 and share >= TUNING.least_predicted
     return improves
+
+
+def _may_be_many(step: Step) -> bool:
+    """Whether a cause may imitate others, as several parameters at once do: predictions of samples show any of them."""
+    return step.chosen.candidate.imitates or step.chosen.is_block
 
 
 def _shows_otherwise(
@@ -177,9 +182,12 @@ def _shows_otherwise(
     (better, (low, high)), (windows, re_estimated) = simulated, data
     first = found.steps[0].chosen
     share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
-    alone = share >= TUNING.least_predicted and not (first.candidate.imitates or first.is_block)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
-    if least > 0.0 and (alone or (better and worth_a_word)):
+    if (
+        least > 0.0
+        and not _may_be_many(found.steps[0])
+        and (share >= TUNING.least_predicted or (better and worth_a_word))
+    ):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
     return beside is not None and shows_for_certain(beside, held[1], seed)
