@@ -117,10 +117,10 @@ def test_a_hundredth_of_the_error_is_a_fiftieth_of_its_square_in_predictions_too
     assert improves_held_out(found, held, 0, SimpleNamespace()) == [reduction > TUNING.least_reduction]  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("several", "imitates"), [(False, False), (True, False), (False, True)])
+@pytest.mark.parametrize("several", [False, True])
 @pytest.mark.parametrize("place", [0, 1])
-def test_predictions_show_a_single_cause_where_simulations_leave_it_open_and_never_what_may_be_many(
-    monkeypatch, place, several, imitates
+def test_predictions_show_a_single_cause_where_simulations_leave_it_open_and_never_several_parameters(
+    monkeypatch, place, several
 ):
     """The first cause and a later one alike; simulations are better on average, and perhaps not."""
     runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
@@ -128,8 +128,7 @@ def test_predictions_show_a_single_cause_where_simulations_leave_it_open_and_nev
     found = steps_of(*("first", "later")[: place + 1])
     chosen = found.steps[place].chosen
     chosen.fit, chosen.is_block = SimpleNamespace(noise=None), several
-    chosen.candidate = replace(chosen.candidate, imitates=imitates)
-    for share, shows in ((0.5, not (several or imitates)), (0.9 * TUNING.least_predicted, False)):
+    for share, shows in ((0.5, not several), (0.9 * TUNING.least_predicted, False)):
         interval = (0.9 * share if place or share > TUNING.least_predicted else -share, 1.1 * share)
         monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_, s=share, i=interval: (s, i))
         improves = improves_held_out(found, [errors(fit) for fit in fits], 0, SimpleNamespace())  # type: ignore[arg-type]

@@ -120,8 +120,8 @@ def improves_held_out(
     a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
     that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
     predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
-    these alone, if it makes simulations no worse for certain; several parameters at once imitate many causes. A later
-    cause shows in them beside simulations that gain on average.
+    these alone, if it makes simulations no worse for certain; one that imitates others, or a later one, beside
+    simulations that gain on average. Several parameters at once, which imitate any cause, never do.
 
     Args:
         found: the selection.
@@ -154,15 +154,10 @@ def improves_held_out(
     if not shows_for_certain(held[0], held[1], seed):
         improves[0] = _shows_otherwise(found, held, (better[0], gains[0][1]), (windows, re_estimated), seed)
     for index, step in enumerate(found.steps[1:], 1):
-        if better[index] and not shown[index] and not _may_be_many(step):
+        if better[index] and not shown[index] and not step.chosen.is_block:
             share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
             improves[index] = least > 0.0 and share >= TUNING.least_predicted
     return improves
-
-
-def _may_be_many(step: Step) -> bool:
-    """Whether a cause may imitate others, as several parameters at once do: predictions of samples show any of them."""
-    return step.chosen.candidate.imitates or step.chosen.is_block
 
 
 def _shows_otherwise(
@@ -183,11 +178,8 @@ def _shows_otherwise(
     first = found.steps[0].chosen
     share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
-    if (
-        least > 0.0
-        and not _may_be_many(found.steps[0])
-        and (share >= TUNING.least_predicted or (better and worth_a_word))
-    ):
+    alone = share >= TUNING.least_predicted and not first.candidate.imitates
+    if least > 0.0 and not first.is_block and (alone or (better and worth_a_word)):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
     return beside is not None and shows_for_certain(beside, held[1], seed)
