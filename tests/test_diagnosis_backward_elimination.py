@@ -117,6 +117,24 @@ def test_a_hundredth_of_the_error_is_a_fiftieth_of_its_square_in_predictions_too
     assert improves_held_out(found, held, 0, SimpleNamespace()) == [reduction > TUNING.least_reduction]  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("place", [0, 1])
+def test_predictions_show_a_single_cause_where_simulations_leave_it_open_and_never_several_parameters(
+    monkeypatch, place, several
+):
+    """The first cause and a later one alike; simulations are better on average, and perhaps not."""
+    runs = np.array([[-1.0], [-1.0], [-1.0], [1.0], [1.0], [1.0]])
+    fits = [50.0, 51.2 + 4.8 * runs] if place == 0 else [50.0, 60.0, 61.6 + 4.8 * runs]
+    found = steps_of(*("first", "later")[: place + 1])
+    chosen = found.steps[place].chosen
+    chosen.fit, chosen.is_block = SimpleNamespace(noise=None), several
+    for share, shows in ((0.5, not several), (0.9 * TUNING.least_predicted, False)):
+        interval = (0.9 * share if place or share > TUNING.least_predicted else -share, 1.1 * share)
+        monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_, s=share, i=interval: (s, i))
+        improves = improves_held_out(found, [errors(fit) for fit in fits], 0, SimpleNamespace())  # type: ignore[arg-type]
+        assert improves[place] is shows
+
+
 def test_later_causes_need_a_clear_or_a_significant_gain():
     assert kept_count(50.0, 60.0, 60.05, 70.0) == 1  # no cause after one that gains too little
     assert kept_count(50.0, 60.0, 60.5) == 2

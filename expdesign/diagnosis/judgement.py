@@ -58,7 +58,7 @@ def errors_as_judged(
     if found.beside_stated:
         again = fitted_ahead(found, windows, short, beside_stated=True) or found
         return again, _ahead([as_stated, *(validation.of(step.chosen.fit) for step in again.steps)])
-    held = _where_more_is_certain(found, _cross_validated(found, as_stated, validation, progress), seed)
+    held = _where_more_is_certain(found, _cross_validated(found, as_stated, validation, progress), seed, windows)
     known = None
     uncertain = found.steps and found.first.keys and not leads_away(as_stated)
     if uncertain and as_stated.mean_fit > validation.of(found.first).mean_fit:
@@ -72,17 +72,19 @@ def errors_as_judged(
     return found, held
 
 
-def _where_more_is_certain(found: Selection, held: list[HeldOut], seed: int) -> list[HeldOut]:
+def _where_more_is_certain(
+    found: Selection, held: list[HeldOut], seed: int, windows: Windows | None = None
+) -> list[HeldOut]:
     """Errors in short stretches, if a first cause gains there for certain and more causes improve there; else as given.
 
-    Whole runs are few, and an error early in a run stays in its simulation.
+    Whole runs are few, and an error early in a run stays in its simulation. Predictions of samples tell of both alike.
     """
     if not found.steps or held[0].in_stretches or any(item.ahead is None for item in held):
         return held
-    in_runs = improves_held_out(found, held, seed)
+    in_runs = improves_held_out(found, held, seed, windows)
     if all(in_runs) or not _gains_for_certain(_ahead(held[:2]), seed):
         return held
-    in_stretches = improves_held_out(found, _ahead(held), seed)
+    in_stretches = improves_held_out(found, _ahead(held), seed, windows)
     return _ahead(held) if [*in_stretches, False].index(False) > in_runs.index(False) else held
 
 

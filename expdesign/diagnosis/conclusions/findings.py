@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values, rounded, wind_can_be_told
 from expdesign.diagnosis.conclusions.verdict import effect_in_words, has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
-from expdesign.diagnosis.fit import AHEAD_S, Fit, HeldOut, held_out_gain, prediction_gain
+from expdesign.diagnosis.fit import AHEAD_S, FEWEST_RUNS, Fit, HeldOut, held_out_gain, prediction_gain
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
@@ -138,6 +140,11 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
         notes.append(
             "All headings are within 45 degrees of their mean. A wind that nobody measured was not tested: on such "
             "courses it is a constant force and moment, as several causes with fewer numbers are."
+        )
+    if len(np.unique(windows.batch)) < FEWEST_RUNS:
+        notes.append(
+            "Fewer than three runs: intervals of gains are of these runs sailed on. They tell nothing of how other "
+            "runs differ."
         )
     missing = missing_wind_share(record)
     if windows.has_wind and missing > FEW:

@@ -31,7 +31,7 @@ from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.held_out import HeldOut
+from expdesign.diagnosis.fit.held_out import FEWEST_RUNS, HeldOut
 from expdesign.diagnosis.fit.output_error import FOLD_STEPS, fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
@@ -46,7 +46,7 @@ PARTS = 5  # of every run, in the cross-validation of short stretches
 
 def validation_units(windows: Windows) -> Array:
     """(w,) number of the unit that every window belongs to."""
-    return windows.batch if len(np.unique(windows.batch)) >= 3 else np.arange(len(windows.batch), dtype=float)
+    return windows.batch if len(np.unique(windows.batch)) >= FEWEST_RUNS else np.arange(len(windows.batch), dtype=float)
 
 
 class CrossValidation:
@@ -144,7 +144,7 @@ def _stretch_folds(effects: _Effects | None, ship: ExtendedModel, windows: Windo
         ship=ship,
         windows=short,
         unit=_parts_of_runs(short),
-        part=np.arange(float(len(of_short))),
+        part=_in_time(short),
         fitted=None if effects is None else partial(_fitted_ahead, unit, of_short, effects),
         in_stretches=True,
     )
@@ -157,7 +157,7 @@ def cross_validate_ahead(found: Fit) -> HeldOut:
         ship=found.ship,
         windows=short,
         unit=_parts_of_runs(short),
-        part=np.arange(float(len(short.batch))),
+        part=_in_time(short),
         fitted=partial(_refitted_ahead, _Effects.of(found)),
         in_stretches=True,
     )
@@ -213,8 +213,7 @@ def _of_folds(given: _Folds, progress: Progress = silent) -> HeldOut:
         squared_error=error,
         squared_deviation=deviation,
         unconverged=unconverged,
-        run=windows.batch if given.in_stretches else None,
-        cut=not given.in_stretches and given.unit is not windows.batch,
+        run=windows.batch[np.argsort(given.part, kind="stable")] if given.in_stretches else None,
         models=tuple(tested),
     )
 
@@ -241,6 +240,11 @@ def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Recor
     short = windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
     within = (windows.batch == short.batch[:, None]) & (windows.first <= short.first[:, None])
     return short, unit[np.where(within, windows.first, -1.0).argmax(axis=1)]
+
+
+def _in_time(short: Windows) -> Array:
+    """(w,) number of every stretch, one run after another in the order of time."""
+    return np.argsort(np.lexsort((short.first, short.batch))).astype(float)
 
 
 def _parts_of_runs(short: Windows) -> Array:

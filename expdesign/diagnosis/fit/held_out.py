@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
+from expdesign.diagnosis.fit.between_runs import sum_by_run
 from expdesign.diagnosis.fit.linear_model import (
     GramMatrices,
     Sensitivities,
@@ -43,6 +44,7 @@ from expdesign.values import Array
 
 LEAST_FIT = 0.0  # of simulations of whole held-out units [%]; where one is worse, the stretches count
 BOOTSTRAP_DRAWS = 1000  # of units, for intervals
+FEWEST_RUNS = 3  # that count as units; fewer are judged by their parts
 
 
 # Errors of models on data that they were not fitted to, and their comparison, with intervals by the bootstrap.
@@ -58,8 +60,8 @@ class HeldOut:
     # of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called
     ahead: Callable[[], HeldOut] | None = None
     in_stretches: bool = False  # whether these are such errors
-    run: Array | None = None  # (b,) of each unit, where these are stretches of runs: those of one run share its errors
-    cut: bool = False  # whether units are parts of runs, because runs are too few to be units
+    # (b,) of each unit, where these are stretches of runs in the order of time: those of one run share its errors
+    run: Array | None = None
     # (mask of windows, model fitted without them) of every fold; None where it could not be fitted
     models: tuple[tuple[NDArray[np.bool_], ExtendedModel | None], ...] = ()
 
@@ -105,7 +107,6 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
             squared_error=item.squared_error[both],
             squared_deviation=item.squared_deviation[both],
             run=None if item.run is None else item.run[both],
-            cut=item.cut,
         )
         for item in (before, after)
     )
@@ -115,62 +116,81 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
 def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut, HeldOut]:
     """Sums over units drawn with replacement, (draws, n), the same units for both models.
 
-    Of stretches of several runs, runs are drawn, then stretches of each. The same seed draws the same units, for
-    decisions and for reports.
+    Of stretches of three runs or more, runs are drawn whole. The same seed draws the same units, for decisions and for
+    reports.
     """
-    runs = (0,) * len(before.squared_error) if before.run is None else tuple(before.run.tolist())
-    times = _times_drawn(runs, BOOTSTRAP_DRAWS, seed)
-    first, second = (
+    first, second = _independent(before), _independent(after)
+    times = _times_drawn(len(first.squared_error), seed)
+    drawn = (
         HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
-        for item in (before, after)
+        for item in (first, second)
     )
-    return first, second
+    return next(drawn), next(drawn)
 
 
 @lru_cache(maxsize=16)
-def _times_drawn(runs: tuple[float, ...], draws: int, seed: int) -> Array:
-    """(draws, count) how often each unit is drawn, given its run."""
+def _times_drawn(count: int, seed: int) -> Array:
+    """(draws, count) how often each unit is drawn."""
     rng = np.random.default_rng(seed)
-    names, run = np.unique(runs, return_inverse=True)
-    runs_drawn = _drawn(rng, np.full(draws, len(names)), len(names)) if len(names) > 1 else np.ones((draws, 1))
-    times = np.zeros((draws, len(run)))
-    for number in range(len(names)):
-        units = np.flatnonzero(run == number)
-        times[:, units] = _drawn(rng, (len(units) * runs_drawn[:, number]).astype(int), len(units))
-    return times
+    return rng.multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS).astype(float)
 
 
-def _drawn(rng: np.random.Generator, many: NDArray[np.int64], count: int) -> Array:
-    """(draws, count) how often each of so many is drawn, if (draws,) `many` are drawn with replacement."""
-    return np.asarray(rng.multinomial(many, np.full(count, 1.0 / count)), dtype=float)
+def _independent(held: HeldOut) -> HeldOut:
+    """Errors of runs, where there are three or more; else of units as they are."""
+    if held.run is None or len(np.unique(held.run)) < FEWEST_RUNS:
+        return held
+    error, deviation = (sum_by_run(item, held.run) for item in (held.squared_error, held.squared_deviation))
+    return HeldOut(squared_error=error, squared_deviation=deviation)
 
 
 def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
-    """Mean gain of fit over outputs [points] and its 95 % interval; nan where no unit could be fitted for both."""
+    """Mean gain of fit over outputs [points] and its 95 % interval, up to a perfect fit.
+
+    All are nan where no unit could be fitted for both.
+    """
     before, after = on_common_units(before, after)
     if not len(before.squared_error):
         return np.nan, (np.nan, np.nan)
     fits = [_fit_percent(item.squared_error, item.squared_deviation) for item in bootstrap_sums(before, after, seed)]
     gain = np.nanmean(after.fit - before.fit)
-    low, high = interval_of(gain, np.nanmean(fits[1] - fits[0], axis=1), before)
-    return float(gain), (float(low), float(high))
+    low, high = interval_of(gain, np.nanmean(fits[1] - fits[0], axis=1), before, after)
+    return float(gain), (float(low), min(float(high), 100.0 - before.mean_fit))
 
 
-def interval_of(found: Array | np.floating, drawn: Array, held: HeldOut) -> Array:
+def interval_of(found: Array | np.floating, drawn: Array, before: HeldOut, after: HeldOut) -> Array:
     """(2, ...) 95 % interval of what was found, given the same of draws (draws, ...) of the units of such errors.
 
     Quantiles of draws of n units are too near: draws vary by sqrt((n - 1) / n) of what they should, and of few units
-    nobody knows how they vary, which Student's distribution counts. Of stretches of several runs the runs count. Parts
-    of one run or two tell nothing of how runs differ: their quantiles are as they are, and too near for other runs.
+    nobody knows how they vary, which Student's distribution counts. Three runs or more are such units. One run or two
+    are told by their stretches, as many as are independent: the interval is of these runs sailed on, and tells nothing
+    of how others differ.
 
     Source: T. Hesterberg, The American Statistician 69 (2015), 371-386, 3.2.
     """
-    if held.cut:
-        return np.asarray(np.nanquantile(drawn, [0.025, 0.975], axis=0))
-    runs = 1 if held.run is None else len(np.unique(held.run))
-    count = max(2, runs if runs > 1 else len(held.squared_error))
-    wider = np.sqrt(count / (count - 1)) * scipy.stats.t.ppf(0.975, count - 1) / scipy.stats.norm.ppf(0.975)
+    first, second = _independent(before), _independent(after)
+    count = max(2, len(first.squared_error))
+    free = count if first.run is None else max(2.0, _independent_stretches(first, second))
+    wider = count / np.sqrt((count - 1) * free) * scipy.stats.t.ppf(0.975, free - 1) / scipy.stats.norm.ppf(0.975)
     return np.asarray(found + wider * (np.nanquantile(drawn, [0.025, 0.975], axis=0) - found))
+
+
+def _independent_stretches(before: HeldOut, after: HeldOut) -> float:
+    """How many independent stretches tell as much of a mean as those of a run, each of which is like the one before.
+
+    Of n stretches with a correlation c from one to the next, n (1 - c) / (1 + c). The correlation is that of what they
+    add to the change of error, by all outputs, less its bias, and by its standard error more, because few stretches
+    hide it.
+
+    Source: G. V. Bayley and J. M. Hammersley, Supplement to the Journal of the Royal Statistical Society 8 (1946),
+    184-197; M. G. Kendall, Biometrika 41 (1954), 403-404, for the bias.
+    """
+    shares = [item.squared_error / np.maximum(item.squared_error.sum(axis=0), 1e-300) for item in (before, after)]
+    change, count = shares[1] - shares[0], len(shares[0])
+    change = change / np.maximum(change.std(axis=0), 1e-300)
+    pairs = before.run[1:] == before.run[:-1] if before.run is not None else np.zeros(0)
+    found = float((change[1:] * change[:-1])[pairs].mean()) if pairs.any() else 0.0
+    correlation = min(max(0.0, found + (1.0 + 3.0 * found) / count + 1.0 / np.sqrt(count)), 1.0)
+    return float(count * (1.0 - correlation) / (1.0 + correlation))
 
 
 def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:

@@ -120,7 +120,8 @@ def improves_held_out(
     a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
     that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
     predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
-    these alone, if it makes simulations no worse for certain; several parameters at once imitate many causes.
+    these alone, if it makes simulations no worse for certain; one that imitates others, or a later one, beside
+    simulations that gain on average. Several parameters at once, which imitate any cause, never do.
 
     Args:
         found: the selection.
@@ -130,33 +131,58 @@ def improves_held_out(
         re_estimated: errors of the model before any cause with its uncertain parameters fitted; None where it has none.
     """
     gains = [held_out_gain(one, other, seed) for one, other in pairwise(held)]
-    simulated = [
+    better = [
         step.chosen.candidate.is_possible(found.last.value)
         and found.last.ship.is_possible(step.chosen.candidate.free)
         and simulates_better(
             held[index],
             held[index + 1],
-            (gain, interval),
+            gain,
             certain=not found.beside_stated and (index == 0 or only_nuisance(step, found)),
             imitates=step.chosen.candidate.imitates,
         )
-        and ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, (gain, interval)))
-        and (shows_for_certain(held[index], held[index + 1], seed) or (index == 0 and windows is not None))
-        for index, (step, (gain, interval)) in enumerate(zip(found.steps, gains, strict=True))
+        for index, (step, gain) in enumerate(zip(found.steps, gains, strict=True))
     ]
-    if windows is None or not gains or shows_for_certain(held[0], held[1], seed):
-        return simulated
-    share, (least, _) = prediction_gain(held[0], held[1], windows, found.steps[0].chosen.fit.noise)
+    shown = [
+        ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, low))
+        and shows_for_certain(held[index], held[index + 1], seed)
+        for index, (_, (low, _)) in enumerate(gains)
+    ]
+    improves = [all(pair) for pair in zip(better, shown, strict=True)]
+    if windows is None or not gains:
+        return improves
+    if not shows_for_certain(held[0], held[1], seed):
+        improves[0] = _shows_otherwise(found, held, (better[0], gains[0][1]), (windows, re_estimated), seed)
+    for index, step in enumerate(found.steps[1:], 1):
+        if better[index] and not shown[index] and not step.chosen.is_block:
+            share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
+            improves[index] = least > 0.0 and share >= TUNING.least_predicted
+    return improves
+
+
+def _shows_otherwise(
+    found: Selection,
+    held: Sequence[HeldOut],
+    simulated: tuple[bool, tuple[float, float]],
+    data: tuple[Windows, HeldOut | None],
+    seed: int,
+) -> bool:
+    """Whether the first cause, whose simulations are not better for certain, shows in predictions or the same fit.
+
+    Args:
+        found, held, seed: as of `improves_held_out`.
+        simulated: whether it simulates better, and the interval of its gain.
+        data: all of it, and errors of the model before any cause with its uncertain parameters fitted.
+    """
+    (better, (low, high)), (windows, re_estimated) = simulated, data
     first = found.steps[0].chosen
-    alone = share >= TUNING.least_predicted and not (first.candidate.imitates or first.is_block)
+    share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
-    shows = least > 0.0 and (alone or (simulated[0] and worth_a_word))
-    low, high = gains[0][1]
-    if not shows and simulated[0] and high >= 0.0 and low <= 0.0:
-        beside = held_beside_the_same_fit(found, held, re_estimated)
-        shows = beside is not None and shows_for_certain(beside, held[1], seed)
-    simulated[0] = shows
-    return simulated
+    alone = share >= TUNING.least_predicted and not first.candidate.imitates
+    if least > 0.0 and not first.is_block and (alone or (better and worth_a_word)):
+        return True
+    beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
+    return beside is not None and shows_for_certain(beside, held[1], seed)
 
 
 def held_beside_the_same_fit(found: Selection, held: Sequence[HeldOut], re_estimated: HeldOut | None) -> HeldOut | None:
@@ -181,12 +207,18 @@ def compared_with(
 
 
 def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
-    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap."""
+    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap.
+
+    All are nan where no unit could be fitted for both.
+    """
     one, other = on_common_units(before, after)
+    if not len(one.squared_error):
+        share, low, high = np.full((3, one.squared_error.shape[1]), np.nan)
+        return share, low, high
     drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0)) / 2
-        ends = interval_of(ratio, np.log(drawn[1] / drawn[0]) / 2, one)
+        ends = interval_of(ratio, np.log(drawn[1] / drawn[0]) / 2, one, other)
     share, high, low = 1.0 - np.exp([ratio, *ends])
     return share, low, high
 
@@ -197,23 +229,12 @@ def shows_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
     return bool(((share >= TUNING.least_reduction) & (low > 0.0)).any())
 
 
-def _is_certain_ahead(
-    held: Sequence[HeldOut], index: int, seed: int, gained: tuple[float, tuple[float, float]]
-) -> bool:
-    """Whether the gain of a step is certain, or else that in short stretches is.
-
-    Stretches of one run share its slow errors, so their interval is too narrow: a cause after the first needs a clear
-    gain there too.
-    """
-    gain, (low, _) = gained
-    least = TUNING.clear_gain_points if index else 0.0
-    if held[0].in_stretches:
-        return low > 0.0 and gain > least
+def _is_certain_ahead(held: Sequence[HeldOut], index: int, seed: int, low: float) -> bool:
+    """Whether the gain of a step, with this lower end of its interval, is certain, or else that in short stretches."""
     before, after = (held[place].ahead for place in (index, index + 1))
-    if low > 0.0 or before is None or after is None:
-        return True
-    gain, (low, _) = held_out_gain(before(), after(), seed)
-    return low > 0.0 and gain > least
+    if low > 0.0 or held[0].in_stretches or before is None or after is None:
+        return low > 0.0 or not held[0].in_stretches
+    return held_out_gain(before(), after(), seed)[1][0] > 0.0
 
 
 def simulates_better(
