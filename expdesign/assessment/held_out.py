@@ -125,7 +125,8 @@ def certainly_worse(item: HeldOut, best: HeldOut) -> bool:
     more = more[np.isfinite(more)]
     if len(more) < 2:
         return False
-    return bool(more.mean() > scipy.stats.t.ppf(0.975, len(more) - 1) * scipy.stats.sem(more) + np.log1p(SAME_ERROR))
+    error = scipy.special.stdtrit(len(more) - 1, 0.975) * more.std(ddof=1) / np.sqrt(len(more))
+    return bool(more.mean() > error + np.log1p(SAME_ERROR))
 
 
 def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:

@@ -149,7 +149,7 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
     joint = found.joint_covariance - gain @ found.joint_covariance[:count]
     joint = (joint + joint.T) / 2
     distance = float(apart @ np.linalg.solve(found.covariance + prior, apart))
-    chance = float(scipy.stats.chi2.sf(distance, count))
+    chance = float(scipy.special.chdtrc(count, distance))
     warnings = found.warnings
     if chance < CONTRADICTED:
         scores = np.abs(apart) / np.sqrt(np.diag(found.covariance + prior))

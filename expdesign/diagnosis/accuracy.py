@@ -289,7 +289,7 @@ def dependence(found: Residuals, output: str, name: str) -> Dependence:
     freedom, rest = len(mean) - 1, max(effective_count - len(mean), 1.0)
     return Dependence(
         middle=x @ share, mean=mean, std=np.sqrt(np.diag(covariance)),
-        p_value=float(scipy.stats.f.sf(apart @ inverse @ apart / freedom, freedom, rest)) if freedom else 1.0,
+        p_value=float(scipy.special.fdtrc(freedom, rest, apart @ inverse @ apart / freedom)) if freedom else 1.0,
     )  # fmt: skip
 
 

@@ -215,5 +215,5 @@ def signed_rank_p_values(without: HeldOut, others: Sequence[HeldOut]) -> list[fl
     spread = spread_between_runs(score, size, np.zeros_like(size), estimated=False)
     factors, freedoms = Dispersion.of(spread).beside(spread)
     z = score.sum(axis=0) / np.sqrt(np.maximum(size.sum(axis=0), 1e-300) * factors)
-    wider = scipy.stats.t.sf(z, freedoms)
+    wider = scipy.special.stdtr(freedoms, -z)
     return [max(pair) if pair[0] < 0.5 else pair[0] for pair in zip(plain, wider.tolist(), strict=True)]

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.model import group_columns, turns_by_force
@@ -188,7 +188,7 @@ def _one(
     place = int(np.argmax(np.abs(mixture)))
     name, factor, unit = described(effect.directions[place], known.base.ship)
     found = power(noncentrality, freedom, level) if known_size else np.array(math.nan)
-    limit = float(chi2.isf(level, freedom))
+    limit = float(scipy.special.chdtri(freedom, level))
     seldom = known_size and float(found) < LEAST_POWER
     shown = 1.0 if seldom else math.nan
     if known_size and not seldom:
@@ -242,7 +242,7 @@ def _against(
     own = [number for number, item in enumerate(rivals.tests) if item.candidate.cause == effect.cause]
     (place,) = [number for number, item in enumerate(rivals.tests) if item.candidate is effect.candidate]
     tested = exact if effect.candidate.finite else gain[:, place]
-    significant = tested >= chi2.isf(level, freedom)
+    significant = tested >= scipy.special.chdtri(freedom, level)
     mine = np.maximum(net[:, own].max(axis=1), tested - price_of(effect.candidate))
     cosine = imitation(rivals, shift, noncentrality)
     first, confusions = np.ones(len(significant), dtype=bool), []

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import beta
+import scipy
 
 from expdesign.diagnosis.model import ExtendedModel, is_coriolis, is_damping
 from expdesign.diagnosis.vessel_file import extend, extended_model
@@ -105,8 +105,8 @@ def interval(count: int, trials: int) -> tuple[float, float]:
     Source: C. J. Clopper and E. S. Pearson, Biometrika 26 (1934), 404-413.
     """
     tail = (1.0 - LEVEL) / 2.0
-    low = float(beta.ppf(tail, count, trials - count + 1)) if count else 0.0
-    high = float(beta.ppf(1.0 - tail, count + 1, trials - count)) if count < trials else 1.0
+    low = float(scipy.special.betaincinv(count, trials - count + 1, tail)) if count else 0.0
+    high = float(scipy.special.betaincinv(count + 1, trials - count, 1.0 - tail)) if count < trials else 1.0
     return low, high
 
 

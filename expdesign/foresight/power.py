@@ -46,7 +46,7 @@ def power(noncentrality: Array | float, freedom: int, level: float) -> Array:
         freedom: numbers tested at once.
         level: of the test.
     """
-    limit = float(scipy.stats.chi2.isf(level, freedom))
+    limit = float(scipy.special.chdtri(freedom, level))
     hidden = np.maximum(np.asarray(noncentrality, dtype=float), 0.0)
     found = scipy.stats.ncx2.sf(limit, freedom, np.maximum(hidden, 1e-12))
     return np.where(hidden > 0.0, np.clip(np.nan_to_num(found, nan=1.0), level, 1.0), level)
@@ -56,7 +56,7 @@ def needed_noncentrality(wanted: float, freedom: int, level: float) -> float:
     """The least noncentrality of a test with a power."""
     if wanted <= level:
         return 0.0
-    limit = float(scipy.stats.chi2.isf(level, freedom))
+    limit = float(scipy.special.chdtri(freedom, level))
     high = 4.0 * limit + 50.0
     return float(scipy.optimize.brentq(lambda value: float(power(value, freedom, level)) - wanted, 0.0, high))
 

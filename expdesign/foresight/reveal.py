@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+import scipy
 
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.model import term_library
@@ -89,14 +89,14 @@ def told_apart_from(probability: float) -> float:
     The lead of one cause over another nearly collinear one is Gaussian, with the noncentrality as mean and four times
     it as variance.
     """
-    quantile = float(norm.ppf(probability))
+    quantile = float(scipy.special.ndtri(probability))
     return (quantile + math.sqrt(quantile**2 + SELECTION_TUNING.equivalent_within)) ** 2
 
 
 def told_apart_with(noncentrality: float) -> float:
     """The probability of `told_apart_from` at a noncentrality that is left."""
     lead = noncentrality - SELECTION_TUNING.equivalent_within
-    return float(norm.cdf(lead / (2.0 * math.sqrt(noncentrality)))) if noncentrality > 0 else 0.0
+    return float(scipy.special.ndtr(lead / (2.0 * math.sqrt(noncentrality)))) if noncentrality > 0 else 0.0
 
 
 def wanted(

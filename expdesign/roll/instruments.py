@@ -253,7 +253,7 @@ def chance_of_answers(
     seen = axes[:, kept].T @ (moments / size) / np.sqrt(powers[kept])
     # spectra of the residuals that are weighed by them come out too small, as in the covariance of the estimate
     short = (1.0 - 2.0 / min(one.freedom for one in spectra)) ** 2
-    return float(scipy.stats.chi2.sf(short * seen @ seen / max(1.0, surprise), np.count_nonzero(kept)))
+    return float(scipy.special.chdtrc(np.count_nonzero(kept), short * seen @ seen / max(1.0, surprise)))
 
 
 def _later(case: Case, part: Weighted, left: Spectrum, period: float) -> list[Array]:

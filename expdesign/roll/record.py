@@ -214,7 +214,7 @@ def judge_roll(
 def _chance(total: float, numbers: int, freedom: float) -> float:
     """Chance of a larger sum of squares of so many numbers, whose covariance has so many degrees of freedom."""
     rest = freedom - numbers + 1.0
-    return float(scipy.stats.f.sf(total * rest / (freedom * numbers), numbers, rest))
+    return float(scipy.special.fdtrc(numbers, rest, total * rest / (freedom * numbers)))
 
 
 def _price(change: RollChange) -> float:

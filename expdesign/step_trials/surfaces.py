@@ -225,8 +225,8 @@ def _paired(channel: int, steady: Sequence[tuple[StepSample, Plateau]]) -> Compa
     if spread > own_variance and np.ptp(np.sign(apart)):
         own_variance, freedom = spread, len(pairs) - 1.0
     std = math.sqrt(own_variance)
-    p_value, one = 2 * float(scipy.stats.t.sf(abs(mean) / std, freedom)), int(np.argmax(apart**2 / variance))
-    alone = 2 * float(scipy.stats.t.sf(abs(apart[one]) / math.sqrt(variance[one]), 2 * (TUNING.steady_blocks - 1)))
+    p_value, one = 2 * float(scipy.special.stdtr(freedom, -abs(mean) / std)), int(np.argmax(apart**2 / variance))
+    alone = 2 * float(scipy.special.stdtr(2 * (TUNING.steady_blocks - 1), -abs(apart[one]) / math.sqrt(variance[one])))
     place = None
     if alone * len(pairs) < p_value:
         p_value, mean, std = alone * len(pairs), float(apart[one]), math.sqrt(variance[one])
@@ -291,5 +291,5 @@ def _tested(kind: str, command: str, columns: Array, extra: Array, values: Array
     freedom = len(values) - np.linalg.matrix_rank(columns) - 1
     error = target - difference * rest
     std = float(np.sqrt(max(float(error @ error), 1e-300) / freedom / power))
-    p_value = 2 * float(scipy.stats.t.sf(abs(difference) / std, freedom))
+    p_value = 2 * float(scipy.special.stdtr(freedom, -abs(difference) / std))
     return Comparison(kind=kind, command=command, difference=difference, std=std, p_value=p_value, samples=len(values))

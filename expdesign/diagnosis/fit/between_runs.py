@@ -29,7 +29,7 @@ FEWEST, MOST_FREEDOM = 0.3, 1e5
 """Degrees of freedom from which a spread tells anything, and which count as any number."""
 LEAST_SHARE = 1e-9
 """Of the information, for a run to tell anything."""
-NORMAL_95 = float(scipy.stats.norm.ppf(0.975))
+NORMAL_95 = float(scipy.special.ndtri(0.975))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,8 +114,8 @@ def _inverse_trigamma(value: float) -> float:
 def tail(statistic: float, numbers: int, factor: float = 1.0, freedom: float = math.inf) -> float:
     """p-value of a chi-squared statistic whose variance is larger by a factor with so many degrees of freedom."""
     if not math.isfinite(freedom) or freedom > MOST_FREEDOM:
-        return float(scipy.stats.chi2.sf(statistic / factor, numbers))
-    return float(scipy.stats.f.sf(statistic / factor / numbers, numbers, freedom))
+        return float(scipy.special.chdtrc(numbers, statistic / factor))
+    return float(scipy.special.fdtrc(numbers, freedom, statistic / factor / numbers))
 
 
 def of_several(p_value: float, tests: float) -> float:
@@ -164,7 +164,7 @@ def counting_stretches(found: Fit) -> Fit:
 
 def few_runs_factor(freedom: Array | float) -> Array:
     """By how much an interval of 95 % is wider with so many degrees of freedom."""
-    return np.asarray(scipy.stats.t.ppf(0.975, np.maximum(freedom, 1.0)) / NORMAL_95)
+    return np.asarray(scipy.special.stdtrit(np.maximum(freedom, 1.0), 0.975) / NORMAL_95)
 
 
 def _spread_of_estimates(found: Fit, run: Array) -> tuple[Spread, Array]:

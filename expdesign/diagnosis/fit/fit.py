@@ -285,7 +285,7 @@ def within_stated_std(found: Fit) -> bool:
     whitening = _prior_whitening(found.ship, found.keys, found.free_count)
     apart = np.abs(whitening @ deviations_of(found.ship, found.keys))
     stated = int((np.diag(whitening) > 0).sum())
-    return bool((2.0 * scipy.stats.norm.sf(apart) * max(stated, 1) > BEYOND_STD_LEVEL).all())
+    return bool((2.0 * scipy.special.ndtr(-apart) * max(stated, 1) > BEYOND_STD_LEVEL).all())
 
 
 def profile_cost(found: Fit, noise: Noise) -> float:

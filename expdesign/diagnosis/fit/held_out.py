@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.between_runs import sum_by_run
+from expdesign.diagnosis.fit.between_runs import NORMAL_95, sum_by_run
 from expdesign.diagnosis.fit.linear_model import (
     GramMatrices,
     Sensitivities,
@@ -170,8 +170,9 @@ def interval_of(found: Array | np.floating, drawn: Array, before: HeldOut, after
     first, second = _independent(before), _independent(after)
     count = max(2, len(first.squared_error))
     free = count if first.run is None else max(2.0, _independent_stretches(first, second))
-    wider = count / np.sqrt((count - 1) * free) * scipy.stats.t.ppf(0.975, free - 1) / scipy.stats.norm.ppf(0.975)
-    return np.asarray(found + wider * (np.nanquantile(drawn, [0.025, 0.975], axis=0) - found))
+    wider = count / np.sqrt((count - 1) * free) * scipy.special.stdtrit(free - 1, 0.975) / NORMAL_95
+    quantile = np.nanquantile if np.isnan(drawn).any() else np.quantile  # which is quicker
+    return np.asarray(found + wider * (quantile(drawn, [0.025, 0.975], axis=0) - found))
 
 
 def _independent_stretches(before: HeldOut, after: HeldOut) -> float:
@@ -219,7 +220,10 @@ def prediction_gain(
         return np.nan, (np.nan, np.nan)
     with np.errstate(invalid="ignore"):
         ratios = np.log(left / lost)  # nan where both models run away
-    middle, error = ratios.mean(), scipy.stats.t.ppf(0.975, len(ratios) - 1) * scipy.stats.sem(ratios)
+    middle, error = (
+        ratios.mean(),
+        scipy.special.stdtrit(len(ratios) - 1, 0.975) * ratios.std(ddof=1) / np.sqrt(len(ratios)),
+    )
     share, most, least = (1.0 - np.exp([middle, middle - error, middle + error])).tolist()
     return share, (least, most)
 

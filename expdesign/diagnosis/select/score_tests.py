@@ -257,7 +257,7 @@ def _p_value(statistic: Any, freedom: int, *, positive: bool) -> Any:
 
     Source: H. Chernoff, Annals of Mathematical Statistics 25 (1954), 573-578, for a size at its bound.
     """
-    return scipy.stats.chi2.sf(statistic, freedom) / (2.0 if positive else 1.0)
+    return scipy.special.chdtrc(freedom, statistic) / (2.0 if positive else 1.0)
 
 
 def _effective_tests(

@@ -97,7 +97,7 @@ def redundant_step(steps: list[Step], windows: Windows) -> int | None:
         if reduced is None:
             continue
         lost, count = log_likelihood_gain(reduced, whole), len(_own_effects(step))
-        p_value = of_several(float(scipy.stats.chi2.sf(max(lost, 0.0), max(1, count))), step.chosen.multiplicity)
+        p_value = of_several(float(scipy.special.chdtrc(max(1, count), max(lost, 0.0))), step.chosen.multiplicity)
         if p_value > TUNING.level or lost < TUNING.price * count:
             return index
     return None

@@ -82,7 +82,7 @@ def _grid_search(base: Fit, candidate: Candidate) -> tuple[str, float, float]:
         place = int(np.argmax(statistics))
         best = float(tried[place])
         width = float(np.min(np.diff(tried))) if len(tried) > 1 else 0.0
-        inside = tried[statistics > statistics.max() - scipy.stats.chi2.isf(TUNING.level, 1)]
+        inside = tried[statistics > statistics.max() - scipy.special.chdtri(1, TUNING.level)]
         std = max(float(np.ptp(inside)) / 4.0, width / 3.5)
         low, high = tried[max(place - 1, 0)], tried[min(place + 1, len(tried) - 1)]
         values = tuple(np.linspace(low, high, REFINED_GRID).tolist())
