@@ -222,7 +222,19 @@ COMMANDS = {
     "whatif": "whatif prior.toml prior.toml",
 }  # fmt: skip
 """Every command that reads measured data, with data in log0."""
-WITHOUT = {"import", "new", "nominal", "roll-plan", "export", "check-route", "simulate", "incline", "explain", "web"}
+WITHOUT = {
+    "import",
+    "new",
+    "nominal",
+    "roll-plan",
+    "export",
+    "check-route",
+    "simulate",
+    "trial-result",
+    "incline",
+    "explain",
+    "web",
+}
 """Commands that read none: logs, plans and particulars only."""
 
 
