@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.cli.app import app
+from expdesign.cli.commands import app
 from expdesign.errors import FileError
 from expdesign.export import vessel_toml
 from expdesign.importing import Channel, sampled, sensor_keys
