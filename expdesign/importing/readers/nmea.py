@@ -298,7 +298,7 @@ def _stamp_in(prefix: str) -> str:
 def _numbers(texts: Sequence[str]) -> Array:
     """Numbers of cells, nan where there is none."""
     try:
-        return np.array(texts, dtype=float)
+        return np.array([text or "nan" for text in texts], dtype=float)
     except ValueError:
         return np.array([_number(text) for text in texts])
 
