@@ -10,7 +10,7 @@ from lxml import html
 
 import export_case as case
 from expdesign.errors import FileError
-from expdesign.export import write_files
+from expdesign.export import words, write_files
 from expdesign.export.cards import cards_html
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
@@ -68,6 +68,9 @@ def test_report_cards_files_and_terminal_agree_on_the_verdict(tmp_path, share: f
     for told in (report, cards, json.dumps(file, ensure_ascii=False), json.dumps(summary, ensure_ascii=False)):
         plain = " ".join(told.split())
         assert (SAID.format(100 * share) in plain) is not within
+    rule = f"than the whole planned trial, {words.duration(plan.day.planned_s)}."  # as drawn trials are aborted
+    assert rule in report
+    assert rule in cards
     assert ("Verified by simulation" in cards) is within
     assert file["verified"] is summary["verified"] is within
     assert file["drawn_trials"]["aborted_share"] == share

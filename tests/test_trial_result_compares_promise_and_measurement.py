@@ -69,6 +69,15 @@ def test_estimates_twice_as_inaccurate_as_planned_are_said_to_be(tmp_path: Path,
     assert "3.1 % in surge" in page.replace("\N{NO-BREAK SPACE}", " ")
 
 
+def test_runs_that_are_missing_or_held_out_are_no_data_of_the_estimate() -> None:
+    plan = json.loads(plan_text())
+    estimate = json.loads(estimate_text(plan, whole=False))["iv"]
+    held_out, *used = estimate["data"]["runs"]
+    held_out["use"] = "test"
+    (note,) = result_document(contents(plan, estimate)).notes
+    assert f"from {words.duration(sum(run['samples'] for run in used))} of data" in note
+
+
 def test_an_accuracy_asked_for_is_met_exactly_where_the_estimate_is_as_accurate(tmp_path: Path) -> None:
     first, second = case.design().problem.parameters[:2]
     free = json.loads(plan_text())["parameters"]
@@ -140,6 +149,7 @@ def test_indices_stand_beside_those_of_the_model_to_the_same_side(tmp_path: Path
     ("file", "change", "said"),
     [
         ("plan.json", lambda made: made.pop("parameters"), "plan.json: parameters: is missing"),
+        ("plan.json", lambda made: made.update(draft=True), "plan.json: draft: is true"),
         ("estimate.json", lambda made: made["iv"]["parameters"].clear(), "estimates no parameter of the plan"),
         ("estimate.json", lambda made: made["iv"].pop("data"), "iv.data: is missing"),
     ],

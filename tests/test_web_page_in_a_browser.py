@@ -239,6 +239,8 @@ def test_a_log_is_dropped_imported_and_diagnosed(page, folder: Path) -> None:
     page.get_by_text(re.compile("expdesign diagnose")).first.wait_for()
     eventually(page, lambda: list(folder.glob("runs/*-diagnose/diagnosis.json")), "the data are diagnosed")
     page.frame_locator("iframe").last.locator("h1").first.wait_for()
+    page.get_by_role("button", name="Trial result").click()
+    page.get_by_text("plan the scenario's trial, choose its runs and estimate from them first").wait_for()
 
 
 def test_what_is_wrong_in_a_file_is_said_in_the_page(page, folder: Path) -> None:

@@ -11,6 +11,7 @@ from statistics import median
 import scipy
 from pydantic import Field
 
+from expdesign.assessment.misfit import ESTIMATION
 from expdesign.conventions import OUTPUTS
 from expdesign.export import words
 from expdesign.export.document import Document, Mark, Table, filled, section
@@ -18,6 +19,8 @@ from expdesign.export.files.disturbances import plus_minus
 from expdesign.export.files.read_json import Entry
 from expdesign.export.indices_form.form import shown
 
+FEW = 0.9
+"""Share of the time of the planned runs below which the data do not hold all of them."""
 CHANCE = 0.05
 """Probability that any parameter is said to differ from the vessel file where none does."""
 SIGNED_BY = ("Trial master", "Owner", "Class")
@@ -69,7 +72,17 @@ class PlanResult(Entry):
     vessel: Ship
     legs: list[PlannedLeg] = Field(min_length=1)
     parameters: dict[str, Expected] = Field(min_length=1)
-    verdict: str = ""
+    draft: bool = False
+
+    @property
+    def runs(self) -> list[PlannedLeg]:
+        """Its runs in time order."""
+        return [leg for leg in self.legs if leg.kind == "primitive"]
+
+    @property
+    def runs_s(self) -> float:
+        """How long all of them take."""
+        return sum(leg.time_s for leg in self.runs)
 
 
 class Valued(Entry):
@@ -143,6 +156,12 @@ class ResultContent:
         """Length of all records."""
         return sum(run.samples for run in self.estimate.data.runs) * self.estimate.sample_time_s
 
+    @property
+    def used_s(self) -> float:
+        """Length of those that are estimated from."""
+        used = [run.samples for run in self.estimate.data.runs if run.use == ESTIMATION]
+        return sum(used) * self.estimate.sample_time_s
+
 
 def result_document(content: ResultContent) -> Document:
     """Verdict, findings and tables."""
@@ -167,7 +186,7 @@ def result_document(content: ResultContent) -> Document:
         facts={
             "planned_s": content.plan.legs[-1].end.time_s,
             "recorded_s": content.recorded_s,
-            "runs_planned": sum(leg.kind == "primitive" for leg in content.plan.legs),
+            "runs_planned": len(content.plan.runs),
             "runs_recorded": len(content.estimate.data.runs),
         },
         values={"parameters": {name: _entry(content, name) for name in content.plan.parameters}},
@@ -214,8 +233,7 @@ def _met(content: ResultContent) -> dict[str, bool]:
 
 def _whole(content: ResultContent) -> bool:
     """Whether the data hold the legs between the runs, too: they last longer than half way from runs to whole track."""
-    runs_s = sum(leg.time_s for leg in content.plan.legs if leg.kind == "primitive")
-    return content.recorded_s > (runs_s + content.plan.legs[-1].end.time_s) / 2
+    return content.used_s > (content.plan.runs_s + content.plan.legs[-1].end.time_s) / 2
 
 
 def _planned(content: ResultContent) -> dict[str, float]:
@@ -230,7 +248,7 @@ def _accuracy(content: ResultContent) -> str:
     """What was asked for, or else what was promised, beside what came out."""
     met = _met(content)
     if met and all(met.values()):
-        return f"All {words.counted(len(met), 'parameter')} with an accuracy asked for are known that well."
+        return f"Every accuracy that was asked for is reached, of {words.counted(len(met), 'parameter')}."
     if met:
         short = ", ".join(name for name, reached in met.items() if not reached)
         return f"{words.counted(sum(met.values()), 'parameter')} of {len(met)} as accurate as asked; not {short}."
@@ -246,9 +264,14 @@ def _accuracy(content: ResultContent) -> str:
 
 
 def _left_out(content: ResultContent) -> tuple[str, ...]:
-    """What the legs between the runs would tell, where the data do not hold them."""
+    """What runs that are not in the data, or else the legs between them, would tell."""
     pairs = [(one.std_after_runs, one.std_after) for one in content.plan.parameters.values()]
     gains = [runs / track for runs, track in pairs if runs and track]
+    if content.used_s < FEW * content.plan.runs_s:
+        return (
+            f"The estimate is from {words.duration(content.used_s)} of data, the planned standard deviations are those "
+            f"of all runs, {words.duration(content.plan.runs_s)}.",
+        )
     if _whole(content) or not gains:
         return ()
     return (
@@ -310,9 +333,7 @@ def run_rows(content: ResultContent) -> list[tuple[str, ...]]:
     """Planned runs beside the records that are named after them; the others follow."""
     step, left = content.estimate.sample_time_s, list(content.estimate.data.runs)
     rows = []
-    for leg in content.plan.legs:
-        if leg.kind != "primitive":
-            continue
+    for leg in content.plan.runs:
         found = next((run for run in left if _plain(run.name) == _plain(leg.name)), None)
         recorded, use = ("no record of that name", "") if found is None else (_time(found, step), found.use)
         if found is not None:

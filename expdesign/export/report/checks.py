@@ -24,6 +24,7 @@ def procedure_sentences(plan: Plan) -> list[str]:
     risk = plan.risk
     if risk is None:
         return []
+    planned_s = len(plan.commands) * plan.commands.sample_time_s
     within = _tolerances(risk, [leg.kind == "primitive" for leg in plan.legs])
     return [
         "Run: give the orders on the card without correcting for the motion of the ship.",
@@ -33,7 +34,7 @@ def procedure_sentences(plan: Plan) -> list[str]:
         f"Start gate: begin the next run if {within}.",
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
         f"on the planned heading at the planned speed. After {words.counted(risk.go_arounds, 'go-around')}, abort the "
-        "trial.",
+        f"trial; also where one start takes longer to reach than the whole planned trial, {words.duration(planned_s)}.",
     ]
 
 

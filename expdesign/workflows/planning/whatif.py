@@ -173,7 +173,7 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
             plan |= {"trial_s": length.planned_s, "day_s": length.planned_s}
             plan |= {"day_median_s": length.median_s, "day_95_s": length.most_s}
         comparing("comparing criteria", 0.0)
-        return replace(_described(case, changes, information, design, plan), track=track)
+        return replace(_described(case, changes, information, design, plan, seed), track=track)
     except NoAnswer as error:
         empty = np.zeros((0, 0))
         return Case(
@@ -187,10 +187,11 @@ def _described(
     information: Sequence[PrimitiveInformation],
     design: DurationDesign,
     plan: dict[str, object],
+    seed: int,
 ) -> Case:
     parameters = estimated_parameters(case.vessel.model, case.design.fixed_parameters)
     run_s = design.problem.run_s
-    others = _in_other_times(case, information, design)
+    others = _in_other_times(case, information, design, seed)
     used = [place for place, runs in enumerate(zip(design.repeats, *others, strict=True)) if any(runs)]
     of_runs = _covariance(case, [information[place].primitive for place in used], parameters)
     times = []
@@ -216,14 +217,14 @@ def _described(
 
 
 def _in_other_times(
-    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign, seed: int
 ) -> list[tuple[int, ...]]:
     """The optimal whole runs in shorter and longer times, those that tell every parameter."""
     found = []
     for share in SHARES:
         settings = replace(case.design, total_s=share * design.problem.total_s, accuracy=None)
         with suppress(NoAnswer):
-            problem = duration_problem(replace(case, design=settings), information)
+            problem = duration_problem(replace(case, design=settings), information, seed=seed)
             found.append(whole_runs(problem, optimal_shares(problem).fractions))
     return found
 

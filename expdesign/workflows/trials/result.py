@@ -34,6 +34,8 @@ def trial_result(
         InputError: a file is wrong, or they are not of the same ship.
     """
     planned = read_json(plan, PlanResult, "a plan.json as expdesign run writes it")
+    if planned.draft:
+        raise FileError(plan, "draft", "is true: a draft is not sailed, expected the plan that was")
     tried = read_json(estimate, Estimates, "an estimate.json as expdesign estimate writes it").root
     best = next((one for one in tried.values() if one.in_vessel_file), None)
     if best is None or not set(best.parameters) & set(planned.parameters):
