@@ -12,6 +12,7 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
+from scipy.signal import lfilter
 
 TUG = {
     "X_u": -0.05, "X_vr": 1.0, "X_abs_u_u": -0.05, "W_abs_u_u": -0.0005, "X_mu": 0.02, "X_kappa": -0.0025,
@@ -149,44 +150,54 @@ def sail(trials: list[Trial], orders: np.ndarray, step_s: float, weather: Weathe
     mean_c = np.array([t.current for t in trials]).T[:, :, None]
     mean_w = np.array([t.wind for t in trials]).T[:, :, None]
     vary_c, vary_w = (rng.standard_normal((2, 1, b)) * s for s in (weather.current_std, weather.wind_std))
-    fade_c, fade_w = np.exp(-h / weather.current_time_s), np.exp(-h / weather.wind_time_s)
     psi0 = rng.uniform(-np.pi, np.pi, (1, b)) * np.ones((n, 1))
     u0 = {"tug": 1.8, "barge": 1.9, "coaster": 3.0}[ship] * rng.uniform(0.7, 1.1, (1, b)) * np.ones((n, 1))
-    x = np.stack([np.zeros((n, b)), np.zeros((n, b)), psi0, u0, np.zeros((n, b)), np.zeros((n, b)),
-                  np.zeros((n, b)), np.zeros((n, b))])  # fmt: skip
-    held = orders[:, :, 0].copy()
-    out = {name: np.zeros((n, b, k)) for name in ("north", "east", "heading", "u", "v", "r", "u_q", "v_q")}
-    advance = runge_kutta(ship, present, h).map(n * b)
-    constants = ca.DM(_lanes(np.stack([np.broadcast_to(v, (n, b)) for v in (*th.values(), *e.values())])))
-    rows = np.arange(n)[:, None, None], np.arange(b)[None, :, None], np.arange(m)[None, None, :]
-    for i in range(k):
-        for part in range(SUBSTEPS):
-            t = i * step_s + part * h
-            if delayed:
-                index = np.clip(np.floor((t - delay + 1e-9) / step_s).astype(int), 0, k - 1)
-                order = orders[rows[0], rows[1], index, rows[2]]
-            else:
-                order = orders[:, :, i]
-            order = np.where(small & (np.abs(order) < e["deadband"][..., None]), 0.0, order)
-            acting = order + (held - order) * (lag / h) * (1 - fade)  # mean over the step
-            held = order + (held - order) * fade
-            if part == 0:
-                c, s = np.cos(x[2]), np.sin(x[2])
-                wind = mean_w + vary_w
-                for name, value in zip(("north", "east", "heading", "u", "v", "r"), x[:6], strict=True):
-                    out[name][:, :, i] = value
-                out["u_q"][:, :, i] = x[3] - (c * wind[0] + s * wind[1])
-                out["v_q"][:, :, i] = x[4] - (c * wind[1] - s * wind[0])
-            shoal = np.zeros((n, b)) if depth is None else 2.5 / depth[:, :, i]
-            after = (t + k * step_s * np.arange(b) >= e["change_s"]) & (e["change_s"] > 0)
-            current, wind = mean_c + vary_c, mean_w + vary_w
-            moved = advance(_lanes(x), _lanes(np.moveaxis(acting, -1, 0)), constants, _lanes(shoal[None]),
-                            _lanes(np.broadcast_to(after, (1, n, b))), _lanes(current), _lanes(wind))  # fmt: skip
-            x = np.array(moved).reshape(8, n, b)
-            x[3:] = np.clip(x[3:], -MOST, MOST)  # ships made unstable, which nobody looks at any further
-            vary_c = fade_c * vary_c + weather.current_std * np.sqrt(1 - fade_c**2) * rng.standard_normal((2, 1, b))
-            vary_w = fade_w * vary_w + weather.wind_std * np.sqrt(1 - fade_w**2) * rng.standard_normal((2, 1, b))
-    return out
+    x = np.zeros((8, n, b))
+    x[2:4] = psi0, u0
+    steps = k * SUBSTEPS
+    white = np.moveaxis(rng.standard_normal((steps, 2, 2, 1, b)), 1, 0)
+    current, wind = (
+        mean + _gauss_markov(first, std, np.exp(-h / time_s), noise)
+        for mean, first, std, time_s, noise in (
+            (mean_c, vary_c, weather.current_std, weather.current_time_s, white[0]),
+            (mean_w, vary_w, weather.wind_std, weather.wind_time_s, white[1]),
+        )
+    )  # (t, 2, n, b)
+    of_sample, of_part = np.divmod(np.arange(steps), SUBSTEPS)
+    time_s = of_sample * step_s + of_part * h
+    if delayed:
+        index = np.floor((time_s[:, None, None, None] - delay + 1e-9) / step_s).astype(int)
+        rows = np.arange(n)[:, None, None], np.arange(b)[None, :, None], np.arange(m)[None, None, :]
+        order = orders[rows[0], rows[1], np.clip(index, 0, k - 1), rows[2]]
+    else:
+        order = np.moveaxis(orders, 2, 0)[of_sample]
+    order = np.where(small & (np.abs(order) < e["deadband"][..., None]), 0.0, order)  # (t, n, b, m)
+    held, acting = orders[:, :, 0], np.empty_like(order)
+    for number, one in enumerate(order if lag.any() else ()):
+        acting[number] = one + (held - one) * (lag / h) * (1 - fade)  # mean over the step
+        held = one + (held - one) * fade
+    if not lag.any():
+        acting = order
+    shoal = np.zeros((steps, n, b)) if depth is None else 2.5 / np.moveaxis(depth, 2, 0)[of_sample]
+    after = (time_s[:, None, None] + k * step_s * np.arange(b) >= e["change_s"]) & (e["change_s"] > 0)
+    constants = np.stack([np.broadcast_to(v, (n, b)) for v in (*th.values(), *e.values())])
+    given = (
+        np.moveaxis(acting, -1, 1),
+        shoal[:, None],
+        np.broadcast_to(after[:, None], (steps, 1, n, b)),
+        current,
+        wind,
+    )
+    whole = runge_kutta(ship, present, h).map(n * b).mapaccum(steps)
+    acting, *sea = (np.moveaxis(values, 1, 0).reshape(values.shape[1], -1) for values in given)
+    moved = whole(x.reshape(8, -1), acting, np.tile(constants.reshape(len(constants), -1), steps), *sea)
+    moved = np.concatenate([x[:, None], np.array(moved).reshape(8, steps, n, b)[:, :-1]], axis=1)
+    at = np.moveaxis(moved[:, ::SUBSTEPS], 1, -1)  # (8, n, b, k)
+    c, s, wind = np.cos(at[2]), np.sin(at[2]), np.moveaxis(wind[::SUBSTEPS], 0, -1)
+    return dict(zip(("north", "east", "heading", "u", "v", "r"), at, strict=False)) | {
+        "u_q": at[3] - (c * wind[0] + s * wind[1]),
+        "v_q": at[4] - (c * wind[1] - s * wind[0]),
+    }
 
 
 EFFECTS = (
@@ -197,9 +208,10 @@ EFFECTS = (
 )  # fmt: skip
 
 
-def _lanes(values: np.ndarray) -> np.ndarray:
-    """(a, n b) of (a, n, b)."""
-    return np.ascontiguousarray(values, dtype=float).reshape(len(values), -1)
+def _gauss_markov(first: np.ndarray, std: float, fade: float, white: np.ndarray) -> np.ndarray:
+    """(t, ...) of the first value and of white noise (t, ...), the last of which is left."""
+    driven = np.concatenate([first[None], std * np.sqrt(1 - fade**2) * white[:-1]])
+    return lfilter([1.0], [1.0, -fade], driven, axis=0)
 
 
 @cache
@@ -218,7 +230,9 @@ def runge_kutta(ship: str, present: frozenset[str], h: float) -> ca.Function:
     k1 = rates(x)
     k2 = rates(x + h / 2 * k1)
     k3 = rates(x + h / 2 * k2)
-    return ca.Function("step", given, [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))])
+    after = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(x + h * k3))
+    kept = ca.fmax(ca.fmin(after[3:], MOST), -MOST)  # ships made unstable, which nobody looks at any further
+    return ca.Function("step", given, [ca.vertcat(after[:3], kept)])
 
 
 def _rates(ship, x, acting, th, e, present, shoal, after, current, wind):

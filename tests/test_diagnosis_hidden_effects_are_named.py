@@ -26,7 +26,7 @@ CASES = (
     ("coaster", "actuator_lag", {"lag_s": 5.0, "acts_on": 0b10}, {}, "lag_rudder_s", 5.0),
     ("barge", "missing_term:N_rrr", {"N_rrr": -60.0}, {}, "N_rrr", -60.0),
 )
-DEFAULT = (0, 7, 10, 13, 14)
+DEFAULT = (0, 10, 14)
 """Tried in every run of the tests; the others take minutes."""
 
 
@@ -77,19 +77,21 @@ def test_every_hidden_effect_is_named_by_uncertain_parameters(case):
 SMALL, WHOLE = {"batches": 2, "samples": 80}, {"batches": 6, "samples": 300}
 
 
-@pytest.mark.parametrize(("trials", "size"), [(8, SMALL), pytest.param(20, WHOLE, marks=pytest.mark.slow)])
-def test_clean_data_are_called_clean(trials, size):
+@pytest.mark.parametrize(
+    ("trials", "most", "size"), [(6, 2, SMALL), pytest.param(20, 3, WHOLE, marks=pytest.mark.slow)]
+)
+def test_clean_data_are_called_clean(trials, most, size):
     """At most one false alarm in twenty trials is expected.
 
-    Four or more among 8 have a probability of 0.04 per cent, among 20 of 1.6; one false alarm in two trials would pass
-    with 7 per cent and 0.1.
+    Three or more among 6 have a probability of 0.2 per cent, four or more among 20 of 1.6; one false alarm in two
+    trials would pass with 34 per cent and 0.1.
     """
     alarms = 0
     for seed in range(trials):
         record = hidden_record("barge", seed=100 + seed, relative_std=0.1 * (seed % 2), **size)
         found = diagnose(vessel_of("barge", relative_std=0.1 * (seed % 2)), record, seed=seed)
         alarms += bool(found.findings)
-    assert alarms <= 3
+    assert alarms <= most
 
 
 def test_the_generator_and_the_package_agree_on_calm_water():
