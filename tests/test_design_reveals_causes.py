@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -54,9 +55,10 @@ def test_a_design_reveals_what_it_is_asked_to(tmp_path):
     told = {name: min(told_of(item, share) for item in design.problem.floors) for name, share in shares.items()}
     assert told["free"] < 0.9
     assert told["own"] >= 1.0 - 1e-5
-    found = foresee(
-        case.vessel, design_runs([item.primitive for item in information], design.repeats), case.environment
-    )
+    with patch("expdesign.foresight.foresee.standard_trials", return_value=None):  # which size the others would have
+        found = foresee(
+            case.vessel, design_runs([item.primitive for item in information], design.repeats), case.environment
+        )
     assert max(item.least_change for item in found.effects if item.cause == "lever_arm") < 1.1 * 0.13
 
 

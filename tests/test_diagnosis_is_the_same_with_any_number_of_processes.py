@@ -11,7 +11,7 @@ from expdesign.processes import local_processes
 
 def test_two_processes_find_what_one_finds(monkeypatch):
     monkeypatch.setattr(sys.modules["expdesign.diagnosis.diagnose"], "FEW_SAMPLES", 0)
-    record = hidden_record("barge", seed=12, batches=3, samples=100, effects={"gain": -0.2})
+    record = hidden_record("barge", seed=12, batches=2, samples=80, effects={"gain": -0.2})
 
     def found(processes: int) -> Diagnosis:
         with local_processes(processes):

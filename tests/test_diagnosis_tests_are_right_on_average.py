@@ -40,7 +40,7 @@ def clean_scores():
     """p-value and share of half a second, for dead time and lag, in clean trials."""
     found = {"delay:all": [], "lag:all": []}
     candidates = [Candidate(cause="actuator_lag", free={key: 0.5}, finite=True) for key in found]
-    for seed in range(20):
+    for seed in range(14):
         record = hidden_record("barge", seed=seed, batches=3, samples=150)
         ship = extended_model(vessel_of("barge"), record)
         windows = cut_windows(ship.model, record)
@@ -213,6 +213,7 @@ def test_a_missing_sample_costs_only_the_samples_whose_filter_reads_it():
     assert not seen[0, 3]
 
 
+TRIALS = 14
 CLEAN = (("theta:X_uu",), ("theta:N_ur",), ("theta:Y_ur",), ("gain",), ("inertia:r",), ("heading_bias",), ("late:psi",))
 
 
@@ -223,14 +224,14 @@ def test_p_values_of_clean_trials_are_uniform(sample_time_s):
     Each of seven tests by Kolmogorov and Smirnov at 0.1 %: seven times two wrong alarms in 1000 drawings of seeds.
     """
     ship, by = at_rate(SHIP_50M, sample_time_s), {key: [] for key in CLEAN}
-    for seed in range(24):
+    for seed in range(TRIALS):
         found, _ = p_values(ship, clean_trial(ship, np.random.default_rng([5, seed]), runs=3, run_s=150.0))
         for (_, *free), value in found.items():
             key = tuple(name for name, _ in free)
             if key in by:
                 by[key].append(value)
     for key, values in by.items():
-        assert len(values) == 24, key
+        assert len(values) == TRIALS, key
         assert kstest(values, "uniform").pvalue > 1e-3, key
 
 

@@ -57,10 +57,11 @@ def foreseen(case):
 
 
 @pytest.fixture(scope="module")
-def of_known_ship(case):
-    """The same where parameters count as known."""
+def of_known_ship(case, foreseen):
+    """The same sizes where parameters count as known."""
     vessel, runs, weather = case
-    return {item.name: item for item in foresee(certain(vessel), runs, weather, seed=0).effects}
+    sizes = {item.cause: item.change for item in foreseen.values() if item.sized}
+    return {item.name: item for item in foresee(certain(vessel), runs, weather, sizes=sizes, seed=0).effects}
 
 
 def certain(vessel: Vessel) -> Vessel:
