@@ -1,7 +1,9 @@
 """`expdesign estimate`: what is wrong is one line and no file, what has no answer names the parameters."""
 
+import io
 import json
 import re
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,20 @@ from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_comma
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short noisy trial."""
     return write_run(tmp_path_factory.mktemp("data") / "run.csv", MODEL_SHIP_TRUE, model_ship_commands(1500), **EULER)
+
+
+@pytest.fixture(scope="module")
+def told(run: Path, made_once) -> tuple[Path, dict]:
+    """Folder of the results by all methods of that trial under an odd name, and the summary that was printed."""
+
+    def estimated(folder: Path) -> dict:
+        odd, said = folder.with_name("run <b> & co.csv"), io.StringIO()
+        odd.write_bytes(run.read_bytes())
+        with redirect_stdout(said):
+            assert main(["estimate", str(odd), "--vessel", str(MODEL_SHIP), "--out", str(folder), "--json"]) == 0
+        return json.loads(said.getvalue())["summary"]
+
+    return made_once("estimate-of-one-run", estimated)
 
 
 def line_of(capsys: pytest.CaptureFixture[str]) -> str:
@@ -108,23 +124,22 @@ def test_the_table_holds_what_the_file_holds(run: Path, tmp_path: Path, capsys: 
     assert f"Open {tmp_path}/estimate.html in a browser." in lines
 
 
-def test_json_says_the_same_without_a_table(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path), "--json", "--quiet"]
-    assert main(arguments) == 0
-    told = json.loads(capsys.readouterr().out)["summary"]
-    found = json.loads((tmp_path / "estimate.json").read_text(encoding="utf-8"))
-    assert [name for name, entry in found.items() if entry["in_vessel_file"]] == [told["vessel_file_holds"]]
-    assert told["vessel_file_holds"] == told["why"].split()[0]
-    for method, entry in told["methods"].items():
+def test_json_says_the_same_without_a_table(told: tuple[Path, dict]) -> None:
+    folder, summary = told
+    found = json.loads((folder / "estimate.json").read_text(encoding="utf-8"))
+    assert [name for name, entry in found.items() if entry["in_vessel_file"]] == [summary["vessel_file_holds"]]
+    assert summary["vessel_file_holds"] == summary["why"].split()[0]
+    for method, entry in summary["methods"].items():
         assert entry["parameters"] == found[method]["parameters"]
         assert entry["fit"] == found[method]["fit"]
 
 
-def test_the_same_data_give_the_same_files(run: Path, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / name), "--quiet"])
-    for path in (tmp_path / "a").iterdir():
-        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+def test_the_same_data_give_the_same_files(told: tuple[Path, dict], tmp_path: Path) -> None:
+    folder, _ = told
+    odd = folder.with_name("run <b> & co.csv")
+    main(["estimate", str(odd), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path), "--quiet"])
+    for path in folder.iterdir():
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes()
 
 
 def test_results_go_to_runs_by_the_name_of_the_first_file(
@@ -139,11 +154,9 @@ def test_results_go_to_runs_by_the_name_of_the_first_file(
     ]
 
 
-def test_the_page_stands_alone_and_names_everything(run: Path, tmp_path: Path) -> None:
-    odd = tmp_path / "run <b> & co.csv"
-    odd.write_bytes(run.read_bytes())
-    assert main(["estimate", str(odd), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path / "out"), "--quiet"]) == 0
-    page = (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
+def test_the_page_stands_alone_and_names_everything(told: tuple[Path, dict]) -> None:
+    folder, _ = told
+    page = (folder / "estimate.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|href)="(?!#)', page.replace("xlink:href", "href"))
     assert "<b> & co" not in page
     assert all(f">{name}<" in page for name in MODEL_SHIP_TRUE.model.names)

@@ -74,6 +74,10 @@ def _most(problem: DurationProblem, floor: InformationFloor) -> float:
 
 
 FEW, MANY = dict(cases(25)), dict(cases(60, 1))
+OFTEN = ("A, a budget", "A, least information", "D_s, all limits", "D_s, worst", "E, balance", "E, average", "T",
+         "V, most times", "V, prior")  # fmt: skip
+"""With everything of criterion D; the other pairs are tried with the slow tests."""
+CASES = [case if case in OFTEN or case.startswith("D,") else pytest.param(case, marks=pytest.mark.slow) for case in FEW]
 
 
 def check_agreement(one: Optimum, other: Optimum) -> None:
@@ -84,7 +88,7 @@ def check_agreement(one: Optimum, other: Optimum) -> None:
         assert here.certificate.value <= there.certificate.value + degree * max(there.gap, 0.0) + ROUNDING
 
 
-@pytest.mark.parametrize("case", FEW)
+@pytest.mark.parametrize("case", CASES)
 def test_cvxpy_and_the_quickest_method_agree(case: str):
     task = concave_problem(FEW[case])
     stated, own = maximised(task, as_stated=True), maximised(task)
@@ -97,7 +101,7 @@ def test_cvxpy_and_the_quickest_method_agree(case: str):
     assert (task.polytope.rows @ stated.fractions <= task.polytope.limits + (1e-12 if task.smooth else 1e-8)).all()
 
 
-@pytest.mark.parametrize("case", MANY)
+@pytest.mark.parametrize("case", CASES)
 def test_working_sets_agree_with_all_candidates_at_once(case: str, monkeypatch):
     task = concave_problem(MANY[case])
     whole = maximised(task, as_stated=True)
