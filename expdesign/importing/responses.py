@@ -34,6 +34,7 @@ FINE_S = 0.1  # of the simulation, at most
 SHIFTS = 2  # steps in which the moment of each move is found
 NO_LAG = 0.02  # steps below which a lag is none
 EVEN = 0.9  # share of an order's intervals that are one and the same, where it is read at even times
+LARGEST = 1e300  # in place of a rate without limit
 LESS = 0.9  # share of the root mean square that a slew rate must leave, to be told
 
 
@@ -161,12 +162,16 @@ def _by_moves(jacobian: Array, left: Array, move: NDArray[np.signedinteger[Any]]
 
 def simulated(orders: Array, step_s: float, rate: float, lag_s: float, delay_s: float, start: float) -> Array:
     """(k,) position that is delivered of orders (k,), each held to the next."""
-    position, reach = start, rate * step_s
-    slewed = np.empty(len(orders))
-    for k, order in enumerate(orders.tolist()):
-        slewed[k] = position
+    reach, begins = min(rate * step_s, LARGEST), np.flatnonzero(np.diff(orders, prepend=np.nan))
+    samples = np.diff(begins, append=len(orders))
+    position, positions = start, []
+    for order, reached in zip(orders[begins].tolist(), (reach * samples).tolist(), strict=True):
+        positions.append(position)
         way = order - position
-        position = order if abs(way) <= reach else position + math.copysign(reach, way)
+        position = order if abs(way) <= reached else position + math.copysign(reached, way)
+    gone_on = np.arange(len(orders)) - np.repeat(begins, samples)
+    ways = orders - np.repeat(positions, samples)
+    slewed: Array = orders - np.copysign(np.maximum(np.abs(ways) - reach * gone_on, 0.0), ways)
     if delay_s:  # also one that is negative
         times = step_s * np.arange(len(orders))
         slewed = np.interp(times - delay_s, times, slewed)
