@@ -6,6 +6,7 @@ through water that flows steadily, with gusts that push and turn her; d is the r
 position 0.3 m, heading 0.003 rad, velocity over ground 0.02 m/s, yaw rate 0.001 rad/s.
 """
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,15 @@ def voyages(
     current_mps: float = 0.3, noise: float = 1.0,
 ) -> list[Log]:  # fmt: skip
     """Voyages of one kind, each with its own heading, current, gusts, helm and noise."""
+    table = _sailed(count, kind, seed, sample_s, last_s, gust, current_mps, noise)
+    return [dict(zip(NAMES, table[:, :, i].T, strict=True)) for i in range(count)]
+
+
+@cache
+def _sailed(
+    count: int, kind: str, seed: int, sample_s: float, last_s: float, gust: float, current_mps: float, noise: float
+) -> np.ndarray:
+    """(k, channels, count) of all voyages: many tests spoil the same."""
     rng = np.random.default_rng(seed)
     x = np.zeros((6, count))
     x[2], x[3] = rng.uniform(-3.0, 3.0, count), 4.2
@@ -98,7 +108,8 @@ def voyages(
             rows.append(np.concatenate([np.full((1, count), k * STEP_S), seen, np.full((1, count), 3.0), rudder[None]]))
         x = _later(x, stream, push, rudder)
     table = np.array(rows)
-    return [dict(zip(NAMES, table[:, :, i].T, strict=True)) for i in range(count)]
+    table.setflags(write=False)
+    return table
 
 
 def _later(x: np.ndarray, stream: np.ndarray, push: np.ndarray, rudder: np.ndarray) -> np.ndarray:

@@ -95,7 +95,7 @@ def test_a_heading_held_in_parts_of_a_file_is_read_there_alone(tmp_path: Path) -
     ship = load_vessel(write_vessel(tmp_path / "ship.toml"))
     (log,) = voyages(1, "zigzag")
     log["batch"] = np.where(log["time_s"] < 200, 0.0, 1.0)
-    half = log["time_s"] >= 200
+    half, log["heading_rad"] = log["time_s"] >= 200, log["heading_rad"].copy()
     log["heading_rad"][half] = repeated(log["heading_rad"][half], 5)
     record = measured([write_log(tmp_path / "log.csv", log, (*NAMES, "batch"))], ship)
     assert len(record.doubts) == 1
