@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,19 @@ def labels_are_whole() -> Generator[None]:
 @pytest.fixture(scope="module")
 def undrawn() -> Generator[None]:
     """Figures of pages stay empty, for tests of numbers: other tests draw each kind of page."""
+    with _without_figures():
+        yield
+
+
+@pytest.fixture
+def undrawn_here() -> Generator[None]:
+    """The same for one test of a file in which others look at figures."""
+    with _without_figures():
+        yield
+
+
+@contextmanager
+def _without_figures() -> Generator[None]:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     def empty(self, target, **options) -> None:

@@ -23,6 +23,7 @@ from expdesign.workflows.outcome import document_of
 from expdesign.workflows.steps.planned import plan_summary
 from export_case import plan, tug
 from roll_files import KNOWN, UNKNOWN, stated, three
+from short_examples import SHORTER, copied
 from step_case import GUESS, STEPS, craft_columns, write_csv
 
 
@@ -44,7 +45,7 @@ def load_plan(folder: Path) -> list[object]:
 
 
 def foreseen(folder: Path) -> list[object]:
-    return ["foresee", SCENARIOS / "model-ship.toml"]
+    return ["foresee", copied(folder, "model-ship", SHORTER["model-ship"])]
 
 
 def validated(folder: Path) -> list[object]:
@@ -66,6 +67,7 @@ def assert_agree(summary: Mapping[str, object], table: Mapping[str, object]) -> 
             assert table[key] == pytest.approx(summary[key], rel=1e-9), key
 
 
+@pytest.mark.usefixtures("undrawn_here")
 @pytest.mark.parametrize("asked", [steps_files, roll_files, load_plan, foreseen, validated])
 def test_what_a_page_says_first_is_on_the_terminal(
     asked: Callable[[Path], list[object]],

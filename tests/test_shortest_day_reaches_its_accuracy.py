@@ -147,6 +147,7 @@ def test_two_processes_find_the_same_day(day, tmp_path):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
 
 
+@pytest.mark.usefixtures("undrawn_here")
 def test_a_draft_is_one_day_of_a_smaller_search_with_what_it_tells(day, tmp_path):
     folder, scenario, _ = day
     with patch.dict(os.environ, {VARIABLE: str(folder.with_name("day-cache"))}):
