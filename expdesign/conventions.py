@@ -1,4 +1,4 @@
-"""Frames, signs, units and column names of the package.
+"""Frames, signs, units and column names of the package, and how numbers with their errors are written.
 
 - n-frame: north, east, down, fixed to the earth; its origin is the reference point of the sea area.
 - b-frame: x forward, y starboard, z down; origin at the centre of rotation.
@@ -11,6 +11,8 @@ Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control 
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,3 +50,16 @@ def to_n_frame(points_b: Array, pose: Array) -> Array:
 def to_b_frame(points_n: Array, pose: Array) -> Array:
     """Points (..., 2) north/east as (..., 2) forward/starboard of a pose (3,) [m]."""
     return np.asarray((points_n - pose[:2]) @ rotation(float(pose[2])))
+
+
+def plus_minus(value: float, std: float) -> str:
+    """A value to the second digit of its standard deviation, e.g. -0.0548 ± 0.0036; to four digits without one."""
+    if not (std > 0 and math.isfinite(std)):
+        whole = not value or 1e-7 <= abs(value) < 1e9
+        return np.format_float_positional(value, precision=4, fractional=False, trim="-") if whole else f"{value:.3e}"
+    decimals, apart = 1 - math.floor(math.log10(std)), "\N{PLUS-MINUS SIGN}"
+    if abs(value) < 1e-4 or decimals > 9 or abs(value) >= 1e6:
+        exponent = math.floor(math.log10(max(abs(value), std)))
+        decimals = max(0, decimals + exponent)
+        return f"({value / 10**exponent:.{decimals}f} {apart} {std / 10**exponent:.{decimals}f})e{exponent}"
+    return f"{value:.{max(0, decimals)}f} {apart} {std:.{max(0, decimals)}f}"

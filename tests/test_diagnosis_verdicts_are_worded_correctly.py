@@ -13,7 +13,7 @@ from expdesign.diagnosis.conclusions.findings import error_reductions_of, note_o
 from expdesign.diagnosis.conclusions.verdict import MISSING_EFFECTS, remarks, verdict
 from expdesign.diagnosis.data.noise import Noise, white_noise
 from expdesign.diagnosis.fit.held_out import HeldOut
-from expdesign.diagnosis.values import ErrorReduction, Finding, Lead, Unexplained
+from expdesign.diagnosis.values import ErrorReduction, Estimate, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.progress import never_falling
@@ -48,6 +48,18 @@ def test_a_verdict_names_the_alternative_and_the_manoeuvre():
         "The simulation lacks wind or a current (these data cannot tell which). Adding it halves the sway error (42 to "
         "58 %) on runs held out of the fit. Sail a turning circle to tell wind from a current."
     )
+
+
+def test_a_headline_gives_the_few_numbers_of_a_cause_and_what_the_file_says():
+    drag = Estimate(name="X_abs_u_u", value=-0.049031, std=0.00057, unit="", stated=-0.03)
+    one = replace(finding("parameters"), keys=("theta:X_abs_u_u",), estimates=(drag,))
+    sizes = "-0.04903 \N{PLUS-MINUS SIGN} 0.00057, the file says -0.03"
+    assert verdict([one], BEFORE).startswith(f"The simulation lacks the correct value of X_abs_u_u ({sizes}). ")
+    flow = [Estimate(name=name, value=0.1, std=0.02, unit="m/s") for name in ("north_mps", "east_mps")]
+    current = replace(finding("current"), estimates=tuple(flow))
+    sizes = "north_mps 0.100 \N{PLUS-MINUS SIGN} 0.020, east_mps 0.100 \N{PLUS-MINUS SIGN} 0.020"
+    assert f"lacks a current ({sizes})" in verdict([current], BEFORE)
+    assert "lacks a current." in verdict([replace(current, estimates=(*flow, drag))], BEFORE)  # the table has them all
 
 
 def test_every_cause_of_a_verdict_has_its_own_number():

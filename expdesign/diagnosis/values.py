@@ -22,6 +22,7 @@ class Estimate:
     value: float
     std: float
     unit: str
+    stated: float | None = None  # in the vessel file; None where that says nothing of it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,10 +12,9 @@ import scipy
 from pydantic import Field
 
 from expdesign.assessment.misfit import ESTIMATION
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, plus_minus
 from expdesign.export import words
 from expdesign.export.document import Document, Mark, Table, filled, section
-from expdesign.export.files.disturbances import plus_minus
 from expdesign.export.files.read_json import Entry
 from expdesign.export.indices_form.form import shown
 

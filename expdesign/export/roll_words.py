@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from expdesign.export.files import plus_minus
+from expdesign.conventions import plus_minus
 from expdesign.roll import G_MPS2, UNITS
 from expdesign.roll.record import CAUSES, LOAD
 

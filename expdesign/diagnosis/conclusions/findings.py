@@ -103,7 +103,12 @@ def _estimates(values: Values, ship: ExtendedModel) -> tuple[Estimate, ...]:
     result = []
     for key, (value, std) in values.items():
         name, factor, offset, unit = public_name(key, ship)
-        result.append(Estimate(name=name, value=offset + factor * value, std=abs(factor) * std, unit=unit))
+        stated = offset if key.startswith("theta:") else None
+        if key in ship.stated:
+            stated = offset + factor * ship.stated[key]
+        result.append(
+            Estimate(name=name, value=offset + factor * value, std=abs(factor) * std, unit=unit, stated=stated)
+        )
     return tuple(result)
 
 

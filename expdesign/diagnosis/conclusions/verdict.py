@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from expdesign.conventions import plus_minus
 from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, SENSOR_CAUSES
 from expdesign.diagnosis.data import Windows
@@ -39,6 +40,8 @@ MANOEUVRES = {
 
 LITTLE_FIT = 50.0
 """Fit [%] of an output below which data are not called free of error, whatever noise there is."""
+MOST_SIZES = 2
+"""Numbers of a cause in a sentence; the table has all."""
 MOST_NAMED = 3
 """Parameters, or equivalent causes, in a sentence."""
 SENSORS = tuple(cause.name for cause in SENSOR_CAUSES)
@@ -175,11 +178,22 @@ def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplaine
     for item in findings:
         others = alternatives(item)
         alike = " (these data cannot tell which)" if others else ""
-        named.append(listed([lacking(item), *others], "or") + alike)
+        named.append(listed([_with_sizes(item), *others], "or") + alike)
     sure = _benefits(findings, unit)
     if unexplained is not None:
         sure += f"; much remains unexplained, {_fits(unexplained)}"
     return [f"The simulation lacks {listed(named)}", sure, _advice(findings)]
+
+
+def _with_sizes(item: Finding) -> str:
+    """A missing effect and its few numbers: the correct value of X_u (-0.050 ± 0.001, the file says 0)."""
+    what, sizes = lacking(item), []
+    for one in item.estimates:
+        name = "" if what.endswith(f" {one.name}") else f"{one.name} "
+        says = "" if one.stated is None else f", the file says {plus_minus(one.stated, 0.0)}"
+        sizes.append(f"{name}{plus_minus(one.value, one.std)}{says}")
+    between = ", " if all(one.stated is None for one in item.estimates) else "; "
+    return f"{what} ({between.join(sizes)})" if 0 < len(sizes) <= MOST_SIZES else what
 
 
 def _advice(findings: Sequence[Finding]) -> str:

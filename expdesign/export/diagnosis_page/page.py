@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from expdesign.conventions import plus_minus
 from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import mean_residual
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.conclusions import DIVERGED_FIT, accuracy_in_words, alternatives, has_diverged, manoeuvre
 from expdesign.diagnosis.select import SELECTION_TUNING
-from expdesign.diagnosis.values import ErrorReduction
+from expdesign.diagnosis.values import ErrorReduction, Estimate
 from expdesign.export import words
 from expdesign.export.diagnosis_page.figures import (
     ACCELERATION_AXES,
@@ -26,7 +27,6 @@ from expdesign.export.diagnosis_page.figures import (
     window_figure,
 )
 from expdesign.export.diagnosis_page.results import RollVerdict, roll_sentences
-from expdesign.export.files import plus_minus
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.progress import Progress, silent
@@ -208,7 +208,7 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "title": cause_title(item.cause),
         "explanation": item.explanation,
         "estimates": [
-            (estimate_words(one.name, item.cause), plus_minus(one.value, one.std).replace("-", words.MINUS), one.unit)
+            (estimate_words(one.name, item.cause), _with_error(one).replace("-", words.MINUS), _says(one))
             for one in item.estimates
         ],
         "p_value": _p_value(item.p_value),
@@ -221,6 +221,14 @@ def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
         "alternatives": alternatives(item),
         "distinguishing": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
     }
+
+
+def _with_error(item: Estimate) -> str:
+    return f"{plus_minus(item.value, item.std)} {item.unit}".rstrip()
+
+
+def _says(item: Estimate) -> str:
+    return "" if item.stated is None else f"the file says {words.significant(item.stated, 4)}"
 
 
 def _reduction(item: ErrorReduction) -> str:

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from expdesign.diagnosis import Accuracy, Diagnosis, Finding, Unexplained
+from expdesign.conventions import plus_minus
+from expdesign.diagnosis import Accuracy, Diagnosis, Estimate, Finding, Unexplained
 from expdesign.diagnosis.accuracy import Residuals, dependence
 from expdesign.export import words
-from expdesign.export.files import plus_minus, strict_json, vessel_toml
+from expdesign.export.files import strict_json, vessel_toml
 from expdesign.export.roll_words import change_words, stability_words
 from expdesign.roll import UNITS
 from expdesign.roll.record import RollChange, RollJudgement
@@ -182,7 +183,11 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
     """One finding."""
     return {
         "cause": item.cause,
-        "estimate": {one.name: {"value": _finite(one.value), "std": _finite(one.std)} for one in item.estimates},
+        "estimate": {
+            one.name: {"value": _finite(one.value), "std": _finite(one.std)}
+            | ({} if one.stated is None else {"in_vessel_file": one.stated})
+            for one in item.estimates
+        },
         "p_value": _finite(item.p_value),
         "fit_before": _named(outputs, item.fit_before),
         "fit_after": _named(outputs, item.fit_after),
@@ -201,12 +206,16 @@ def finding_entry(item: Finding, outputs: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _in_file(item: Estimate) -> str:
+    return "" if item.stated is None else f" (file: {plus_minus(item.stated, 0.0)})"
+
+
 def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header, and one row per finding."""
     rows: list[tuple[str, ...]] = [
         (
             item.cause,
-            ", ".join(f"{one.name} {plus_minus(one.value, one.std)}" for one in item.estimates),
+            ", ".join(f"{one.name} {plus_minus(one.value, one.std)}{_in_file(one)}" for one in item.estimates),
             f"{item.p_value:.1e}" if item.p_value > SMALL else f"< {SMALL:.0e}",
             f"{item.gain:.1f} ({item.gain_interval[0]:.1f} to {item.gain_interval[1]:.1f})",
             ", ".join(item.not_distinguishable_from) or "-",

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from expdesign.assessment import Assessed, Assessment, sentence
 from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
+from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import sample_notes
 from expdesign.export import words
 from expdesign.export.document import Document, Figure, Items, Section, Table, filled, notes_of, section
@@ -28,7 +29,6 @@ from expdesign.export.files import (
     motion_words,
     parameter_entries,
     parameter_table,
-    plus_minus,
     prediction_entries,
     prediction_table,
     prediction_title,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
         recorded_dictionary_json,
         subsets_json,
     )
-    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table, plus_minus
+    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table
     from expdesign.export.files.estimates import (
         breach_sentences,
         estimate_json,

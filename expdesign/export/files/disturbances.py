@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from expdesign.assessment import Assessed, Assessment
+from expdesign.conventions import plus_minus
 from expdesign.estimation.disturbance import MeasuredWind, Moments
-from expdesign.export import words
 from expdesign.export.files.text import finite
 from expdesign.values import Array
 
-PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
 CURRENT = "velocity of the water over ground"
 WIND = "velocity of the air over ground, measured; the covariance is that of its samples, with the sensors' noise"
 CONSTANT = "second moments: the current is estimated as steady"
@@ -117,15 +115,3 @@ def _pair(values: Array, stds: Array) -> str:
     if not np.isfinite(values).all():
         return "not told"
     return ", ".join(plus_minus(value, std) for value, std in zip(values.tolist(), stds.tolist(), strict=True))
-
-
-def plus_minus(value: float, std: float) -> str:
-    """A value to the second digit of its standard deviation: -0.0548 ± 0.0036."""
-    if not (std > 0 and math.isfinite(std)):
-        return words.significant(value, 4)
-    decimals = 1 - math.floor(math.log10(std))
-    if abs(value) < 1e-4 or decimals > 9 or abs(value) >= 1e6:
-        exponent = math.floor(math.log10(max(abs(value), std)))
-        decimals = max(0, decimals + exponent)
-        return f"({value / 10**exponent:.{decimals}f} {PLUS_MINUS} {std / 10**exponent:.{decimals}f})e{exponent}"
-    return f"{value:.{max(0, decimals)}f} {PLUS_MINUS} {std:.{max(0, decimals)}f}"

@@ -14,10 +14,11 @@ from expdesign.assessment import Assessed, Assessment, Limits, RunCheck, sentenc
 from expdesign.assessment.held_out import ranked
 from expdesign.assessment.misfit import ESTIMATION, TEST
 from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
+from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
 from expdesign.export import words
-from expdesign.export.files.disturbances import disturbance_entries, plus_minus
+from expdesign.export.files.disturbances import disturbance_entries
 from expdesign.export.files.text import finite, named_finite, strict_json
 from expdesign.export.files.vessel_file import vessel_toml
 from expdesign.values import Array
