@@ -1,6 +1,9 @@
 """What files state and the trial does not use, or takes as certain, is said; the motion confirms it."""
 
+import re
+import tomllib
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +11,11 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.cli.summary import print_summary
+from expdesign.errors import FileError
 from expdesign.export.document import Table
 from expdesign.scenario import load_scenario
+from expdesign.scenario.scenario_file import build_scenario
+from expdesign.scenario.tables import Entry
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import column_name
@@ -31,6 +37,11 @@ def loaded(tmp_path, *changes):
     for old, new in changes:
         spoil(tmp_path / "vessel.toml", old, new)
     return load_scenario(path)
+
+
+def merged(first, over):
+    """A table with the entries of another put over it, at any depth."""
+    return first | {key: merged(first.get(key, {}), one) if isinstance(one, dict) else one for key, one in over.items()}
 
 
 def said(case, beginning):
@@ -111,6 +122,48 @@ def test_a_stated_search_for_paths_is_said_not_to_act_exactly_where_legs_are_cur
     assert [line for line in case.remarks if "plan.paths" in line] == []
     stated = replace(case, plan=replace(case.plan, paths="visibility"))
     assert any("plan.paths does not act" in line for line in stated.remarks) is not acts
+
+
+BESIDE = {
+    "plan.lattice_spacing_m": ({"plan": {"lattice_spacing_m": 50.0}}, {"plan": {"planner": "lattice"}}),
+    "design.outcome_speed_mps": (
+        {"design": {"outcome_speed_mps": 1.5}},
+        {"design": {"accuracy": {"outcomes_95": {"advance_m": 5.0}}}},
+    ),
+    "environment.current_to.correlation_s": (
+        {"environment": {"current_to": {"north_mps": 0.0, "east_mps": 0.0, "correlation_s": 60.0}}},
+        {"environment": {"current_to": {"variation_std_mps": 0.1}}},
+    ),
+    "environment.wind_to.correlation_s": (
+        {"environment": {"wind_to": {"north_mps": 0.0, "east_mps": 0.0, "correlation_s": 60.0}}},
+        {"environment": {"wind_to": {"variation_std_mps": 0.1}}},
+    ),
+}
+"""Keys that act only beside others -> what states them, and what makes them act."""
+
+
+@pytest.mark.parametrize("key", BESIDE)
+def test_keys_that_act_only_beside_others_are_said_not_to_act_alone(key):
+    content = tomllib.loads((EXAMPLES / "story.toml").read_text(encoding="utf-8"))
+    alone, acting = BESIDE[key]
+    entry = Entry(EXAMPLES / "story.toml")
+    for changes, lines in (((), 0), ((alone,), 1), ((alone, acting), 0)):
+        case = build_scenario(reduce(merged, changes, content), entry)
+        assert len(said(case, f"{key} does not act")) == lines
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"outcome_units": {"advance_m": 2.0}}, "design.outcome_units: has no effect while design.outcomes is empty"),
+        ({"reveal_sizes": {"wind": 0.5}}, "has no effect while design.reveal and design.tell_apart are empty"),
+        ({"prior_samples": 5}, "design.prior_samples: has no effect while design.robust is 'nominal'"),
+    ],
+)
+def test_sizes_of_what_nobody_asks_for_are_refused(changes, words):
+    content = tomllib.loads((EXAMPLES / "story.toml").read_text(encoding="utf-8"))
+    with pytest.raises(FileError, match=re.escape(words)):
+        build_scenario(merged(content, {"design": changes}), Entry(EXAMPLES / "story.toml"))
 
 
 def test_a_calm_scenario_of_a_ship_known_in_part_has_nothing_to_say(tmp_path):

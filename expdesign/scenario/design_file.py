@@ -39,7 +39,7 @@ def design_settings(table: DesignTable, vessel: Vessel, primitives: tuple[str, .
     _check_list(table.interest, estimated, entry.at("interest"))
     _check_keys(table.parameter_units, estimated, entry.at("parameter_units"))
     _check_list(table.outcomes, OUTCOMES, entry.at("outcomes"))
-    _check_keys(table.outcome_units, table.outcomes, entry.at("outcome_units"))
+    _check_keys(table.outcome_units, table.outcomes, entry.at("outcome_units"), of="design.outcomes")
     for key in ("least_s", "most_s"):
         _check_keys(getattr(table, key), primitives, entry.at(key))
     for key in ("required", "excluded"):
@@ -148,11 +148,14 @@ def _check_causes(table: DesignTable, vessel: Vessel, entry: Entry) -> None:
             raise place.error(f"has {len(pair)} names, expected two causes")
         _check_list(pair, known, place)
     _check_keys(table.reveal_sizes, [*table.reveal, *(name for pair in table.tell_apart for name in pair)],
-                entry.at("reveal_sizes"))  # fmt: skip
+                entry.at("reveal_sizes"), of="design.reveal and design.tell_apart")  # fmt: skip
 
 
-def _check_keys(given: Mapping[str, float], known: Iterable[str], entry: Entry) -> None:
+def _check_keys(given: Mapping[str, float], known: Iterable[str], entry: Entry, *, of: str = "") -> None:
+    """`of`: the keys that the names come from, where these may be empty."""
     allowed = tuple(known)
+    if given and not allowed and of:
+        raise entry.error(f"has no effect while {of} {'are' if ' and ' in of else 'is'} empty")
     for name in given:
         if name not in allowed:
             raise entry.unknown(name, allowed)

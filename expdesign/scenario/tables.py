@@ -265,6 +265,8 @@ def _description(model: type[Table], place: tuple[str | int, ...]) -> str:
 
 def offer(name: str, known: tuple[str, ...]) -> str:
     """The nearest known name, if one is near, and all of them where these still make one line."""
+    if not known:
+        return "expected none, as there is nothing here to name"
     near = nearest(name, known)
     names = ", ".join(known)
     if near is None:

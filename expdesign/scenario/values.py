@@ -122,7 +122,24 @@ class Scenario:
               if unstated else []),
             *(["plan.paths does not act: it is of ships that turn on the spot, and this one does not"]
               if self.plan.paths != PlanSettings.paths and not self._turns_on_the_spot else []),
+            *(f"{key} does not act: {because}" for key, because in self._beside_others),
         )  # fmt: skip
+
+    @property
+    def _beside_others(self) -> list[tuple[str, str]]:
+        """Keys that are stated, and act only beside others that are not; and which these are."""
+        design, weather, plan = self.design, self.environment, self.plan
+        predicted = design.outcomes or (design.accuracy is not None and design.accuracy.outcomes_95)
+        cases = [
+            ("plan.lattice_spacing_m", plan.lattice_spacing_m is not None, plan.planner == "lattice",
+             "plan.planner is not 'lattice'"),
+            ("design.outcome_speed_mps", design.outcome_speed_mps is not None, bool(predicted),
+             "neither design.outcomes nor design.accuracy.outcomes_95 is given"),
+            *((f"environment.{name}_to.correlation_s", varies.correlation_s > 0, varies.std_mps > 0,
+               f"environment.{name}_to.variation_std_mps is 0")
+              for name, varies in (("current", weather.current_variation), ("wind", weather.wind_variation))),
+        ]  # fmt: skip
+        return [(key, because) for key, stated, acts, because in cases if stated and not acts]
 
     @property
     def _turns_on_the_spot(self) -> bool:
