@@ -250,8 +250,9 @@ def rest_of(state: PresentState, *, interest: Sequence[str] = ()) -> tuple[Scena
     if accuracy is not None and not state.left_stated:
         accuracy = _left_of_day(accuracy, state.sailed_s)
     elif accuracy is not None:
+        instead = "what design.accuracy lacks" if accuracy.day_s is None else "in what is left of design.day_s"
+        notes = (*notes, f"The rest tells most in the time left, as --remaining asks, not {instead}.")
         accuracy = None
-        notes = (*notes, "The rest tells most in the time left, as --remaining asks, not what design.accuracy lacks.")
     design = replace(
         settings,
         total_s=first.design.total_s if accuracy else state.left_s,
