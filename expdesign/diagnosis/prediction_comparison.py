@@ -93,10 +93,16 @@ class ComparedCause:
 class Compared:
     """Causes compared by predictions."""
 
-    without: HeldOut  # errors on held-out stretches of the model without any of them, its uncertain parameters fitted
+    base: ExtendedModel  # without any of them, its uncertain parameters fitted
+    without: HeldOut  # its errors on held-out stretches
     causes: tuple[ComparedCause, ...]  # with the largest gain first
     tests: tuple[ScoreTest, ...]  # that chose them
     short: Windows  # data in short stretches
+
+    def without_in(self, windows: Windows) -> Fit:
+        """The model without any of them, in longer windows."""
+        starts = initial_states(windows, self.base.states)
+        return fit(self.base, windows, (), starts=starts, options=FitOptions(steps=0))
 
     def of(self, found: Fit) -> HeldOut | None:
         """Errors on held-out stretches of another model, fitted in the same way; None where it cannot be fitted."""
@@ -134,7 +140,8 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
         _compared(*fitted, without, min(1.0, len(shortlist) * p_value), seed)
         for fitted, p_value in zip(tried, p_values, strict=True)
     ]
-    return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests, short=short)
+    causes = tuple(sorted(found, key=lambda item: -item.gain))
+    return Compared(base=base.ship, without=without, causes=causes, tests=tests, short=short)
 
 
 def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:

@@ -50,8 +50,7 @@ def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bo
     free, ship = found.free_keys, found.ship
     if beside_stated:
         parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
-        model = replace(ship.model, parameter_std=np.zeros(len(ship.model.parameters)))
-        ship = replace(ship.without_effects(parameters), model=model)
+        ship = ship.without_effects(parameters).with_known_parameters()
     ahead = counting_stretches(fit_output_error(ship, short, free))
     at_these = replace(continuing(found), steps=0, warm_start=None)
     again = fit(ahead.ship, windows, free, starts=found.starts, options=at_these)
