@@ -30,6 +30,7 @@ from expdesign.diagnosis.fit import (
     fit_output_error,
     held_out_gain,
     log_likelihood_gain,
+    no_smaller,
     on_common_units,
     spread_between_runs,
 )
@@ -147,7 +148,8 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
 def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:
     """A cause as it was fitted to short stretches, with the noise of the long windows; None where that diverges there.
 
-    Its standard errors are those of the scatter from stretch to stretch.
+    Its standard errors are no smaller than those of the likelihood there, and than the scatter from stretch to stretch
+    tells: few stretches beside many parameters tell little of either.
     """
     ahead = counting_stretches(item.fit)
     free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
@@ -159,7 +161,7 @@ def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCa
     point = item.point
     return FittedCandidate(
         candidate=point.test.candidate,
-        fit=replace(found, covariance=ahead.covariance),
+        fit=replace(found, covariance=no_smaller(found.covariance, ahead.covariance)),
         likelihood_gain=gain,
         penalised_gain=gain - SELECTION_TUNING.price * (len(point.keys) + (point.profiled is not None)),
         keys=point.keys,

@@ -275,11 +275,11 @@ def note_on_parameters_alone(as_stated: HeldOut, alone: HeldOut, found: HeldOut,
         cause: its missing effect, in words.
         seed: of the intervals.
     """
-    own, (low, high) = held_out_gain(alone, found, seed)
+    gain, (own, (low, high)) = held_out_gain(as_stated, alone, seed)[0], held_out_gain(alone, found, seed)
     return (
         f"The gain of {cause} counts that of the parameters, which are re-estimated beyond their standard deviations "
-        f"with it: without it they alone gain {held_out_gain(as_stated, alone, seed)[0]:+.1f} points of fit, and it "
-        f"adds {own:+.1f} ({low:.1f} to {high:.1f})."
+        f"with it. Re-estimated without it, they change the fit by {gain:+.1f} points, and it adds {own:+.1f} "
+        f"({low:.1f} to {high:.1f})."
     )
 
 
