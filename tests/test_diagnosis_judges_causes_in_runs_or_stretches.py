@@ -8,7 +8,6 @@ import pytest
 
 from expdesign.diagnosis import judgement
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit import FEWEST_RUNS, validation_units
 from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
 from expdesign.diagnosis.select import Step
@@ -168,11 +167,3 @@ def test_parameters_far_beyond_the_file_are_the_other_answer_where_they_alone_ga
     validation = SimpleNamespace(of=lambda _: errors(alone))
     judged = judgement.with_parameters_as_rival(found, [errors(20.0), after], validation, None, 0)  # type: ignore[arg-type]
     assert [one.candidate.cause for one in judged.steps[0].alternatives] == ["parameters"] * rival
-
-
-@pytest.mark.parametrize("runs", [1, 2, 3, 4])
-def test_one_or_two_runs_are_units_by_their_parts_and_more_are_whole(runs):
-    """In held-out errors, p-values and standard errors alike."""
-    batch = np.repeat(np.arange(float(runs)), 4)
-    unit = validation_units(SimpleNamespace(batch=batch))  # type: ignore[arg-type]
-    assert len(np.unique(unit)) == (runs if runs >= FEWEST_RUNS else len(batch))

@@ -20,7 +20,7 @@ from expdesign.diagnosis.fit import (
     judged,
     leads_away,
     prediction_gain,
-    validation_units,
+    runs_of,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -298,9 +298,7 @@ def without_harm(
         kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]
         if kept.steps:
             last = kept.last
-            kept = replace(
-                kept, last=counting_runs(last, validation_units(last.linear.motion.windows), kept.dispersion)
-            )
+            kept = replace(kept, last=counting_runs(last, runs_of(last.linear.motion.windows), kept.dispersion))
     return kept, held
 
 

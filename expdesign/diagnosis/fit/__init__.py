@@ -5,7 +5,6 @@ compares two, `counting_runs` corrects standard errors, `cross_validate` measure
 """
 
 from expdesign.diagnosis.fit.between_runs import (
-    FEWEST_RUNS,
     NOISE_ALONE,
     Dispersion,
     Spread,
@@ -14,12 +13,17 @@ from expdesign.diagnosis.fit.between_runs import (
     directions_between_runs,
     few_runs_factor,
     of_several,
+    runs_of,
     spread_between_runs,
     sum_by_run,
     tail,
+)
+from expdesign.diagnosis.fit.cross_validation import (
+    CrossValidation,
+    cross_validate,
+    cross_validate_ahead,
     validation_units,
 )
-from expdesign.diagnosis.fit.cross_validation import CrossValidation, cross_validate, cross_validate_ahead
 from expdesign.diagnosis.fit.fit import (
     Fit,
     FitOptions,
@@ -34,6 +38,7 @@ from expdesign.diagnosis.fit.fit import (
 )
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import (
+    FEWEST_RUNS,
     HeldOut,
     bootstrap_sums,
     held_out_gain,

@@ -27,8 +27,6 @@ from expdesign.values import Array
 
 FEWEST, MOST_FREEDOM = 0.3, 1e5
 """Degrees of freedom from which a spread tells anything, and which count as any number."""
-FEWEST_RUNS = 3
-"""That count as units; fewer are judged by their parts."""
 LEAST_SHARE = 1e-9
 """Of the information, for a run to tell anything."""
 NORMAL_95 = float(scipy.special.ndtri(0.975))
@@ -128,12 +126,9 @@ def of_several(p_value: float, tests: float) -> float:
     return 1.0 if p_value >= 1.0 else -math.expm1(tests * math.log1p(-p_value))
 
 
-def validation_units(windows: Windows) -> Array:
-    """(w,) number of the unit that every window belongs to: its run, or itself where there are fewer than three runs.
-
-    Two runs hardly tell how runs differ. What is said of one or two is said of these sailed on.
-    """
-    return windows.batch if len(np.unique(windows.batch)) >= FEWEST_RUNS else np.arange(float(len(windows.batch)))
+def runs_of(windows: Windows) -> Array:
+    """(w,) the run of every window; of a single run each window is one."""
+    return windows.batch if len(np.unique(windows.batch)) > 1 else np.arange(float(len(windows.batch)))
 
 
 def sum_by_run(values: Array, run: Array) -> Array:

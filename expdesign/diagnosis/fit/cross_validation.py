@@ -29,10 +29,9 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data import Windows, cut_windows
-from expdesign.diagnosis.fit.between_runs import validation_units
 from expdesign.diagnosis.fit.fit import Fit, FitOptions
 from expdesign.diagnosis.fit.gauss_newton import fit
-from expdesign.diagnosis.fit.held_out import HeldOut
+from expdesign.diagnosis.fit.held_out import FEWEST_RUNS, HeldOut
 from expdesign.diagnosis.fit.output_error import FOLD_STEPS, fit_output_error
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
@@ -43,6 +42,11 @@ from expdesign.signals import Record
 from expdesign.values import Array
 
 PARTS = 5  # of every run, in the cross-validation of short stretches
+
+
+def validation_units(windows: Windows) -> Array:
+    """(w,) number of the unit that every window belongs to."""
+    return windows.batch if len(np.unique(windows.batch)) >= FEWEST_RUNS else np.arange(len(windows.batch), dtype=float)
 
 
 class CrossValidation:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Noise, Windows
-from expdesign.diagnosis.fit.between_runs import FEWEST_RUNS, NORMAL_95, sum_by_run
+from expdesign.diagnosis.fit.between_runs import NORMAL_95, sum_by_run
 from expdesign.diagnosis.fit.linear_model import (
     GramMatrices,
     Sensitivities,
@@ -44,6 +44,7 @@ from expdesign.values import Array
 
 LEAST_FIT = 0.0  # of simulations of whole held-out units [%]; where one is worse, the stretches count
 BOOTSTRAP_DRAWS = 1000  # of units, for intervals
+FEWEST_RUNS = 3  # that count as units; fewer are judged by their parts
 
 
 # Errors of models on data that they were not fitted to, and their comparison, with intervals by the bootstrap.

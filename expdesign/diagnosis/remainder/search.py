@@ -33,8 +33,8 @@ from expdesign.diagnosis.fit import (
     log_likelihood_gain,
     of_several,
     on_common_units,
+    runs_of,
     tail,
-    validation_units,
     window_information,
 )
 from expdesign.diagnosis.motion import exogenous_inputs, initial_states, term_disturbances
@@ -358,7 +358,7 @@ def _added(
         ordered = order(steps)
         errors = judged([result.held[0], *(validation.of(item.chosen.fit) for item in ordered)])
         if ordered and before.in_stretches == errors[-1].in_stretches and _clear_gain(before, errors[-1], seed):
-            last = counting_runs(ordered[-1].chosen.fit, validation_units(windows), kept.dispersion)
+            last = counting_runs(ordered[-1].chosen.fit, runs_of(windows), kept.dispersion)
             return replace(result, kept=replace(kept, steps=tuple(ordered), last=last), held=errors)
     return None
 

@@ -36,8 +36,8 @@ from expdesign.diagnosis.fit import (
     gram_matrices,
     in_groups,
     of_several,
+    runs_of,
     tail,
-    validation_units,
     window_information,
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, disturbance_of
@@ -171,11 +171,7 @@ def scored_between_runs(
 ) -> tuple[tuple[ScoreTest, ...], Dispersion]:
     """The same, and how much the estimates of all candidates differ between runs beside everything in the fit."""
     scores = _scores(base, candidates)
-    known = (
-        Dispersion.of(scores.spread)
-        if len(np.unique(validation_units(base.linear.motion.windows))) > 1
-        else NOISE_ALONE
-    )
+    known = Dispersion.of(scores.spread) if len(np.unique(runs_of(base.linear.motion.windows))) > 1 else NOISE_ALONE
     factors, freedoms = known.beside(scores.spread)
     tests, roots = [], []
     for candidate, index in zip(candidates, scores.index, strict=True):
@@ -221,7 +217,7 @@ def _scores(base: Fit, candidates: Sequence[Candidate]) -> _Scores:
         np.array([shared.setdefault(tag, len(shared)) for tag, _ in candidate_disturbances(base.linear, candidate)])
         for candidate in candidates
     ]
-    c, (names, run) = len(base.keys), np.unique(validation_units(base.linear.motion.windows), return_inverse=True)
+    c, (names, run) = len(base.keys), np.unique(runs_of(base.linear.motion.windows), return_inverse=True)
     own, both = np.zeros((len(names), c, c)), np.zeros((len(names), c, len(shared)))
     each, s = np.zeros((len(names), len(shared))), np.zeros((len(names), c + len(shared)))
     A = np.zeros((c + len(shared), c + len(shared)))

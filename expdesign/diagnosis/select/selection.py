@@ -21,8 +21,8 @@ from expdesign.diagnosis.fit import (
     fit_ahead,
     log_likelihood_gain,
     of_several,
+    runs_of,
     tail,
-    validation_units,
 )
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
 from expdesign.diagnosis.select.score_tests import ScoreTest, scored_between_runs
@@ -138,7 +138,7 @@ def with_runs_counted(found: Selection, candidates: Sequence[Candidate], rng: np
         rng: of the null distribution.
     """
     tests, known = scored_between_runs(found.last, candidates, rng)
-    last = counting_runs(found.last, validation_units(found.last.linear.motion.windows), known)
+    last = counting_runs(found.last, runs_of(found.last.linear.motion.windows), known)
     steps = [
         replace(
             step,
