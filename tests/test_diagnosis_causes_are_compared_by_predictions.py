@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -13,8 +14,15 @@ from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit import AHEAD_S, HeldOut
-from expdesign.diagnosis.prediction_comparison import Compared, compare_predictions, signed_rank_p_values
+from expdesign.diagnosis.fit import AHEAD_S, FitOptions, HeldOut, counting_stretches, fit
+from expdesign.diagnosis.model import ExtendedModel
+from expdesign.diagnosis.motion import stable_windows
+from expdesign.diagnosis.prediction_comparison import (
+    Compared,
+    compare_predictions,
+    fitted_to_all,
+    signed_rank_p_values,
+)
 from expdesign.diagnosis.select import Selection, Step
 from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -30,16 +38,22 @@ def trial(seed: int, **hidden: object) -> Record:
     return hidden_record("coaster", seed=seed, batches=3, samples=240, **hidden)  # type: ignore[arg-type]
 
 
-def compared(record: Record, seed: int = 0) -> Compared:
+def compared(record: Record, seed: int = 0) -> tuple[ExtendedModel, Compared]:
     """Causes beside parameters that the file states to 10 %."""
     ship = extended_model(vessel_of("coaster", relative_std=0.1), record)
     found = compare_predictions(ship, cut_windows(ship.model, record, longest_s=AHEAD_S), seed, silent)
     assert found is not None
-    return found
+    return ship, found
+
+
+@cache
+def biased() -> tuple[ExtendedModel, Compared]:
+    """With a heading bias."""
+    return compared(trial(1, faults={"heading_bias": BIAS_RAD}))
 
 
 def test_the_hidden_cause_predicts_best_and_is_certain():
-    first = compared(trial(1, faults={"heading_bias": BIAS_RAD})).causes[0]
+    first = biased()[1].causes[0]
     assert first.cause == "heading_bias"
     assert first.is_certain
     assert abs(first.fit.value("heading_bias") - BIAS_RAD) < 3.5 * first.fit.std("heading_bias")
@@ -47,7 +61,7 @@ def test_the_hidden_cause_predicts_best_and_is_certain():
 
 def test_where_nothing_is_hidden_nothing_is_certain():
     """A trial has a certain cause with a chance of 2.5 % at most: two trials have none in 95 of 100."""
-    assert not [item.cause for seed in range(2) for item in compared(trial(seed)).causes if item.is_certain]
+    assert not [item.cause for seed in range(2) for item in compared(trial(seed))[1].causes if item.is_certain]
 
 
 def test_a_current_that_wanders_gains_and_is_no_certain_cause():
@@ -130,6 +144,44 @@ def test_what_slow_weather_predicts_as_well_is_no_certain_cause(monkeypatch):
         (),
     )
     assert judged(monkeypatch, of("current", 0.3, weather=True), bias, found=None) == ("current", ("heading_bias",))
+
+
+@pytest.mark.parametrize(
+    ("re_estimated", "alternatives"), [(0.2, None), (0.3, ("parameters",)), (0.4, ())], ids=["better", "level", "worse"]
+)
+def test_beside_the_file_a_cause_predicts_no_worse_than_all_parameters_re_estimated(
+    monkeypatch, re_estimated, alternatives
+):
+    """Fewer numbers that predict as well are the answer, and all parameters are the other one."""
+
+    def chosen(item, *_):
+        return SimpleNamespace(candidate=Candidate(cause=item.cause, free={}), fit=None)
+
+    parameters = Candidate(cause="parameters", free={"theta:Y_v": 0.0})
+    monkeypatch.setattr(judging, "harms", lambda *_: False)
+    monkeypatch.setattr(judging, "open_candidates", lambda *_: [parameters])
+    monkeypatch.setattr(judging, "fitted_to_all", chosen)
+    kept = Selection(steps=(), first=SimpleNamespace(ship=None), last=None, last_tests=())  # type: ignore[arg-type]
+    current, without = of("current", 0.3, weather=True), errors(np.ones((10, 3)))
+    compared = SimpleNamespace(causes=(current,), without=without, tests=(), without_in=lambda _: None)
+    alone = errors(np.full((10, 3), re_estimated))
+    found = judging.found_by_predictions(kept, compared, (None, None), None, 0, alone)  # type: ignore[arg-type]
+    if alternatives is None:
+        assert found is None
+    else:
+        assert found[0].beside_stated
+        assert tuple(one.candidate.cause for one in found[0].steps[0].alternatives) == alternatives
+
+
+def test_sizes_found_by_predictions_are_no_surer_than_the_likelihood_and_the_stretches():
+    ship, found = biased()
+    windows, first = stable_windows(ship, trial(1, faults={"heading_bias": BIAS_RAD})), found.causes[0]
+    chosen = fitted_to_all(first, found.without_in(windows), windows)
+    assert chosen is not None
+    free, starts = chosen.fit.free_keys, chosen.fit.starts
+    likeliest = fit(chosen.fit.ship, windows, free, starts=starts, options=FitOptions(steps=0))
+    for other in (likeliest, counting_stretches(first.fit)):
+        assert chosen.fit.std("heading_bias") >= 0.999 * other.std("heading_bias")
 
 
 def test_the_signed_rank_test_counts_stretches_not_their_size():

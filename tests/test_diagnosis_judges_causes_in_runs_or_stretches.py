@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from expdesign.diagnosis import judgement
+from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
+from expdesign.diagnosis.select import Step
 from expdesign.diagnosis.select.backward_elimination import certain_reductions, improves_held_out
 from expdesign.progress import silent
 from held_out_cases import POSSIBLE, errors, steps_of
@@ -142,3 +144,26 @@ def test_causes_are_fitted_beside_the_file_where_it_simulates_better_with_them_f
         )
         kept, _ = errors_as_judged(found, stated, validation, None, silent, 0)  # type: ignore[arg-type]
         assert kept is chosen
+
+
+@pytest.mark.parametrize(
+    ("alone", "with_cause", "rival"), [(70.0, 71.0, False), (70.0, None, True), (75.0, 71.0, True)]
+)
+def test_parameters_far_beyond_the_file_are_the_other_answer_where_they_alone_gain_as_much(
+    monkeypatch, alone, with_cause, rival
+):
+    """The gain on the file as it is counts that of parameters fitted beside the cause."""
+    spread = np.array([[-6.0], [-6.0], [9.0], [9.0], [9.0], [9.0]])
+    after = errors(70.0 + spread if with_cause is None else with_cause)
+    chosen = SimpleNamespace(keys=("wind",), fit=Model("fit", noise=None))
+    step = Step(chosen=chosen, p_value=0.0, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
+    first = Model("first", keys=("theta:Y_v",), ship=None)
+    found = replace(steps_of("wind"), steps=(step,), first=first)  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "within_stated_std", lambda _fit: False)
+    monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
+    monkeypatch.setattr(judgement, "prediction_gain", lambda *_: (np.nan, (np.nan, np.nan)))
+    parameters = Candidate(cause="parameters", free={"theta:Y_v": 0.0})
+    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [parameters])
+    validation = SimpleNamespace(of=lambda _: errors(alone))
+    judged = judgement.with_parameters_as_rival(found, [errors(20.0), after], validation, None, 0)  # type: ignore[arg-type]
+    assert [one.candidate.cause for one in judged.steps[0].alternatives] == ["parameters"] * rival

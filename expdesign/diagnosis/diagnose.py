@@ -22,9 +22,11 @@ from expdesign.diagnosis.causes import rounded
 from expdesign.diagnosis.conclusions import (
     error_reductions_of,
     finding_of,
+    missing_effect,
     note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
+    note_on_parameters_alone,
     note_on_predictions,
     note_on_random_current,
     note_on_stretches,
@@ -55,7 +57,9 @@ from expdesign.diagnosis.judgement import (
     found_by_predictions,
     harms,
     losses_without,
+    parameters_alone,
     with_alternatives,
+    with_parameters_as_rival,
     without_harm,
 )
 from expdesign.diagnosis.model import ExtendedModel
@@ -145,6 +149,7 @@ def select_causes(
     comparable = found.steps and found.first.keys and within_stated_std(found.first)
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
+    kept = with_parameters_as_rival(kept, held, validation, windows, seed)
     rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
     searched, compared = kept, None
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
@@ -152,6 +157,9 @@ def select_causes(
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
+        if compared and not by_predictions and not kept.steps and found.first.keys:
+            stated = compare_predictions(ship.with_known_parameters(), short, seed, progress)
+            by_predictions = stated and found_by_predictions(kept, stated, data, ship, seed, compared.without)
         if compared and kept.steps and not by_predictions:
             kept, compared = with_alternatives(kept, compared, seed), None
         kept, held = by_predictions or (kept, held)
@@ -390,7 +398,11 @@ def _notes_on_selection(chosen: Selected, unit: str, seed: int) -> tuple[str, ..
             *(note_beside_the_same_fit(chosen.kept) if chosen.kept.steps and chosen.compared_with(seed)[1] else ()),
             *rejected,
         ]
-        if chosen.kept.first.keys:
+        alone = parameters_alone(chosen.kept, chosen.held, chosen.validation)
+        if alone is not None:
+            cause = missing_effect(chosen.kept.steps[0].chosen.candidate.cause)
+            notes.append(note_on_parameters_alone(chosen.before, alone, chosen.held[1], cause, seed))
+        elif chosen.kept.first.keys:
             notes += note_on_nuisance(chosen.before, chosen.held[0], seed)
     notes += (*notes_on_found_again(chosen.kept), *note_on_work(chosen.found))
     return (*notes, *note_on_unconverged(chosen.held), *note_on_random_current(chosen.kept.last.noise))

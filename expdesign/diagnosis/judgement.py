@@ -13,17 +13,19 @@ from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import (
     AHEAD_S,
     CrossValidation,
+    Fit,
     HeldOut,
     counting_runs,
     held_out_gain,
     judged,
     leads_away,
+    prediction_gain,
     runs_of,
     within_stated_std,
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import simulate_from_measured
-from expdesign.diagnosis.prediction_comparison import Compared, ComparedCause, fitted_to_all
+from expdesign.diagnosis.prediction_comparison import RE_ESTIMATED, Compared, ComparedCause, fitted_to_all
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Rival,
@@ -32,6 +34,7 @@ from expdesign.diagnosis.select import (
     fitted_ahead,
     improves_held_out,
     only_nuisance,
+    open_candidates,
     without_step,
 )
 from expdesign.progress import Progress, within
@@ -124,13 +127,20 @@ def _cross_validated(
 
 
 def found_by_predictions(
-    kept: Selection, compared: Compared, data: tuple[Windows, Record], ship: ExtendedModel, seed: int
+    kept: Selection,
+    compared: Compared,
+    data: tuple[Windows, Record],
+    ship: ExtendedModel,
+    seed: int,
+    re_estimated: HeldOut | None = None,
 ) -> tuple[Selection, list[HeldOut]] | None:
     """The cause that gains most for certain in predictions, and errors on held-out data without and with it.
 
     None where no cause does with which the data are simulated no worse than by the model in use, or where slow weather
     that nobody measured predicts about as well. Where a search found causes, one has to predict better than the model
-    with all of them, to take their place.
+    with all of them, to take their place. Beside the parameters of the file, it has to predict on average no worse than
+    all of these re-estimated without it, which are many more numbers, and an alternative unless they do worse for
+    certain.
 
     Args:
         kept: the causes that the search found.
@@ -138,15 +148,20 @@ def found_by_predictions(
         data: as compared, and as measured.
         ship: the model in use.
         seed: of the intervals.
+        re_estimated: errors of the model with parameters re-estimated and no cause, where causes are compared beside
+            the parameters of the file; None where they are compared beside re-estimated ones.
     """
     windows, record = data
+    first = kept.first if re_estimated is None else compared.without_in(windows)
     weather = [other.held for other in compared.causes if other.is_slow_weather]
     known = [compared.of(kept.last)] if kept.steps else []
     for item in _certain_besides(kept, compared):
+        if re_estimated is not None and item.held.mean_fit < re_estimated.mean_fit:
+            continue
         better_than = [*known, *([] if item.is_slow_weather else weather)]
         if not all(held is not None and _gains_for_certain([held, item.held], seed) for held in better_than):
             continue
-        chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, kept.first, windows)
+        chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, first, windows)
         if chosen is None:
             continue
         others = [other for other in compared.causes if other is not item and other.is_certain]
@@ -154,13 +169,58 @@ def found_by_predictions(
             chosen=chosen,
             p_value=item.p_value,
             alternatives=_no_worse(others, item.held, seed),
-            before=kept.first,
+            before=first,
             tests=compared.tests,
         )
         left = tuple(test for test in kept.last_tests if test.candidate.cause != item.cause)
-        found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left, beside_stated=False)
+        found = replace(kept, steps=(step,), last=chosen.fit, last_tests=left, beside_stated=re_estimated is not None)
+        if re_estimated is not None and not _gains_for_certain([re_estimated, item.held], seed):
+            found = _or_parameters(found, kept.first, windows)
         return found, [compared.without, item.held]
     return None
+
+
+def parameters_alone(kept: Selection, held: Sequence[HeldOut], validation: CrossValidation) -> HeldOut | None:
+    """Errors of all parameters re-estimated without any cause, where they have a part in the gain of the first one.
+
+    A fit without any cause that needs parameters far beyond their standard deviations is no model that the file allows,
+    so gains are measured on the file as it is. Part of such a gain is then that of the parameters, which are fitted
+    beside the cause. None elsewhere.
+
+    Args:
+        kept: the causes.
+        held: errors on held-out units of the model before any cause, then after every one.
+        validation: of other fits.
+    """
+    exceeded = kept.steps and kept.first.keys and not kept.beside_stated and not within_stated_std(kept.first)
+    if not exceeded or only_nuisance(kept.steps[0], kept):
+        return None
+    return validation.of(kept.first).like(held[1])
+
+
+def with_parameters_as_rival(
+    kept: Selection, held: Sequence[HeldOut], validation: CrossValidation, windows: Windows, seed: int
+) -> Selection:
+    """The causes, the first with all parameters as an alternative unless it gains for certain on them re-estimated.
+
+    It may gain in simulations, or in predictions from one sample to the next. Arguments as of `parameters_alone`.
+    """
+    alone = parameters_alone(kept, held, validation)
+    if alone is None or _gains_for_certain([alone, held[1]], seed):
+        return kept
+    share, (least, _) = prediction_gain(alone, held[1], windows, kept.steps[0].chosen.fit.noise)
+    certain = least > 0.0 and share >= SELECTION_TUNING.least_predicted
+    return kept if certain else _or_parameters(kept, kept.first, windows)
+
+
+def _or_parameters(kept: Selection, first: Fit, windows: Windows) -> Selection:
+    """The causes, all parameters as fitted before any of them an alternative to the first."""
+    step, *others = kept.steps
+    candidates = [item for item in open_candidates(first, windows) if item.cause == RE_ESTIMATED]
+    if not candidates or any(item.candidate.cause == RE_ESTIMATED for item in step.alternatives):
+        return kept
+    rival = Rival(candidate=max(candidates, key=lambda item: item.size), ship=first.ship, trails_by=0.0)
+    return replace(kept, steps=(replace(step, alternatives=(*step.alternatives, rival)), *others))
 
 
 def with_alternatives(kept: Selection, compared: Compared, seed: int) -> Selection:

@@ -30,6 +30,7 @@ from expdesign.diagnosis.fit import (
     fit_output_error,
     held_out_gain,
     log_likelihood_gain,
+    no_smaller,
     on_common_units,
     spread_between_runs,
 )
@@ -93,10 +94,16 @@ class ComparedCause:
 class Compared:
     """Causes compared by predictions."""
 
-    without: HeldOut  # errors on held-out stretches of the model without any of them, its uncertain parameters fitted
+    base: ExtendedModel  # without any of them, its uncertain parameters fitted
+    without: HeldOut  # its errors on held-out stretches
     causes: tuple[ComparedCause, ...]  # with the largest gain first
     tests: tuple[ScoreTest, ...]  # that chose them
     short: Windows  # data in short stretches
+
+    def without_in(self, windows: Windows) -> Fit:
+        """The model without any of them, in longer windows."""
+        starts = initial_states(windows, self.base.states)
+        return fit(self.base, windows, (), starts=starts, options=FitOptions(steps=0))
 
     def of(self, found: Fit) -> HeldOut | None:
         """Errors on held-out stretches of another model, fitted in the same way; None where it cannot be fitted."""
@@ -134,13 +141,15 @@ def compare_predictions(ship: ExtendedModel, short: Windows, seed: int, progress
         _compared(*fitted, without, min(1.0, len(shortlist) * p_value), seed)
         for fitted, p_value in zip(tried, p_values, strict=True)
     ]
-    return Compared(without=without, causes=tuple(sorted(found, key=lambda item: -item.gain)), tests=tests, short=short)
+    causes = tuple(sorted(found, key=lambda item: -item.gain))
+    return Compared(base=base.ship, without=without, causes=causes, tests=tests, short=short)
 
 
 def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCandidate | None:
     """A cause as it was fitted to short stretches, with the noise of the long windows; None where that diverges there.
 
-    Its standard errors are those of the scatter from stretch to stretch.
+    Its standard errors are no smaller than those of the likelihood there, and than the scatter from stretch to stretch
+    tells: few stretches beside many parameters tell little of either.
     """
     ahead = counting_stretches(item.fit)
     free, starts = ahead.free_keys, initial_states(windows, ahead.ship.states)
@@ -152,7 +161,7 @@ def fitted_to_all(item: ComparedCause, first: Fit, windows: Windows) -> FittedCa
     point = item.point
     return FittedCandidate(
         candidate=point.test.candidate,
-        fit=replace(found, covariance=ahead.covariance),
+        fit=replace(found, covariance=no_smaller(found.covariance, ahead.covariance)),
         likelihood_gain=gain,
         penalised_gain=gain - SELECTION_TUNING.price * (len(point.keys) + (point.profiled is not None)),
         keys=point.keys,

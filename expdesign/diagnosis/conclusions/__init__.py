@@ -6,6 +6,7 @@ from expdesign.diagnosis.conclusions.findings import (
     note_beside_the_same_fit,
     note_on_divergence,
     note_on_nuisance,
+    note_on_parameters_alone,
     note_on_predictions,
     note_on_random_current,
     note_on_stretches,

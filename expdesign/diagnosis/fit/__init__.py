@@ -60,7 +60,7 @@ from expdesign.diagnosis.fit.linear_model import (
     sensitivities_to,
     window_information,
 )
-from expdesign.diagnosis.fit.output_error import fit_ahead, fit_output_error, with_longer_windows
+from expdesign.diagnosis.fit.output_error import fit_ahead, fit_output_error, no_smaller, with_longer_windows
 from expdesign.diagnosis.fit.tuning import TUNING
 
 AHEAD_S = TUNING.ahead_s

@@ -17,6 +17,7 @@ from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import initial_states, longest_windows, simulate_from_measured, stable_windows
 from expdesign.signals import Record
+from expdesign.values import Array
 
 FOLD_STEPS = 6  # Gauss-Newton steps from the fit to all units to the fit without a fold
 LONGER_BY = 1.4  # factor of the length of windows from one fit of a diverging model to the next
@@ -50,16 +51,19 @@ def fit_ahead(found: Fit, windows: Windows, short: Windows, *, beside_stated: bo
     free, ship = found.free_keys, found.ship
     if beside_stated:
         parameters = {key for key in found.keys if key.startswith("theta:") and key not in free}
-        model = replace(ship.model, parameter_std=np.zeros(len(ship.model.parameters)))
-        ship = replace(ship.without_effects(parameters), model=model)
+        ship = ship.without_effects(parameters).with_known_parameters()
     ahead = counting_stretches(fit_output_error(ship, short, free))
     at_these = replace(continuing(found), steps=0, warm_start=None)
     again = fit(ahead.ship, windows, free, starts=found.starts, options=at_these)
     rows = [found.keys.index(key) for key in again.keys]
-    covariance = found.covariance[np.ix_(rows, rows)]
+    return replace(again, covariance=no_smaller(found.covariance[np.ix_(rows, rows)], ahead.covariance))
+
+
+def no_smaller(covariance: Array, other: Array) -> Array:
+    """A covariance (c, c) with its correlations, and standard errors no smaller than those of another."""
     own = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    ratio = np.maximum(np.sqrt(np.maximum(np.diag(ahead.covariance), 0.0)) / own, 1.0)
-    return replace(again, covariance=covariance * np.outer(ratio, ratio))
+    ratio = np.maximum(np.sqrt(np.maximum(np.diag(other), 0.0)) / own, 1.0)
+    return np.asarray(covariance * np.outer(ratio, ratio))
 
 
 def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -> tuple[ExtendedModel, Windows]:

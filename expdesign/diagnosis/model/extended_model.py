@@ -105,6 +105,10 @@ class ExtendedModel:
         others = {key: value for key, value in self.effects.items() if key not in keys}
         return replace(self, effects=others | {key: value for key, value in self.stated.items() if key in keys})
 
+    def with_known_parameters(self) -> ExtendedModel:
+        """The model whose parameters count as known."""
+        return replace(self, model=replace(self.model, parameter_std=np.zeros(len(self.model.parameters))))
+
     def has_found(self, prefix: str) -> bool:
         """Whether an effect whose key begins so differs from the vessel file, which does not say how sure it is."""
         return any(

@@ -199,8 +199,11 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
         changed = injected.model(vessel, clean)
         if changed is None:
             return row
-        vessel, *effect = changed
-        effects = (tuple(effect),)
+        vessel, key, size = changed
+        if trial.true is not None:
+            model = trial.true.model
+            size = dict(zip(model.names, model.parameters.tolist(), strict=True)).get(key.partition(":")[2], size)
+        effects = ((key, size),)
     angle = "rudder" if "rudder" in kinds else "a"
     effects = tuple((key.replace("ANGLE", angle), value) for key, value in effects)
     own = averaged(faulty if checked is None else checked(faulty, vessel))

@@ -289,7 +289,8 @@ def answer(
         return "record", None
     if fault.record and texts:
         value, std = (float(number) for number in texts[0])
-        before = own[effects[0][0]]
+        effect, _ = effects[0]
+        before = 0.0 if effect.startswith("late") and EARLY_POSITIONS in " ".join(found.record.faults) else own[effect]
         true = fault.record[1] * (1.0 + before) if fault.record[1] == SCALE else fault.record[1] + before
         return "record", abs(value - true) / std
     right = {*fault.causes} | {f"missing_{key}" for key, _ in effects if key.startswith("term:")}
@@ -316,6 +317,8 @@ def estimates(item: Finding, found: Diagnosis) -> dict[str, tuple[float, float]]
     return rows
 
 
+EARLY_POSITIONS = "later than the positions"
+"""What the record says of early positions, apart from late velocities."""
 PLUS = "(-?[0-9.]+) \N{PLUS-MINUS SIGN} ([0-9.]+)"
 FAULTS = (
     Fault(name="untouched"),

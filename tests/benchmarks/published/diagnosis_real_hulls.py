@@ -135,6 +135,7 @@ class Trial:
     vessel: Vessel
     judged: Record
     unseen: Record | None
+    true: Vessel | None = None  # of simulated runs
 
 
 def tank_trial(data: Path, rng: np.random.Generator) -> Trial:
@@ -182,7 +183,7 @@ def clean_trial(data: Path, rng: np.random.Generator) -> Trial:
         Record(batches=tuple(batch for batch in record.batches if batch.name in some))
         for some in divided(names, 3, 3, rng)
     )
-    return Trial(vessel=simulating(ship, fitted, "ls"), judged=judged, unseen=unseen)
+    return Trial(vessel=simulating(ship, fitted, "ls"), judged=judged, unseen=unseen, true=ship)
 
 
 HULLS: dict[str, Callable[[Path, np.random.Generator], Trial]] = {
