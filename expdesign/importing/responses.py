@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.importing.channels import Channel
+from expdesign.importing.channels import LARGEST, Channel
 from expdesign.importing.noise import step_of, white_noise
 from expdesign.records.file import REACHED, is_input, is_turning_input
 from expdesign.values import Array
@@ -161,17 +161,21 @@ def _by_moves(jacobian: Array, left: Array, move: NDArray[np.signedinteger[Any]]
 
 def simulated(orders: Array, step_s: float, rate: float, lag_s: float, delay_s: float, start: float) -> Array:
     """(k,) position that is delivered of orders (k,), each held to the next."""
-    position, reach = start, rate * step_s
-    slewed = np.empty(len(orders))
-    for k, order in enumerate(orders.tolist()):
-        slewed[k] = position
+    begins = np.flatnonzero(np.diff(orders, prepend=np.nan) != 0)  # of each order that stands
+    lasts = np.diff(begins, append=len(orders))
+    reach, position, at = min(rate * step_s, LARGEST), start, []
+    for order, steps in zip(orders[begins].tolist(), lasts.tolist(), strict=True):
+        at.append(position)
         way = order - position
-        position = order if abs(way) <= reach else position + math.copysign(reach, way)
+        position = order if abs(way) <= steps * reach else position + math.copysign(steps * reach, way)
+    from_there, way_left = np.repeat(at, lasts), np.repeat(orders[begins] - at, lasts)
+    gone = reach * (np.arange(len(orders)) - np.repeat(begins, lasts))
+    slewed = from_there + np.clip(way_left, -gone, gone)
     if delay_s:  # also one that is negative
         times = step_s * np.arange(len(orders))
         slewed = np.interp(times - delay_s, times, slewed)
     if lag_s > 0:
-        gone = -math.expm1(-step_s / lag_s)
-        before = gone * lag_s / step_s - 1.0 + gone  # between samples the position goes straight
-        slewed = scipy.signal.lfilter([gone - before, before], [1.0, gone - 1.0], slewed - start) + start
+        done = -math.expm1(-step_s / lag_s)
+        before = done * lag_s / step_s - 1.0 + done  # between samples the position goes straight
+        slewed = scipy.signal.lfilter([done - before, before], [1.0, done - 1.0], slewed - start) + start
     return slewed

@@ -18,7 +18,7 @@ from expdesign.importing.readers.nmea import Sentences
 from expdesign.importing.readers.table import TextTable
 from expdesign.importing.units import counted
 
-BLOCK_BYTES = 1 << 22  # read at once
+BLOCK_BYTES = 1 << 20  # read at once
 SNIFFED = 400  # lines that a dialect is told from
 MOST_COLUMNS = 2000
 
