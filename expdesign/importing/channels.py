@@ -6,7 +6,7 @@ Times count from 1970 UTC where the clock is that of a satellite receiver or a c
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,10 @@ class Channel:
     def __len__(self) -> int:
         return len(self.values)
 
+    def without_readings(self) -> Channel:
+        """Its name alone."""
+        return replace(self, time_s=np.zeros(0), values=np.zeros(0))
+
     @property
     def interval_s(self) -> float:
         """Usual time between readings [s]; infinite for fewer than two."""
@@ -63,6 +67,10 @@ class Log:
     channels: tuple[Channel, ...]
     notes: tuple[str, ...] = ()  # what was broken, converted, taken for granted
     unused: tuple[str, ...] = ()  # what stands in the file and is no channel
+
+    def without_readings(self) -> Log:
+        """The names of its channels alone."""
+        return replace(self, channels=tuple(channel.without_readings() for channel in self.channels))
 
 
 @dataclass(frozen=True, kw_only=True)

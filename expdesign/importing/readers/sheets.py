@@ -76,9 +76,10 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
     import pyarrow
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(path)
     columns = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
+    file = pyarrow.parquet.ParquetFile(path)
+    for name in file.schema_arrow.names:  # one at a time, so that the file is not in the memory twice
+        column = file.read([name]).column(0)
         kind = column.type
         if pyarrow.types.is_temporal(kind):
             columns[name] = np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
