@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 HEAD = "time,lat,lon,sog,cog,hdg,rpm,rudder"
 ROWS = [f"{k},54.{k:05d},18.5,5.0,{k},{k},3.0,{k // 20 % 2 * 10}" for k in range(60)]
-TABLE = "\n".join([HEAD, *ROWS])
+TABLE = "\n".join([HEAD, *ROWS, ""])
 
 
 def packed(**files: str) -> bytes:
@@ -91,7 +91,7 @@ def test_readings_that_nothing_can_be_are_left_out_and_told(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "text", [TABLE, "\n".join([HEAD, *ROWS[::-1]]), "\n".join([HEAD, *ROWS[:30][::-1], *ROWS[30:]])]
+    "text", [TABLE, "\n".join([HEAD, *ROWS[::-1], ""]), "\n".join([HEAD, *ROWS[:30][::-1], *ROWS[30:], ""])]
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
 def test_order_of_rows_and_encoding_make_no_difference(text: str, encoding: str, tmp_path: Path) -> None:

@@ -115,11 +115,15 @@ class Sentences:
             body = line[start + 1 :].rstrip(ENDS)
             maker = MAKERS.get(name)
             read = name[0] != "P" and name[-3:] in FIELDS
-            if maker and maker[0] and not body.startswith(f"{name},{maker[0]},") or not (maker or read):
+            if (maker and maker[0] and not body.startswith(f"{name},{maker[0]},")) or not (maker or read):
                 self.unread[name] += 1
                 continue
             own = kept.setdefault(name, [])
-            own += place, line[:start], *body.partition("*")  # in one list: a million small ones cost more than all else
+            own += (
+                place,
+                line[:start],
+                *body.partition("*"),
+            )  # in one list: a million small ones cost more than all else
         for name, own in kept.items():
             self._take(name, *(own[part::5] for part in range(5)))
 
@@ -128,6 +132,8 @@ class Sentences:
     ) -> None:
         """Lines of one talker and sentence: places, what is before it, the sentence, its star and its checksum."""
         good = _checked(texts, stars, ends)
+        if 2 * (checked := sum(map(bool, stars))) > len(stars) > checked:  # others have one: these are cut
+            good = [own and bool(star) for own, star in zip(good, stars, strict=True)]
         if not all(good):
             self.broken += len(good) - sum(good)
             numbers, prefixes = list(compress(numbers, good)), list(compress(prefixes, good))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import zipfile
+from dataclasses import replace
 from datetime import datetime, time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -76,10 +77,14 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
     import pyarrow
     import pyarrow.parquet
 
-    columns = {}
+    columns, unused = {}, []
     file = pyarrow.parquet.ParquetFile(path)
     for name in file.schema_arrow.names:  # one at a time, so that the file is not in the memory twice
         column = file.read([name]).column(0)
+        if pyarrow.types.is_dictionary(column.type):
+            column = column.cast(column.type.value_type)
+        if pyarrow.types.is_decimal(column.type):
+            column = column.cast(pyarrow.float64())
         kind = column.type
         if pyarrow.types.is_temporal(kind):
             columns[name] = np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
@@ -87,4 +92,7 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
             columns[name] = np.asarray(column.to_numpy(), dtype=float)
         elif pyarrow.types.is_string(kind) or pyarrow.types.is_large_string(kind):
             columns[name] = np.asarray(column.to_numpy(), dtype=object)
-    return columns_log(path.name, columns, sample_time_s)
+        else:
+            unused.append(f"{name} ({kind})")
+    log = columns_log(path.name, columns, sample_time_s)
+    return replace(log, unused=(*log.unused, *unused))

@@ -7,6 +7,7 @@ own stand between sentences with satellite time, and are spread evenly from one 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     plain = [line for line in sample if "$" not in line and not line.startswith("!") and line.strip()]
     dialect = sniffed(plain)
     table = None if dialect is None else TextTable(path, dialect, plain)
-    sentences, place, other = Sentences(path.name), 0, 0
+    sentences, place, other, before, cut = Sentences(path.name), 0, 0, "", False
     with path.open(encoding=encoding, errors="replace", newline=None) as file:
         while lines := file.readlines(BLOCK_BYTES):
             marked = [
@@ -55,6 +56,10 @@ def read_text(path: Path, sample_time_s: float) -> Log:
             else:
                 left = list(enumerate(lines, start=place))
             left = [pair for pair in left if not pair[1].isspace()]
+            if left:
+                before, last = left[-2][1] if len(left) > 1 else before, left[-1][1]
+                cut = dialect is not None and dialect.is_cut(last, before)
+                left, before = left[:-1] if cut else left, last
             if table is not None:
                 table.add(left)
             else:
@@ -63,7 +68,9 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     if not sentences.count and table is None:
         expected = "a table of numbers with a header, NMEA 0183, or a format of expdesign explain import"
         raise FileError(path, "", f"holds no rows of numbers and no NMEA sentences that are read, expected {expected}")
-    return _joined(path, sentences, table, other, sample_time_s)
+    log = _joined(path, sentences, table, other, sample_time_s)
+    words = "left out the last line, which has no end and may be cut"
+    return replace(log, notes=(words, *log.notes)) if cut else log
 
 
 def _joined(path: Path, sentences: Sentences, table: TextTable | None, other: int, sample_time_s: float) -> Log:

@@ -46,6 +46,7 @@ from expdesign.importing import (
     guess,
     inputs_of,
     lag_of,
+    length_of_speed_m,
     presumed,
     read_log,
     sampled,
@@ -54,6 +55,7 @@ from expdesign.importing import (
     typical_length_m,
     zone_lag_of,
 )
+from expdesign.importing.mapping import SOG
 from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
@@ -236,6 +238,9 @@ def _one_time_scale(
         NothingToWrite: nothing tells how a clock stands to the others.
     """
     clocks = {clock.file: clock for clock in mapping.files}
+    speeds = [own[name].values for own in columns.values() for name in (SOG, "u_mps") if name in own]
+    typical_m = length_of_speed_m(np.concatenate(speeds) if speeds else np.zeros(0))
+    length_m = (mapping.length_m, 0.0) if mapping.length_m else (typical_m, typical_m)
     order = sorted(logs, key=lambda log: TRUSTED.index(log.clock))
     table: dict[str, Channel] = {}
     notes = []
@@ -255,8 +260,8 @@ def _one_time_scale(
         own, clock = columns[log.source], clocks.get(log.source, FileClock(file=log.source))
         if table and own and not (stated and log.source in clocks):
             near = log.clock != OWN and order[0].clock != OWN
-            lag = lag_of(own, table, near=near)
-            zone = zone_lag_of(own, table) if lag is None and near else None
+            lag = lag_of(own, table, near=near, length_m=length_m)
+            zone = zone_lag_of(own, table, length_m=length_m) if lag is None and near else None
             if zone is not None:
                 lag, what = zone
                 notes.append(f"{log.source}: its clock is {what}")
@@ -374,8 +379,8 @@ def _tried(
                 said.setdefault(note, []).append(name)
     if compared < len(kept):
         notes.append(
-            f"instruments are compared with each other in {compared} of {len(kept)} runs, evenly over the log, of which "
-            f"{rows} rows are more than is needed"
+            f"instruments are compared with each other in {compared} of {len(kept)} runs, evenly over the log, as "
+            f"its {rows} rows are more than are needed"
         )
     if batches:
         whole = Record(batches=tuple(batches))
