@@ -45,6 +45,9 @@ NO_LOGS = {
     "gzip": (gzip.compress(TABLE.encode()), "is compressed by gzip, expected it unpacked"),
     "PDF": (b"%PDF-1.4\n" + bytes(range(256)), "is a PDF"),
     "zip": (packed(notes="hi"), "is a zip archive with notes, expected the log itself"),
+    "Signal K without times": (
+        b'{"updates":[{"values":[{"path":"navigation.headingTrue","value":1.0}]}]}\n' * 9, "is Signal K without"
+    ),
     "NMEA 2000 without times": (b"<0x18eeff01> [8] 05 a0 be 1c 00 a0 a0 c0\n" * 9, "is NMEA 2000 without times"),
     "NMEA 2000 of other things": (b"(1502979132.1) can0 18EEFF01#05A0BE1C00A0A0C0\n" * 9, "without rudder, heading"),
 }  # fmt: skip

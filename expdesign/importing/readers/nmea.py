@@ -6,6 +6,7 @@ five sentences at 10 Hz; here the lines of a block are taken apart column by col
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
@@ -65,6 +66,9 @@ DOUBTS = {"GGA": ("quality", {"6": "estimated", "7": "put in by hand", "8": "sim
           "RMC": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"}),
           "GNS": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"})}  # fmt: skip
 """Sentence -> field, and its marks of positions that no satellite gave."""
+OWN_SHIP = {"lat": ("lat", "deg", 91.0), "lon": ("lon", "deg", 181.0), "spd": ("speed", "kn", 102.3),
+            "cog": ("course", "deg", 360.0), "headt": ("heading", "deg", 511.0)}  # fmt: skip
+"""Reading -> field of pyais, unit, and what stands for none (ITU-R M.1371)."""
 WGS84 = ("", "W84", "P90", "999")
 PLACES = {name: {field: place for place, field in enumerate(NMEA_PAYLOADS_GET[name])} for name in FIELDS}
 INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}
@@ -113,6 +117,9 @@ class Sentences:
                 start, name = found.start(), found[1]
                 self.known.add(name)
             body = line[start + 1 :].rstrip(ENDS)
+            if name.endswith("VDO"):
+                self._own_ship(name, place, f"!{body}", line[:start])
+                continue
             maker = MAKERS.get(name)
             read = name[0] != "P" and name[-3:] in FIELDS
             if (maker and maker[0] and not body.startswith(f"{name},{maker[0]},")) or not (maker or read):
@@ -126,6 +133,28 @@ class Sentences:
             )  # in one list: a million small ones cost more than all else
         for name, own in kept.items():
             self._take(name, *(own[part::5] for part in range(5)))
+
+    def _own_ship(self, name: str, place: int, line: str, prefix: str) -> None:
+        """Position, course, speed and heading that the ship's own AIS sends, by pyais."""
+        try:
+            import pyais
+        except ModuleNotFoundError:
+            self.unread[f"{name}, which needs pyais: pip install 'expdesign[logs]'"] += 1
+            return
+        try:
+            message = pyais.decode(line).asdict()
+        except pyais.exceptions.AISBaseException:
+            self.broken += 1
+            return
+        if "lat" not in message or not math.isfinite(float(message["lat"])) or abs(message["lat"]) > 90.0:
+            self.unread[f"{name} of type {message.get('msg_type')}"] += 1
+            return
+        self.count += 1
+        at = np.array([place], dtype=float)
+        for what, (field, unit, none) in OWN_SHIP.items():
+            value = float(message.get(field, none))
+            self._keep(f"{name}.{what}", unit, at, np.array([value]), np.array([value < none]))
+        self._received([prefix], at)
 
     def _take(
         self, name: str, numbers: list[int], prefixes: list[str], texts: list[str], stars: list[str], ends: list[str]

@@ -41,18 +41,16 @@ def read_text(path: Path, sample_time_s: float) -> Log:
         raise FileError(path, "", "is empty, expected a log")
     if (wide := max(line.count(separator) for line in sample[:2] for separator in SEPARATORS[:-1])) > MOST_COLUMNS:
         raise FileError(path, "row 1", f"has {wide + 1} columns, expected at most {MOST_COLUMNS}")
-    plain = [line for line in sample if "$" not in line and not line.startswith("!") and line.strip()]
+    plain = [line for line in sample if not _is_sentence(line) and line.strip()]
     dialect = sniffed(plain)
     table = None if dialect is None else TextTable(path, dialect, plain)
     sentences, place, other, before, cut = Sentences(path.name), 0, 0, "", False
     with path.open(encoding=encoding, errors="replace", newline=None) as file:
         while lines := file.readlines(BLOCK_BYTES):
-            marked = [
-                (place + k, line) for k, line in enumerate(lines) if "$" in line or line.startswith("!")
-            ]  # fmt: skip
+            marked = [(place + k, line) for k, line in enumerate(lines) if _is_sentence(line)]
             if marked:
                 sentences.add(marked)
-                left = [(place + k, x) for k, x in enumerate(lines) if "$" not in x and not x.startswith("!")]
+                left = [(place + k, line) for k, line in enumerate(lines) if not _is_sentence(line)]
             else:
                 left = list(enumerate(lines, start=place))
             left = [pair for pair in left if not pair[1].isspace()]
@@ -107,6 +105,11 @@ def _joined(path: Path, sentences: Sentences, table: TextTable | None, other: in
         found, clock_notes = channels_of(columns, times, source=path.name, units=table.units, what=table.time_name)
         channels, notes, unused = [*channels, *found], [*notes, *clock_notes], [*unused, *table.texts()]
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=tuple(unused))
+
+
+def _is_sentence(line: str) -> bool:
+    """Whether a line is, or ends in, a sentence of NMEA 0183; reports of the own ship may stand behind a time."""
+    return "$" in line or line.startswith("!") or "VDO," in line
 
 
 def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:
