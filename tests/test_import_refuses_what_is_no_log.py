@@ -78,6 +78,23 @@ def test_a_spreadsheet_that_unpacks_without_end_is_refused(tmp_path: Path, monke
         read_log(path)
 
 
+def test_sheets_beside_the_first_and_a_full_sheet_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in [HEAD.split(","), *([float(cell) for cell in row.split(",")] for row in ROWS)]:
+        book.active.append(row)
+    book.create_sheet("second half").append([1.0, 2.0])
+    book.save(tmp_path / "a.xlsx")
+    log = read_log(tmp_path / "a.xlsx")
+    assert log.unused == ("sheet second half",)
+    assert not any("are filled" in note for note in log.notes)
+    monkeypatch.setattr("expdesign.importing.readers.sheets.MOST_ROWS", 61)
+    assert any(note.startswith("all 61 rows of the sheet are filled") for note in read_log(tmp_path / "a.xlsx").notes)
+    monkeypatch.setattr("expdesign.importing.readers.sheets.MOST_ROWS", 60)
+    with pytest.raises(FileError, match="more than 60 rows"):
+        read_log(tmp_path / "a.xlsx")
+
+
 def test_columns_of_one_name_are_kept_apart_and_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(TABLE.replace("hdg,rpm", "hdg,hdg").replace(",3.0,", ",90.0,"))
     names = [channel.name for channel in read_log(tmp_path / "a.csv").channels]
