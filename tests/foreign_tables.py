@@ -192,6 +192,7 @@ ANGLES: dict[str, Style] = {
         names={"order": "rudder cmd", "rudder": "rudder"},
         cells={"order": lambda x: f"{x * 5.0:.4f}", "rudder": lambda x: f"{x * 5.0:.4f}"}, largest=20.0,
     ),
+    "names like ours, without a number": Style(names={"rudder": "rudder_deg"}),
     "within half a turn": Style(cells={"hdg": lambda x: f"{(x + 180) % 360 - 180:.4f}"}),
     "units in the cells": Style(
         names={name: text.split(" [")[0] for name, text in NAMES.items()},

@@ -11,7 +11,7 @@ import numpy as np
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, dimension
 from expdesign.importing.units import FACTORS, KNOWN, SHARES, split_unit, unit_word, words
-from expdesign.records.file import Source, meaning
+from expdesign.records.file import Source, is_input, meaning
 from expdesign.values import Array
 
 COURSE_OR_HEADING = 3
@@ -119,7 +119,7 @@ class Mark:
 def marked(channel: Channel) -> Mark:
     """What the name of a channel says, with its unit; x, y and z are told by their readings."""
     own = meaning(channel.name, 0)
-    if isinstance(own, Source):
+    if isinstance(own, Source) and not (is_input(own.name) and not re.search(r"\d|tau", channel.name)):
         return Mark(column=own.name, rank=-1, unit=f"times {own.factor!r}", exact=True, name=words(channel.name))
     bare, unit = split_unit(channel.name)
     name, unit = words(bare), channel.unit or unit
