@@ -142,7 +142,7 @@ class Sentences:
             self.unread[f"{name}, which needs pyais: pip install 'expdesign[logs]'"] += 1
             return
         try:
-            message = pyais.decode(line).asdict()
+            message: dict[str, Any] = pyais.decode(line).asdict()
         except pyais.exceptions.AISBaseException:
             self.broken += 1
             return
