@@ -141,11 +141,14 @@ class Sentences:
         except ModuleNotFoundError:
             self.unread[f"{name}, which needs pyais: pip install 'expdesign[logs]'"] += 1
             return
-        try:
-            message: dict[str, Any] = pyais.decode(line).asdict()
-        except pyais.exceptions.AISBaseException:
+        text, star, end = line[1:].partition("*")
+        if not star or not _checked([text], [star], [end])[0]:
             self.broken += 1
             return
+        try:
+            message: dict[str, Any] = pyais.decode(line).asdict()
+        except pyais.exceptions.AISBaseException:  # of several sentences, which has no position, or unknown
+            message = {"msg_type": "no position"}
         if "lat" not in message or not math.isfinite(float(message["lat"])) or abs(message["lat"]) > 90.0:
             self.unread[f"{name} of type {message.get('msg_type')}"] += 1
             return

@@ -114,11 +114,11 @@ def _channels(file: str, series: dict[tuple[str, str], tuple[array[float], array
         if len(sources) > 1:
             rest = ", ".join(source for source in sources if source != best)
             notes.append(f"{name}: of several sources {best} is read, which gives most; {rest[:120]} not")
-        order, times, more = set_right(sources[best][0], what=name)
-        values = sources[best][1][order]
-        if len(values):
+        order, time_s, more = set_right(sources[best][0], what=name)
+        readings = sources[best][1][order]
+        if len(readings):
             unit = next((unit for pattern, unit in UNITS if re.search(pattern, name, re.IGNORECASE)), "")
-            channels.append(Channel(name=name, source=file, unit=unit, time_s=times, values=values))
+            channels.append(Channel(name=name, source=file, unit=unit, time_s=time_s, values=readings))
             notes += more
     return channels, notes
 
