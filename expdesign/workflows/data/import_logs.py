@@ -61,7 +61,7 @@ from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
-from expdesign.signals import Record
+from expdesign.signals import Batch, Record
 from expdesign.values import closed
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, command_text
@@ -349,7 +349,8 @@ def _tried(
             sides=sides(mapping),
         )  # fmt: skip
     assert taken is not None
-    batches, kept, refused = [], [], []
+    batches: list[Batch] = []
+    kept, refused = [], []
     tables: dict[str, Path] = {}
     said: dict[str, list[str]] = {}
     outputs = OUTPUTS if "heading_rad" in runs[0].stretch.columns else ()
