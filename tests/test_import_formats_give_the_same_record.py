@@ -261,7 +261,8 @@ def test_reports_of_the_own_ships_ais_are_read(received: bool, tmp_path: Path, t
         lines += [f"{time_s:.1f} {line}"] if received else [sentence(f"GPZDA,{clock},00,00"), line]
     away = {"msg_type": 1, "mmsi": 230000002, "lat": 10.0, "lon": 10.0}
     others = pyais.encode_dict(away, talker_id="AI", sentence_type="VDM")
-    lines += [line.replace("VDO,1,1,,A,1", "VDO,1,1,,A,3")] * (not received)  # its checksum is wrong now
+    spoilt = line[:24] + ("1" if line[24] == "0" else "0") + line[25:]  # its checksum is wrong now
+    lines += [spoilt] * (not received)
     (tmp_path / "a.nmea").write_text("\n".join([*lines, *others * (not received)]) + "\n")
     table = {channel.name: channel for channel in read_log(tmp_path / "a.nmea").channels}
     # a report has ten-thousandths of minutes, tenths of knots and of degrees, and whole degrees of heading
