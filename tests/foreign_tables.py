@@ -42,6 +42,7 @@ class Style:
     separator: str = ","
     encoding: str = "utf-8"
     dated: bool = True
+    largest: float = 35.0  # degrees that 100 per cent of the helm are
     south: bool = False  # of the equator, and west of Greenwich
 
     def text(self, trip: Voyage) -> str:
@@ -112,6 +113,9 @@ CLOCKS: dict[str, Style] = {
         names={"time": "GPS Week|GPS TOW [s]"},
         cells={"time": lambda t: "{:.0f}|{:.3f}".format(*divmod(gps(t), 604800.0))},
     ),
+    "AM and PM, the month first": Style(
+        cells={"time": lambda t: f'"{when(t):%m/%d/%Y %I:%M:%S %p}"'}, names={"lat": '"Latitude"'}
+    ),
     "14 digits": Style(cells={"time": lambda t: f"{when(t):%Y%m%d%H%M%S}"}),
     "names of months": Style(cells={"time": lambda t: f"{when(t):%d-%b-%Y %H:%M:%S}"}),
     "the month first, by its name": Style(cells={"time": lambda t: f"{when(t):%b %d %Y %H:%M:%S}"}),
@@ -180,6 +184,15 @@ ANGLES: dict[str, Style] = {
                "order": lambda x: f"{'PORT' if x < 0 else 'STBD'} {abs(x):.4f}"}
     ),
     "a rate of turn with letters": Style(cells={"rot": lambda x: f"{abs(x):.4f}{'P' if x < 0 else 'S'}"}),
+    "per cent of the largest helm": Style(
+        names={"order": "rudder_cmd_pct", "rudder": "Rudder act. [%]"},
+        cells={"order": lambda x: f"{x / 0.35:.4f}", "rudder": lambda x: f"{x / 0.35:.4f}"},
+    ),
+    "per cent by the size": Style(
+        names={"order": "rudder cmd", "rudder": "rudder"},
+        cells={"order": lambda x: f"{x * 5.0:.4f}", "rudder": lambda x: f"{x * 5.0:.4f}"}, largest=20.0,
+    ),
+    "names like ours, without a number": Style(names={"rudder": "rudder_deg"}),
     "within half a turn": Style(cells={"hdg": lambda x: f"{(x + 180) % 360 - 180:.4f}"}),
     "units in the cells": Style(
         names={name: text.split(" [")[0] for name, text in NAMES.items()},
@@ -193,6 +206,11 @@ WORDS: dict[str, Style] = {
         "cog": "Kurs über Grund [°]",
         "hdg": "Steuerkurs [°]", "rot": "Wendegeschwindigkeit [°/min]", "rpm": "Drehzahl [U/min]",
         "order": "Ruder Soll [°]", "rudder": "Ruder Ist [°]"}),
+    "German, of pilots": Style(separator="\t", encoding="utf-16", names={
+        "time": "Zeit", "lat": "Breite", "lon": "Länge", "sog": "Fahrt (kn)", "cog": "Kurs (°)", "hdg": "Heading (°)",
+        "rot": "Drehrate (°/min)", "rpm": "Drehzahl (U/min)", "order": "Ruder Soll (°)", "rudder": "Ruder Ist (°)"}),
+    "English of engineers": Style(names={
+        "rot": "Gyro Rate [deg/min]", "rpm": "Engine Speed [1/min]", "order": "Rudder cmd [deg]"}),
     "French": Style(separator=";", encoding="cp1252", names={
         "time": "Heure", "lat": "Latitude", "lon": "Longitude", "sog": "Vitesse fond (nds)", "cog": "Route fond (°)",
         "hdg": "Cap vrai (°)", "rot": "Taux de giration (°/min)", "rpm": "Régime (tr/min)",

@@ -246,6 +246,32 @@ def write_n2k(path: Path, trip: Voyage, *, form: str) -> Path:
     return path
 
 
+def write_signalk(path: Path, trip: Voyage, *, served: bool = False) -> Path:
+    """Deltas of Signal K, in SI units; as a server logs them, with another vessel among them and a second compass."""
+    lines = [json.dumps({"name": "server", "version": "2.0.0", "self": "vessels.urn:mrn:imo:mmsi:219000001"})]
+    columns = (trip.time_s, trip.lat_deg, trip.lon_deg, trip.heading_rad, trip.speed_mps, trip.course_rad, trip.r_radps,
+               trip.n_rps, trip.order_rad, trip.rudder_rad)  # fmt: skip
+    for k, row in enumerate(np.stack(columns, axis=1).tolist()):
+        time_s, lat, lon, heading, speed, course, rate, rps, order, rudder = row
+        place = {"latitude": lat, "longitude": lon}
+        paths = {"navigation.position": place, "navigation.speedOverGround": speed,
+                 "navigation.courseOverGroundTrue": course, "navigation.headingTrue": heading,
+                 "navigation.rateOfTurn": rate, "propulsion.main.revolutions": rps,
+                 "steering.autopilot.target.rudderAngle": order, "steering.rudderAngle": rudder}  # fmt: skip
+        deltas = [("vessels.urn:mrn:imo:mmsi:219000001", "n2k.12", paths)]
+        if served:
+            away = {"latitude": lat + 0.1, "longitude": lon}
+            deltas.append(("vessels.urn:mrn:imo:mmsi:230000002", "ais.1", {"navigation.position": away}))
+            deltas += [("vessels.self", "compass.2", {"navigation.headingTrue": heading + 0.1})] * (k % 2)
+        for vessel, source, own in deltas:
+            values = [{"path": name, "value": value} for name, value in own.items()]
+            update = {"$source": source, "timestamp": iso(time_s), "values": values}
+            lines.append(json.dumps({"context": vessel, "updates": [update]}))
+            lines[-1] = f"{time_s * 1e3 + 30:.0f};I;{lines[-1]}" if served else lines[-1]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 def write_excel(path: Path, trip: Voyage) -> Path:
     """A sheet with a header, units below it, and dates."""
     import openpyxl

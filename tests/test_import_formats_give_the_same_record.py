@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import struct
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
@@ -12,10 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from pynmeagps import NMEAReader
 
 from expdesign.cli import main
-from expdesign.importing import read_log
+from expdesign.errors import FileError
+from expdesign.importing import guess, read_log
 from logged_trial import (
     RATE_RADPS,
     SHIP,
@@ -35,6 +38,7 @@ from logged_trial import (
     write_own,
     write_parquet,
     write_ros,
+    write_signalk,
     write_telemetry,
     write_ulog,
 )
@@ -112,6 +116,12 @@ CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path], dict[str, float], se
             f"a.{form}", partial(write_n2k, form=form), BUS, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}
         )
         for form in ("plain", "candump", "frames", "ascii", "json")
+    },
+    **{
+        f"signal k{served * ' of a server'}": (
+            "a.log", partial(write_signalk, served=served), FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}
+        )
+        for served in (False, True)
     },
     "excel": ("a.xlsx", write_excel, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
     "parquet": ("a.parquet", write_parquet, FINE, {"n1_rps", "rudder1_rad", "reached_rudder1_rad"}),
@@ -236,6 +246,64 @@ def test_each_sentence_is_read_as_its_definition_says(body: str, tmp_path: Path)
     assert {channel.name: channel.values[0] for channel in log.channels} == pytest.approx(SENTENCES[body], abs=1e-9)
     assert all(abs(channel.time_s[0] - 1_760_011_200.0) < 1e-6 for channel in log.channels)
     assert log.clock == "satellite time"
+
+
+@pytest.mark.parametrize("received", [False, True])
+def test_reports_of_the_own_ships_ais_are_read(received: bool, tmp_path: Path, trip: Voyage) -> None:
+    pyais = pytest.importorskip("pyais")
+    part, lines = trip.every(20), []
+    for k, time_s in enumerate(part.time_s.tolist()):
+        own = {"msg_type": (1, 2, 3, 18)[k % 4], "mmsi": 219000001, "lat": part.lat_deg[k], "lon": part.lon_deg[k],
+               "speed": part.speed_mps[k] / KNOT, "course": math.degrees(part.course_rad[k]),
+               "heading": 511 if k % 10 == 9 else round(math.degrees(part.heading_rad[k])) % 360}  # fmt: skip
+        (line,) = pyais.encode_dict(own, talker_id="AI", sentence_type="VDO")
+        clock = f"{datetime.fromtimestamp(time_s, UTC):%H%M%S.%f,%d,%m,%Y}"
+        lines += [f"{time_s:.1f} {line}"] if received else [sentence(f"GPZDA,{clock},00,00"), line]
+    away = {"msg_type": 1, "mmsi": 230000002, "lat": 10.0, "lon": 10.0}
+    others = pyais.encode_dict(away, talker_id="AI", sentence_type="VDM")
+    spoilt = line[:24] + ("1" if line[24] == "0" else "0") + line[25:]  # its checksum is wrong now
+    lines += [spoilt] * (not received)
+    (tmp_path / "a.nmea").write_text("\n".join([*lines, *others * (not received)]) + "\n")
+    table = {channel.name: channel for channel in read_log(tmp_path / "a.nmea").channels}
+    # a report has ten-thousandths of minutes, tenths of knots and of degrees, and whole degrees of heading
+    assert np.abs(table["AIVDO.lat"].values - part.lat_deg).max() < 1e-4 / 60
+    assert np.abs(table["AIVDO.spd"].values - part.speed_mps / KNOT).max() < 0.1
+    assert len(table["AIVDO.headt"]) == len(part.time_s) - len(part.time_s) // 10
+    assert np.abs(table["AIVDO.lat"].time_s - part.time_s).max() < 1e-3
+    uses = {use.channel: use.column for use in guess([read_log(tmp_path / "a.nmea")]).uses}
+    assert uses == {"AIVDO.lat": "lat_deg", "AIVDO.lon": "lon_deg", "AIVDO.spd": "sog_mps", "AIVDO.cog": "cog_rad",
+                    "AIVDO.headt": "heading_rad"}  # fmt: skip
+
+
+def test_rows_of_structures_are_a_table_and_objects_of_matlab_are_told(tmp_path: Path, trip: Voyage) -> None:
+    part = trip.every(50)
+    rows = np.zeros(len(part.time_s), dtype=[("t", "O"), ("hdg", "O")])
+    rows["t"], rows["hdg"] = part.time_s - START_S, np.degrees(part.heading_rad)
+    scipy.io.savemat(tmp_path / "a.mat", {"log": rows})
+    (heading,) = read_log(tmp_path / "a.mat").channels
+    assert np.allclose(heading.values, np.degrees(part.heading_rad), atol=1e-12)
+    assert np.allclose(heading.time_s, part.time_s - START_S)
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    places = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 2, 1)) + element(1, b"")
+    inner = element(14, places + element(6, struct.pack("<II", 1, 2)))
+    flags = element(6, struct.pack("<II", 17, 0))  # an opaque object, as MATLAB writes a table
+    table = element(14, flags + element(1, b"T") + element(1, b"MCOS") + element(1, b"timetable") + inner)
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
+    (tmp_path / "b.mat").write_bytes(head + table)
+    with pytest.raises(FileError, match=r"T: is a table, a timetable .* expected vectors or a file of writetable"):
+        read_log(tmp_path / "b.mat")
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "c.mat", "w") as file:
+        own = [file.create_dataset(f"#refs#/{k}", data=[[value]]).ref for k, value in enumerate(rows["hdg"])]
+        file.create_dataset("log/hdg", data=np.array([own], dtype=h5py.ref_dtype))
+        file["log/t"] = np.array(rows["t"], dtype=float)
+        file.create_dataset("T", data=np.zeros((1, 6), "u4")).attrs["MATLAB_object_decode"] = 3
+    log = read_log(tmp_path / "c.mat")
+    assert np.allclose(log.channels[0].values, np.degrees(part.heading_rad), atol=1e-12)
+    assert log.unused == ("T (an object of MATLAB)",)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 HEAD = "time,lat,lon,sog,cog,hdg,rpm,rudder"
 ROWS = [f"{k},54.{k:05d},18.5,5.0,{k},{k},3.0,{k // 20 % 2 * 10}" for k in range(60)]
-TABLE = "\n".join([HEAD, *ROWS])
+TABLE = "\n".join([HEAD, *ROWS, ""])
 
 
 def packed(**files: str) -> bytes:
@@ -45,6 +45,9 @@ NO_LOGS = {
     "gzip": (gzip.compress(TABLE.encode()), "is compressed by gzip, expected it unpacked"),
     "PDF": (b"%PDF-1.4\n" + bytes(range(256)), "is a PDF"),
     "zip": (packed(notes="hi"), "is a zip archive with notes, expected the log itself"),
+    "Signal K without times": (
+        b'{"updates":[{"values":[{"path":"navigation.headingTrue","value":1.0}]}]}\n' * 9, "is Signal K without"
+    ),
     "NMEA 2000 without times": (b"<0x18eeff01> [8] 05 a0 be 1c 00 a0 a0 c0\n" * 9, "is NMEA 2000 without times"),
     "NMEA 2000 of other things": (b"(1502979132.1) can0 18EEFF01#05A0BE1C00A0A0C0\n" * 9, "without rudder, heading"),
 }  # fmt: skip
@@ -75,6 +78,23 @@ def test_a_spreadsheet_that_unpacks_without_end_is_refused(tmp_path: Path, monke
         read_log(path)
 
 
+def test_sheets_beside_the_first_and_a_full_sheet_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in [HEAD.split(","), *([float(cell) for cell in row.split(",")] for row in ROWS)]:
+        book.active.append(row)
+    book.create_sheet("second half").append([1.0, 2.0])
+    book.save(tmp_path / "a.xlsx")
+    log = read_log(tmp_path / "a.xlsx")
+    assert log.unused == ("sheet second half",)
+    assert not any("are filled" in note for note in log.notes)
+    monkeypatch.setattr("expdesign.importing.readers.sheets.MOST_ROWS", 61)
+    assert any(note.startswith("all 61 rows of the sheet are filled") for note in read_log(tmp_path / "a.xlsx").notes)
+    monkeypatch.setattr("expdesign.importing.readers.sheets.MOST_ROWS", 60)
+    with pytest.raises(FileError, match="more than 60 rows"):
+        read_log(tmp_path / "a.xlsx")
+
+
 def test_columns_of_one_name_are_kept_apart_and_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(TABLE.replace("hdg,rpm", "hdg,hdg").replace(",3.0,", ",90.0,"))
     names = [channel.name for channel in read_log(tmp_path / "a.csv").channels]
@@ -91,7 +111,7 @@ def test_readings_that_nothing_can_be_are_left_out_and_told(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "text", [TABLE, "\n".join([HEAD, *ROWS[::-1]]), "\n".join([HEAD, *ROWS[:30][::-1], *ROWS[30:]])]
+    "text", [TABLE, "\n".join([HEAD, *ROWS[::-1], ""]), "\n".join([HEAD, *ROWS[:30][::-1], *ROWS[30:], ""])]
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
 def test_order_of_rows_and_encoding_make_no_difference(text: str, encoding: str, tmp_path: Path) -> None:

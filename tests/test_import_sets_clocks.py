@@ -104,6 +104,25 @@ def test_lags_of_noisy_series_are_within_their_standard_errors() -> None:
     assert np.abs(scores).max() < 5
 
 
+@pytest.mark.parametrize("heading", [0.3, 2.0])
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("late_s", [0.0, 40.0])
+def test_a_course_turns_later_than_a_heading_by_the_drift(late_s: float, swapped: bool, heading: float) -> None:
+    trip = voyage(parts=(("steady", 30.0), ("zigzag", 120.0), ("steady", 60.0), ("circle", 150.0)), heading=heading)
+    part = trip.every(5)
+    gyro = {"heading_rad": Channel(name="h", source="a", time_s=part.time_s + late_s, values=part.heading_rad)}
+    course = {
+        name: Channel(name=name, source="b", time_s=part.time_s, values=values)
+        for name, values in (("cog_rad", part.course_rad), ("sog_mps", part.speed_mps))
+    }
+    own, other = (course, gyro) if swapped else (gyro, course)
+    found = lag_of(own, other, near=True, length_m=(50.0, 0.0))
+    assert found is not None
+    assert abs(found.offset_s + (-late_s if swapped else late_s)) < 2 * found.std_s
+    assert "late by" in found.by
+    assert found.std_s < 2.5  # a fifth of the time in which she sails her length
+
+
 def test_logs_that_saw_nothing_alike_are_not_put_together(
     tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,6 +17,7 @@ from logged_trial import (
     Voyage,
     logger_rows,
     nmea,
+    sentence,
     voyage,
     write_dialect,
     write_nmea,
@@ -195,3 +196,40 @@ def test_readings_that_a_log_repeats_give_noise_and_interval_of_their_own(tmp_pa
     # of 1300 and 6500 readings: a robust deviation of third differences is known to about 4 and 2 per cent
     assert float(sensors["position_m"]) == pytest.approx(0.3, rel=0.15)
     assert float(sensors["heading_rad"]) == pytest.approx(math.radians(0.2), rel=0.08)
+
+
+@pytest.mark.parametrize("quoted", [False, True])
+@pytest.mark.parametrize("form", [".1f", ".4f", ".0f"])
+def test_a_table_that_is_cut_anywhere_in_its_last_line_gives_no_wrong_reading(
+    form: str, quoted: bool, tmp_path: Path
+) -> None:
+    rows = [[f"{k:{form}}", f"{54 + k / 1e4:.6f}", "18.500000", f"{5 * (k % 9):{form}}"] for k in range(95, 125)]
+    lines = [
+        ",".join(f'"{cell}"' if quoted else cell for cell in row) for row in (["time", "lat", "lon", "hdg"], *rows)
+    ]
+    whole = "\n".join(lines) + "\n"
+    for end in range(len(whole) - len(lines[-1]), len(whole) + 1):
+        (tmp_path / "a.csv").write_text(whole[:end])
+        log = read_log(tmp_path / "a.csv")
+        table = {channel.name: channel.values for channel in log.channels}
+        rest = whole[len(whole) - len(lines[-1]) - 1 : end].strip()
+        count = len(table["hdg"])
+        assert np.allclose(table["hdg"], [5 * (k % 9) for k in range(95, 125)][:count], atol=0)
+        assert np.allclose(table["lat"], [54 + k / 1e4 for k in range(95, 125)][:count], atol=1e-9)
+        assert count == 30 or not rest or any("left out" in note for note in log.notes)
+    assert count == 30
+
+
+def test_sentences_that_are_cut_anywhere_give_no_wrong_reading(tmp_path: Path) -> None:
+    lines = [
+        sentence(body)
+        for k in range(20)
+        for body in (f"GPZDA,1200{k:02d}.00,09,10,2025,00,00", f"HEHDT,{100 + k}.25,T")
+    ]
+    whole = "\n".join(lines) + "\n"
+    for end in range(len(whole) - len(lines[-1]) - 1, len(whole)):
+        (tmp_path / "a.nmea").write_text(whole[:end])
+        log = read_log(tmp_path / "a.nmea")
+        (heading,) = log.channels
+        assert np.array_equal(heading.values, 100.25 + np.arange(len(heading)))
+        assert len(heading) in (19, 20)

@@ -20,8 +20,8 @@ from expdesign.interruptions import interruptions_wait
 REMAINS = re.compile(r"\..+\.(\d+)-[0-9a-f]{12}\.(?:new|old)")
 """Names of temporary files, with the process that writes them."""
 NOT_DRAWN = re.compile(r'<p class="not-drawn">(.*?)</p>', re.DOTALL)
-Content = str | bytes | Callable[[], str]
-"""Of a file; a page is a function that draws it."""
+Content = str | bytes | Path | Callable[[], str]
+"""Of a file, or a file that is copied; a page is a function that draws it."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,13 @@ class _Slot:
     beside: Path
     before: Path
 
-    def write(self, content: bytes) -> None:
+    def write(self, content: bytes | Path) -> None:
         with self.beside.open("xb") as file:
-            file.write(content)
+            if isinstance(content, Path):
+                with content.open("rb") as source:
+                    shutil.copyfileobj(source, file)
+            else:
+                file.write(content)
             file.flush()
             os.fsync(file.fileno())
 
@@ -113,7 +117,7 @@ def gaps(paths: Sequence[Path]) -> tuple[str, ...]:
     return tuple(f"{path}: {found}" for path in pages for found in NOT_DRAWN.findall(path.read_text(encoding="utf-8")))
 
 
-def _write(folder: Path, files: Mapping[str, str | bytes]) -> None:
+def _write(folder: Path, files: Mapping[str, str | bytes | Path]) -> None:
     """Write all files, or none.
 
     Raises:
@@ -161,7 +165,7 @@ def _slot(folder: Path, name: str, mark: str) -> _Slot:
     return _Slot(folder / name, folder / f".{name}.{mark}.new", folder / f".{name}.{mark}.old")
 
 
-def _write_beside(slots: list[_Slot], contents: list[bytes], stop_here: Callable[[], None]) -> None:
+def _write_beside(slots: list[_Slot], contents: list[bytes | Path], stop_here: Callable[[], None]) -> None:
     try:
         for slot, content in zip(slots, contents, strict=True):
             stop_here()

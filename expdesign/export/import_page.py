@@ -19,6 +19,7 @@ from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, 
 from expdesign.export.words import counted
 from expdesign.importing import Followed, Log, Run, Sampled, inputs_of
 from expdesign.importing import Mapping as Decisions
+from expdesign.values import Array
 from expdesign.vessel import response_keys, stem
 
 MOST_POINTS = 4000
@@ -243,7 +244,7 @@ def import_document(content: ImportContent, folder: Path) -> Document:
             "Fitted to orders and positions reached; instruments.toml has them, and other "
             "commands use them where the vessel file says nothing.",
         ),
-        section("Sensors", Table(header=("Key under [sensors]", "Value", "From"), rows=sensors)),
+        section("Sensors", Table(header=("Key under [sensors]", "Value", "From"), rows=sensors, texts=3)),
     )
     return Document(
         kind="Imported logs",
@@ -318,6 +319,13 @@ def _track(content: ImportContent) -> Markup:
     return svg(figure, key="track", label="way over ground with the runs")
 
 
+def _within_turn(degrees: Array) -> Array:
+    """Headings from 0 to 360 degrees, with a gap where they pass north."""
+    shown = degrees % 360.0
+    shown[1:][np.abs(np.diff(shown)) > 180.0] = np.nan
+    return shown
+
+
 @page_figure
 def _series(content: ImportContent) -> Markup:
     """Heading, speed and inputs over time, runs shaded."""
@@ -331,12 +339,15 @@ def _series(content: ImportContent) -> Markup:
             values = inputs_of(stretch.columns).get(name, stretch.columns.get(name))
             if values is not None:
                 thin = _thin(len(stretch))
-                axes.plot((stretch.time_s[thin] - content.origin_s) / 60.0, values[thin] * (DEGREES if angle else 1.0),
-                          color="#0072B2", linewidth=0.8)  # fmt: skip
+                shown = values[thin] * (DEGREES if angle else 1.0)
+                shown = _within_turn(shown) if name == "heading_rad" else shown
+                axes.plot((stretch.time_s[thin] - content.origin_s) / 60.0, shown, color="#0072B2", linewidth=0.8)
         for k, run in enumerate(content.runs):
             ends = (run.stretch.time_s[[0, -1]] - content.origin_s) / 60.0
             axes.axvspan(*ends, color=LINES[k % len(LINES)], alpha=0.15, linewidth=0)
-        axes.set_ylabel(name.replace("_rad", " deg").replace("_", " "), fontsize=8)
+        words = {"heading_rad": "heading [deg]", "u_mps": "ahead [m/s]"}
+        unit = "deg" if angle else "1/s" if name.endswith("_rps") else "-"
+        axes.set_ylabel(words.get(name, f"{name.removesuffix('_rad').removesuffix('_rps')} [{unit}]"), fontsize=8)
         light_grid(axes)
         axes.set_xlabel("time [min]")
         axes.label_outer()

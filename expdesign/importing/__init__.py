@@ -28,6 +28,7 @@ from expdesign.importing.runs import (
     cut_by_plan,
     file_name,
     inputs_of,
+    length_of_speed_m,
     typical_length_m,
 )
 from expdesign.importing.sampling import NothingToWrite, Sampled, Stretch, sampled

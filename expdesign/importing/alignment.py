@@ -30,6 +30,7 @@ NEAR_S = 120.0  # by which a computer's clock may be off [s]
 LIKE = 0.3  # least squared correlation that tells a lag
 MOST_SAMPLES = 400_000
 OVERLAP = 0.5  # of the shorter series at a lag, at least
+LEAST_SPEED = 0.1  # m/s
 SLOW = 0.3  # share of the usual speed below which that does not count
 
 
@@ -51,31 +52,37 @@ class _Series:
     time_s: Array
     values: Array
     speed: Array | None = None  # beside a turn, where it is known [m/s]
+    is_course: bool = False  # whether the turn is that of the course, not of the heading
 
 
-def lag_of(own: Mapping[str, Channel], other: Mapping[str, Channel], *, near: bool) -> Lag | None:
+def lag_of(
+    own: Mapping[str, Channel], other: Mapping[str, Channel], *, near: bool, length_m: tuple[float, float] = (0.0, 0.0)
+) -> Lag | None:
     """What is to be added to the times of a file so that it fits another one; None where nothing tells.
 
     Args:
         own: column -> channel in its unit, of the file whose clock is sought.
         other: those of the file with the clock that is kept.
         near: whether both clocks count from the same origin, and are off by little.
+        length_m: of the ship, by which the course is late in turns, and its standard error [m].
     """
     found = []
     for one, two, how in _pairs(own, other):
-        lag = _lag(one, two, how, near=near)
+        lag = _lag(one, two, how, near=near, length_m=length_m)
         if lag is not None:
             found.append(lag)
     return max(found, key=lambda lag: (lag.explained > LIKE, -lag.std_s), default=None)
 
 
-def zone_lag_of(own: Mapping[str, Channel], other: Mapping[str, Channel]) -> tuple[Lag, str] | None:
+def zone_lag_of(
+    own: Mapping[str, Channel], other: Mapping[str, Channel], *, length_m: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Lag, str] | None:
     """What is to be added to a dated clock that is of another zone, or weeks of GPS behind, and words; None for none.
 
     A lag counts only where both saw the same, and where it is whole quarters of an hour, or 1024 weeks, but for what a
     computer's clock may be off.
     """
-    lag = lag_of(own, other, near=False)
+    lag = lag_of(own, other, near=False, length_m=length_m)
     if lag is None or lag.explained < SAME:
         return None
     weeks = round(lag.offset_s / ROLLOVER_S)
@@ -112,12 +119,13 @@ def _series(table: Mapping[str, Channel]) -> Iterator[_Series]:
         times = table["r_radps"].time_s
         yield _Series("turn", times, table["r_radps"].values, beside(times))
     else:
-        angle = next((table[name] for name in ("heading_rad", "magnetic_heading_rad", COG) if name in table), None)
+        names = ("heading_rad", "magnetic_heading_rad", COG)
+        angle = next((table[name] for name in names if name in table), None)
         if angle is not None and len(angle) > 3:
             turned = np.unwrap(angle.values)
             steps = np.maximum(np.diff(angle.time_s), 1e-6)
             times = (angle.time_s[1:] + angle.time_s[:-1]) / 2
-            yield _Series("turn", times, np.diff(turned) / steps, beside(times))
+            yield _Series("turn", times, np.diff(turned) / steps, beside(times), is_course=angle is table.get(COG))
     if speed is not None:
         yield _Series("speed", speed.time_s, speed.values)
     elif NORTHWARD in table and EASTWARD in table and len(table[NORTHWARD]) == len(table[EASTWARD]):
@@ -129,13 +137,13 @@ def _series(table: Mapping[str, Channel]) -> Iterator[_Series]:
             yield _Series(f"rudder {name.removeprefix('reached_')}", table[name].time_s, table[name].values)
 
 
-def _lag(one: _Series, two: _Series, how: str, *, near: bool) -> Lag | None:
+def _lag(one: _Series, two: _Series, how: str, *, near: bool, length_m: tuple[float, float]) -> Lag | None:
     step_s = float(np.clip(max(np.median(np.diff(s.time_s)) for s in (one, two)) / 2, *STEP_S))
     length = max(np.ptp(one.time_s), np.ptp(two.time_s)) / step_s
     step_s *= max(1.0, length / MOST_SAMPLES)
     x, y = _even(one, step_s), _even(two, step_s)
     if how == "follows":  # as where the rudder is this file's, but for the sign
-        found = _lag(two, one, "causes", near=near)
+        found = _lag(two, one, "causes", near=near, length_m=length_m)
         return None if found is None else replace(found, offset_s=-found.offset_s)
     beside = np.zeros(0)
     if how == "causes":
@@ -164,9 +172,25 @@ def _lag(one: _Series, two: _Series, how: str, *, near: bool) -> Lag | None:
         kept = [part for part in parts if abs(part - median) * step_s < 3.0]
         place = float(np.mean(kept))
         std_s = float(np.hypot(np.std(kept, ddof=1) / np.sqrt(len(kept)), 0.05)) * step_s
-    offset_s = two.time_s[0] - one.time_s[0] + place * step_s
-    return Lag(offset_s=float(offset_s), std_s=float(std_s), by=one.what if how == "like" else "rudder and turn",
-               explained=explained)  # fmt: skip
+    offset_s, by = two.time_s[0] - one.time_s[0] + place * step_s, one.what if how == "like" else "rudder and turn"
+    if two.is_course or (one.is_course and how == "like"):
+        late_s, late_std_s = _drift_s(two if two.is_course else one, length_m)
+        both = one.is_course and two.is_course
+        offset_s -= 0.0 if both else late_s if two.is_course else -late_s
+        std_s = std_s if both else np.hypot(std_s, late_std_s)
+        by = by if both else f"{by} of heading and course, which in a turn is late by {late_s:.2g} s of drift"
+    return Lag(offset_s=float(offset_s), std_s=float(std_s), by=by, explained=explained)
+
+
+def _drift_s(turn: _Series, length_m: tuple[float, float]) -> tuple[float, float]:
+    """How much later than the heading the course turns, as ships drift: the way to the pivot point; and how unsure [s].
+
+    The pivot point of a turning ship is a fourth to a third of her length behind the bow (Tzeng, 1998), and further
+    aft for broad ones: here a fourth ahead of midships, with a standard error of a tenth.
+    """
+    speed = LEAST_SPEED if turn.speed is None else max(float(np.median(turn.speed)), LEAST_SPEED)
+    own, std = length_m
+    return 0.25 * own / speed, float(np.hypot(0.1 * own, 0.25 * std)) / speed
 
 
 def _even(series: _Series, step_s: float) -> Array:

@@ -6,14 +6,14 @@ Times count from 1970 UTC where the clock is that of a satellite receiver or a c
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.values import Array, seal
+from expdesign.values import Array, closed, seal
 
 Places = NDArray[np.signedinteger[Any]]
 """Indices of rows."""
@@ -39,10 +39,17 @@ class Channel:
     values: Array  # (k,) finite
 
     def __post_init__(self) -> None:
+        for array in (self.time_s, self.values):  # taken over, as a day of readings is not to be copied
+            if isinstance(array, np.ndarray):
+                closed(array)
         seal(self, time_s="k", values="k")
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def without_readings(self) -> Channel:
+        """Its name alone."""
+        return replace(self, time_s=np.zeros(0), values=np.zeros(0))
 
     @property
     def interval_s(self) -> float:
@@ -60,6 +67,10 @@ class Log:
     channels: tuple[Channel, ...]
     notes: tuple[str, ...] = ()  # what was broken, converted, taken for granted
     unused: tuple[str, ...] = ()  # what stands in the file and is no channel
+
+    def without_readings(self) -> Log:
+        """The names of its channels alone."""
+        return replace(self, channels=tuple(channel.without_readings() for channel in self.channels))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,16 +161,18 @@ def channels_of(
 ) -> tuple[list[Channel], list[str]]:
     """Channels of a table whose rows (k,) share a clock, and notes on it; readings that are no numbers are left out."""
     order, times, notes = set_right(np.asarray(time_s, dtype=float), what=what or source)
+    in_order = len(order) == len(time_s) and bool((np.diff(order) == 1).all())
     found, beyond = [], []
     for name, values in columns.items():
-        own = np.asarray(values, dtype=float)[order]
+        own = np.asarray(values, dtype=float)
+        own = own if in_order else own[order]
         known = np.abs(own) < LARGEST
         beyond += [name] * bool((np.isfinite(own) & ~known).any())
         if known.any():
             unit = (units or {}).get(name, "")
             # most channels of a table have all readings, and then share its times
-            times_of = times if known.all() else times[known]
-            found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own[known]))
+            times_of, own = (times, own) if known.all() else (times[known], own[known])
+            found.append(Channel(name=f"{prefix}{name}", source=source, unit=unit, time_s=times_of, values=own))
     notes += [f"{', '.join(beyond)}: readings beyond {LARGEST:g} are left out"] * bool(beyond)
     return found, notes
 
@@ -176,4 +189,7 @@ class Blocks:
 
     def joined(self, name: str) -> Array:
         """All values of a name; empty where there are none."""
-        return np.concatenate(self.parts[name]) if self.parts.get(name) else np.zeros(0)
+        own = self.parts.get(name)
+        if own is not None and len(own) > 1:
+            own[:] = [np.concatenate(own)]  # in place of its blocks, so that both are not kept
+        return own[0] if own else np.zeros(0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from expdesign.importing.channels import Channel, Log
 from expdesign.importing.machines import numbered
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, FileClock, Mapping, Use
-from expdesign.importing.names import Mark, family_of, marked
+from expdesign.importing.names import COURSE_OR_HEADING, Mark, family_of, marked
 from expdesign.importing.readings import used
 from expdesign.vessel import Actuator
 
@@ -23,6 +24,8 @@ def guess(logs: Sequence[Log], actuators: Sequence[Actuator] = ()) -> Mapping:
     """
     channels = [channel for log in logs for channel in log.channels]
     marks = [marked(channel) for channel in channels]
+    if any(mark.column == "heading_rad" and mark.rank < COURSE_OR_HEADING for mark in marks):
+        marks = [replace(mark, column=COG) if mark.rank == COURSE_OR_HEADING else mark for mark in marks]
     chosen = _best(channels, marks)
     uses = [
         used(channel, mark, channels, chosen) if chosen.get(mark.key) is channel else _unused(channel, mark, chosen)

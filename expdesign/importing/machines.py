@@ -34,6 +34,7 @@ def numbered(
     forces = not actuators or any(one.kind == "force" for one in actuators)
     throttles = {mark.machine for _, mark in own if mark.column == "throttle"}
     as_forces = shares and forces and len(throttles) < 2 and not any(mark.column in ("n", "a") for _, mark in own)
+    as_forces = as_forces and all(use.unit in SHARES for use, _ in own)  # an angle is no share
     machines = sorted({mark.machine for _, mark in own if mark.column != "rudder"}, key=_as_listed)
     rudders = sorted({mark.machine for _, mark in own if mark.column == "rudder"}, key=_as_listed)
     turning = {mark.machine for _, mark in own if mark.column == "a"}

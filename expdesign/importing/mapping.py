@@ -48,11 +48,12 @@ class Use:
 
     def applied(self, channel: Channel) -> Channel:
         """The channel in the column's unit."""
-        values = channel.values - (1500.0 if self.unit == "pwm" else 0.0)
+        values = channel.values - 1500.0 if self.unit == "pwm" else channel.values
         if self.unit == "ddmm":  # degrees and minutes run together
             size = np.abs(values)
             values = np.sign(values) * (np.floor(size / 100.0) + size % 100.0 / 60.0)
-        values = values * self.factor * self.scale + self.offset
+        factor = self.factor * self.scale
+        values = values * factor + self.offset if factor != 1.0 or self.offset else values
         return replace(channel, name=self.column, unit="", values=values)
 
 

@@ -11,9 +11,11 @@ import numpy as np
 from expdesign.importing.channels import Channel
 from expdesign.importing.mapping import COG, EASTWARD, MAGNETIC, NORTHWARD, SOG, VARIATION, dimension
 from expdesign.importing.units import FACTORS, KNOWN, SHARES, split_unit, unit_word, words
-from expdesign.records.file import Source, meaning
+from expdesign.records.file import Source, is_input, meaning
 from expdesign.values import Array
 
+COURSE_OR_HEADING = 3
+"""Rank of words that mean the heading, but for tables with another heading: there they mean the course."""
 RULES = (
     ("", 0, r"\b(des|desired|nav|target|tgt|wp|std|sigma|var|cov|err(or)?|quality|id|temp|volt\w*|curr\w*)\b"),
     ("", 0, r"\b(buoy|mark|waypoint|pin|committee|ais)\b"),
@@ -26,6 +28,7 @@ RULES = (
     ("lon_deg", 1, r"\b(lon|lng|long|longitude)\b"),
     ("roll_rate_radps", 0, r"\b(roll ?(rate|speed)|rollspeed|gyr\w* x|angular velocity x|xgyro|gx|rx)\b"),
     ("r_radps", 0, r"\b(rot|rate of turn|yaw ?rate|rate yaw|yawspeed|turn rate|r)$|\brot\b"),
+    ("r_radps", 1, r"\b(gyro|heading|hdg|turning) rate$"),
     ("r_radps", 1, r"\b(gyr\w* z|angular velocity z|zgyro|gz|rz)\b"),
     ("roll_rad", 0, r"\b(roll|heel|heeling)\b"),
     ("imu_lateral_mps2", 0, r"\b(acc\w* y|linear acceleration y|yacc|ay|lateral acceleration)\b"),
@@ -33,13 +36,20 @@ RULES = (
     (VARIATION, 0, r"\b(variation|mv|declination|magvar)\b"),
     (COG, 0, r"\b(course over ground|course made good)\b"),
     ("heading_rad", 0, r"\b(heading t|headt|true (heading|hdg)|(heading|hdg|hding) true|hdt|ths|gyro heading)\b"),
-    ("heading_rad", 1, r"\b(att|attitude) (yaw|heading)\b|\b(heading|hdg|hding|psi|kurs|hdg t)\b"),
+    ("heading_rad", 1, r"\b(att|attitude) (yaw|heading)\b|\b(heading|hdg|hding|psi|hdg t)\b"),
+    ("heading_rad", COURSE_OR_HEADING, r"\b(kurs|kurssi|koers)\b"),
     ("heading_rad", 2, r"\b(yaw|compass|gyro)\b"),
     (COG, 0, r"\b(cogt|cog|course over ground|course|track|tmg|ctmg|g crs)\b"),
+    ("n", 0, r"\b(engine|shaft|prop(eller)?|motor|screw) (speed|revs?)\b"),
     (NORTHWARD, 0, r"\b(vn|vel n|v north|velocity north)\b|\blocal position ned vx\b|global position int vx"),
     (EASTWARD, 0, r"\b(ve|vel e|v east|velocity east)\b|\blocal position ned vy\b|global position int vy"),
     (SOG, 0, r"\b(sogn|sog|speed over ground|ground ?speed|gps speed|gps spd|rmc spd)\b"),
-    (SOG, 1, r"\b(spd|speed|v ground|geschwindigkeit|nopeus|velocity|groundspeed)$"),
+    (
+        SOG,
+        1,
+        r"\b(spd|speed|v ground|velocity|groundspeed|geschwindigkeit|nopeus|fahrt|fart|vaart|snelheid|vitesse|"
+        r"hastighe[td]|velocidad|velocita)$",
+    ),
     ("u_mps", 0, r"^(?!.*\bgps\b).*\b(u|surge|longgroundspd|surge speed)$"),
     ("v_mps", 0, r"^(?!.*\bgps\b).*\b(v|sway|transgroundspd|sway speed)$"),
     ("depth_m", 0, r"\b(depth|depthm|dpt|sounding|dpth)\b"),
@@ -109,7 +119,7 @@ class Mark:
 def marked(channel: Channel) -> Mark:
     """What the name of a channel says, with its unit; x, y and z are told by their readings."""
     own = meaning(channel.name, 0)
-    if isinstance(own, Source):
+    if isinstance(own, Source) and not (is_input(own.name) and not re.search(r"\d|tau", channel.name)):
         return Mark(column=own.name, rank=-1, unit=f"times {own.factor!r}", exact=True, name=words(channel.name))
     bare, unit = split_unit(channel.name)
     name, unit = words(bare), channel.unit or unit
@@ -123,7 +133,7 @@ def marked(channel: Channel) -> Mark:
     if column == "" and re.search(ORDER, name):
         column, rank = _rule(whole, ACTUATOR_RULES) or ("", 9)
     if name in ("x", "y", "z"):
-        column, rank = _coordinate(name, channel.values), 3
+        column, rank = _coordinate(name, channel.values), 4
     if not _fits(column, unit_word(unit)):
         column = ""
     if column in BESIDE and np.ptp(channel.values) == 0:

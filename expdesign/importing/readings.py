@@ -19,6 +19,7 @@ RADIANS = {"heading_rad": 6.4, MAGNETIC: 6.4, COG: 6.4, "roll_rad": 1.6, "rudder
 """Largest size of an angle in radians, by column or kind."""
 MOST_DEGREES = {"lat_deg": 90.0, "lon_deg": 180.0}
 TURN_DEG = 360.5
+MOST_HELM_DEG, MOST_PERCENT = 75.0, 101.0
 SWAPPED = "no place"
 RADIANS_RATIO = 0.1
 """Way by positions over that by speed below which positions, read in degrees, are in radians."""
@@ -65,6 +66,8 @@ def used(channel: Channel, mark: Mark, channels: Sequence[Channel], chosen: dict
         return _by_fit(use, _going(channel, channels, chosen), ("kn", "mps", "kmph", "cmps"), mark.unit, usual="kn")
     if mark.unit:
         return replace(use, why="its name and unit")
+    if mark.column == "rudder" and MOST_HELM_DEG < largest < MOST_PERCENT:
+        return replace(use, unit="percent", why=f"its name; up to {largest:.4g}, which no rudder turns, so per cent")
     if kind == "angle":
         if (
             mark.column in DIRECTIONS

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.importing.channels import Channel
+from expdesign.importing.channels import LARGEST, Channel
 from expdesign.importing.noise import step_of, white_noise
 from expdesign.records.file import REACHED, is_input, is_turning_input
 from expdesign.values import Array
@@ -34,7 +34,6 @@ FINE_S = 0.1  # of the simulation, at most
 SHIFTS = 2  # steps in which the moment of each move is found
 NO_LAG = 0.02  # steps below which a lag is none
 EVEN = 0.9  # share of an order's intervals that are one and the same, where it is read at even times
-LARGEST = 1e300  # in place of a rate without limit
 LESS = 0.9  # share of the root mean square that a slew rate must leave, to be told
 
 
@@ -162,21 +161,21 @@ def _by_moves(jacobian: Array, left: Array, move: NDArray[np.signedinteger[Any]]
 
 def simulated(orders: Array, step_s: float, rate: float, lag_s: float, delay_s: float, start: float) -> Array:
     """(k,) position that is delivered of orders (k,), each held to the next."""
-    reach, begins = min(rate * step_s, LARGEST), np.flatnonzero(np.diff(orders, prepend=np.nan))
-    samples = np.diff(begins, append=len(orders))
-    position, positions = start, []
-    for order, reached in zip(orders[begins].tolist(), (reach * samples).tolist(), strict=True):
-        positions.append(position)
+    begins = np.flatnonzero(np.diff(orders, prepend=np.nan) != 0)  # of each order that stands
+    lasts = np.diff(begins, append=len(orders))
+    reach, position, at = min(rate * step_s, LARGEST), start, []
+    for order, steps in zip(orders[begins].tolist(), lasts.tolist(), strict=True):
+        at.append(position)
         way = order - position
-        position = order if abs(way) <= reached else position + math.copysign(reached, way)
-    gone_on = np.arange(len(orders)) - np.repeat(begins, samples)
-    ways = orders - np.repeat(positions, samples)
-    slewed: Array = orders - np.copysign(np.maximum(np.abs(ways) - reach * gone_on, 0.0), ways)
+        position = order if abs(way) <= steps * reach else position + math.copysign(steps * reach, way)
+    from_there, way_left = np.repeat(at, lasts), np.repeat(orders[begins] - at, lasts)
+    gone = reach * (np.arange(len(orders)) - np.repeat(begins, lasts))
+    slewed = from_there + np.clip(way_left, -gone, gone)
     if delay_s:  # also one that is negative
         times = step_s * np.arange(len(orders))
         slewed = np.interp(times - delay_s, times, slewed)
     if lag_s > 0:
-        gone = -math.expm1(-step_s / lag_s)
-        before = gone * lag_s / step_s - 1.0 + gone  # between samples the position goes straight
-        slewed = scipy.signal.lfilter([gone - before, before], [1.0, gone - 1.0], slewed - start) + start
+        done = -math.expm1(-step_s / lag_s)
+        before = done * lag_s / step_s - 1.0 + done  # between samples the position goes straight
+        slewed = scipy.signal.lfilter([done - before, before], [1.0, done - 1.0], slewed - start) + start
     return slewed

@@ -55,7 +55,12 @@ def typical_length_m(stretches: Sequence[Stretch]) -> float:
     speeds = [
         np.hypot(s.columns["u_mps"], s.columns["v_mps"]) for s in stretches if {"u_mps", "v_mps"} <= set(s.columns)
     ]
-    speed = float(np.quantile(np.concatenate(speeds), 0.8)) if speeds else 3.0
+    return length_of_speed_m(np.concatenate(speeds) if speeds else np.zeros(0))
+
+
+def length_of_speed_m(speeds: Array) -> float:
+    """Length of a ship of these speeds, (k,) in m/s [m]."""
+    speed = float(np.quantile(np.abs(speeds), 0.8)) if len(speeds) else 3.0
     return max(1.0, speed**2 / (9.81 * FROUDE**2))
 
 

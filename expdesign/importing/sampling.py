@@ -178,12 +178,11 @@ def _own_readings(table: dict[str, Channel]) -> tuple[dict[str, Channel], list[s
         own = [table[name] for name in pair if name in table]
         if not own or len({len(channel) for channel in own}) > 1:
             continue
-        values = np.column_stack([channel.values for channel in own])
-        how = held(values[:LOOKED_AT])
+        how = held(np.column_stack([channel.values[:LOOKED_AT] for channel in own]))
         if how is None or how.interpolated or how.interval != round(how.interval):
             continue
         interval = round(how.interval)
-        changes = np.flatnonzero((np.diff(values, axis=0) != 0).any(axis=1)) + 1
+        changes = np.flatnonzero(np.any([np.diff(channel.values) != 0 for channel in own], axis=0)) + 1
         counts = np.bincount(changes % interval, minlength=interval)
         if counts.max() < EVEN * len(changes):
             continue

@@ -148,6 +148,12 @@ def tells_month_first(texts: Sequence[str]) -> bool:
     return any(12 < int(found[1] or found[2]) < 32 for found in parts if found)
 
 
+def halves_of_days(texts: Sequence[str]) -> bool:
+    """Whether dates such as 3/4/2024 stand beside AM and PM, as where the month comes first."""
+    days = [int(found[1]) for text in texts if (found := re.match(r"\s*(\d{1,2})/\d{1,2}/\d{4}", text))]
+    return max(days, default=13) < 13 and any(re.search(r"(^|\d)\s*[AaPp][Mm]\s*$", text) for text in texts)
+
+
 def _day(text: str, day_first: bool) -> float:
     numbers = [int(part) for part in re.split("[-/.:]", text)]
     try:

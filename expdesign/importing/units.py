@@ -24,12 +24,14 @@ FACTORS: dict[str, dict[str, float]] = {
     "force": {"": 1.0},
 }  # fmt: skip
 """Dimension -> unit -> factor to the unit of our columns (rad, m/s, rad/s, deg, m, rps, m/s2)."""
-SHARES = {"percent": 0.01, "%": 0.01, "pwm": 1.0 / 500.0, "share": 1.0}
+SHARES = {**dict.fromkeys(("percent", "%", "pct", "perc", "prozent"), 0.01), "pwm": 1.0 / 500.0, "share": 1.0}
 """Units of an order that is a share of the largest, and their factor; of pulse widths the middle, 1500 us, is zero."""
 KNOWN = {unit for table in FACTORS.values() for unit in table if unit} | set(SHARES)
 ALIASES = {"kt": "kn", "kts": "kn", "knots": "kn", "knot": "kn", "degrees": "deg", "degree": "deg", "°": "deg",
            "m/s": "mps", "m/sec": "mps", "deg/s": "degps", "°/s": "degps", "deg/sec": "degps", "deg/min": "degpmin",
-           "°/min": "degpmin", "rad/s": "radps", "%": "percent", "1/min": "rpm", "km/h": "kmph"}  # fmt: skip
+           "°/min": "degpmin", "rad/s": "radps",
+           **dict.fromkeys(("%", "pct", "perc", "prozent"), "percent"),
+           "1/min": "rpm", "km/h": "kmph"}  # fmt: skip
 """Units as people write them -> one word for each."""
 LETTERS = str.maketrans({"ø": "o", "Ø": "O", "æ": "ae", "Æ": "Ae", "ß": "ss", "œ": "oe"})
 RATES = re.compile(r"_(deg|rad|km|m|cm|rev|r)_(s|min|h)(?:_1)?$")

@@ -76,9 +76,10 @@ def measured(words: list[str]) -> tuple[float, float, float]:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begun = time.perf_counter()
     code = (
-        "import resource, sys; from expdesign.cli import main; "
+        "import resource, sys; from pathlib import Path; from expdesign.cli import main; "
         f"resource.setrlimit(resource.RLIMIT_AS, ({LIMIT_MB} * 2**20,) * 2); "
-        "status = main(sys.argv[1:]); print(status, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+        "status = main(sys.argv[1:]); state = Path('/proc/self/status').read_text(); "
+        "print(status, state.partition('VmHWM:')[2].split()[0])"  # its own: ru_maxrss begins with that of its parent
     )
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
     status, peak_kb = done.stdout.split()[-2:]

@@ -17,6 +17,7 @@ from expdesign.importing.readers.n2k import is_n2k, read_n2k
 from expdesign.importing.readers.px4 import read_px4
 from expdesign.importing.readers.ros import is_ros, read_ros
 from expdesign.importing.readers.sheets import read_excel, read_parquet
+from expdesign.importing.readers.signalk import is_signalk, read_signalk
 from expdesign.importing.readers.text import is_text, read_text
 from expdesign.input_files import check_ends
 
@@ -60,6 +61,10 @@ READERS = (
         fits=_begins(b"MATLAB 7.3", b"\x89HDF"), read=read_matlab73, extra="logs",
     ),
     Reader(
+        name="Signal K", meaning="deltas as JSON, one a line, also behind the time and provider of a server's log",
+        fits=is_signalk, read=read_signalk,
+    ),
+    Reader(
         name="NMEA 2000",
         meaning="as text, by nmea2000: plain and fast lines of canboat and Actisense, frames of Yacht Devices, "
         "candump -L; JSON of canboat's analyzer",
@@ -68,7 +73,7 @@ READERS = (
     Reader(
         name="text",
         meaning="tables with any separator, decimal sign, header and clock; NMEA 0183, also behind times of reception, "
-        "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; both in one file",
+        "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; AIVDO, by pyais; both in one file",
         fits=is_text, read=read_text,
     ),
 )  # fmt: skip

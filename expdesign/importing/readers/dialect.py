@@ -39,6 +39,16 @@ class Dialect:
             return (line.split() for line in lines)
         return csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
 
+    def is_cut(self, line: str, before: str) -> bool:
+        """Whether a line may be cut: it has no end, and decimals of its last cell that tell nothing, or are fewer."""
+        if line.endswith("\n") or (line.endswith('"') and line.count('"') % 2 == 0):
+            return False
+        own, usual = (next(iter(self.rows([text.rstrip("\n")])), []) for text in (line, before))
+        if not own or len(own) != len(usual):
+            return False  # left out, as a line without the cells of a row
+        decimals = [len(row[-1].strip().partition("," if self.comma else ".")[2]) for row in (own, usual)]
+        return decimals[0] == 0 or decimals[0] < decimals[1]
+
 
 def encoding_of(path: Path) -> str:
     """Of a text.

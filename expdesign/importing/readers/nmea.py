@@ -6,17 +6,20 @@ five sentences at 10 Hz; here the lines of a block are taken apart column by col
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from datetime import date, timedelta
+from itertools import compress
+from typing import Any
 
 import numpy as np
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
 
 from expdesign.importing.channels import DAY_S, Blocks, Channel, epochs, spread
 from expdesign.importing.times import over_midnight, read_numbers, read_stamps, tells_month_first
-from expdesign.values import Array
+from expdesign.values import Array, closed
 
 FIELDS = {
     "RSA": "stbdangle:deg:stbdstatus portangle:deg:portstatus",
@@ -63,6 +66,9 @@ DOUBTS = {"GGA": ("quality", {"6": "estimated", "7": "put in by hand", "8": "sim
           "RMC": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"}),
           "GNS": ("posMode", {"E": "estimated", "M": "put in by hand", "S": "simulated"})}  # fmt: skip
 """Sentence -> field, and its marks of positions that no satellite gave."""
+OWN_SHIP = {"lat": ("lat", "deg", 91.0), "lon": ("lon", "deg", 181.0), "spd": ("speed", "kn", 102.3),
+            "cog": ("course", "deg", 360.0), "headt": ("heading", "deg", 511.0)}  # fmt: skip
+"""Reading -> field of pyais, unit, and what stands for none (ITU-R M.1371)."""
 WGS84 = ("", "W84", "P90", "999")
 PLACES = {name: {field: place for place, field in enumerate(NMEA_PAYLOADS_GET[name])} for name in FIELDS}
 INVALID = {"V", "0", "N", "NN", "NNN", "NNNN"}
@@ -71,6 +77,8 @@ TIMED = ("RMC", "GGA", "GNS", "GLL", "ZDA")
 WIND_UNITS = {"N": 1852.0 / 3600.0, "K": 1.0 / 3.6, "M": 1.0}
 XDR_UNITS = {"D": "deg", "M": "m", "N": "", "P": "percent"}
 ENDS = '"\r\n \x00'
+TWO_DIGITS = {form.format(number): number for number in range(256) for form in ("{:02X}", "{:02x}")}
+"""Of a checksum."""
 SENTENCE = re.compile(r"[$!]([A-Z]{2,4}[A-Z]{3}|P[A-Z0-9]+),")
 DATE_AND_TIME = re.compile(
     r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})[T ,;:_\t]+"
@@ -87,6 +95,7 @@ class Sentences:
     def __init__(self, source: str) -> None:
         self.source = source
         self.blocks = Blocks()
+        self.known: set[str] = set()  # talkers and sentences
         self.broken = self.garbled = self.unchecked = 0
         self.unread: Counter[str] = Counter()
         self.no_numbers = 0  # readings of transducers
@@ -96,104 +105,161 @@ class Sentences:
 
     def add(self, lines: Sequence[tuple[int, str]]) -> None:
         """Take lines with a "$" or a "!", each with its place in the file."""
-        kept: dict[str, list[tuple[int, str, str]]] = {}
+        kept: dict[str, list[Any]] = {}
         for place, line in lines:
-            found = SENTENCE.search(line)
-            if found is None:
-                self.garbled += 1
+            start = 0 if line[0] in "$!" else line.find("$")
+            name = line[start + 1 : line.find(",", start)]
+            if name not in self.known:
+                found = SENTENCE.search(line)
+                if found is None:
+                    self.garbled += 1
+                    continue
+                start, name = found.start(), found[1]
+                self.known.add(name)
+            body = line[start + 1 :].rstrip(ENDS)
+            if name.endswith("VDO"):
+                self._own_ship(name, place, f"!{body}", line[:start])
                 continue
-            name = found[1]
             maker = MAKERS.get(name)
-            if maker and not (maker[0] and not line[found.end() :].startswith(f"{maker[0]},")):
-                kept.setdefault(name, []).append((place, line[: found.start()], line[found.start() + 1 :].rstrip(ENDS)))
-                continue
-            if name[-3:] not in FIELDS or name[0] == "P":
+            read = name[0] != "P" and name[-3:] in FIELDS
+            if (maker and maker[0] and not body.startswith(f"{name},{maker[0]},")) or not (maker or read):
                 self.unread[name] += 1
                 continue
-            body = line[found.start() + 1 :].rstrip(ENDS)
-            kept.setdefault(name, []).append((place, line[: found.start()], body))
-        for name, group in kept.items():
-            self._take(name, group)
+            own = kept.setdefault(name, [])
+            own += (
+                place,
+                line[:start],
+                *body.partition("*"),
+            )  # in one list: a million small ones cost more than all else
+        for name, own in kept.items():
+            self._take(name, *(own[part::5] for part in range(5)))
 
-    def _take(self, name: str, group: list[tuple[int, str, str]]) -> None:
-        """Lines of one talker and sentence."""
-        whole = _checked([body for _, _, body in group])
-        self.broken += int((whole < 0).sum())
-        self.unchecked += int((whole == 0).sum())
-        group = [line for line, good in zip(group, whole, strict=True) if good >= 0]
-        if not group:
+    def _own_ship(self, name: str, place: int, line: str, prefix: str) -> None:
+        """Position, course, speed and heading that the ship's own AIS sends, by pyais."""
+        try:
+            import pyais
+        except ModuleNotFoundError:
+            self.unread[f"{name}, which needs pyais: pip install 'expdesign[logs]'"] += 1
             return
-        self.count += len(group)
-        rows = [body.partition("*")[0].split(",")[1:] for _, _, body in group]
-        places = np.array([place for place, _, _ in group], dtype=float)
+        text, star, end = line[1:].partition("*")
+        if not star or not _checked([text], [star], [end])[0]:
+            self.broken += 1
+            return
+        try:
+            message: dict[str, Any] = pyais.decode(line).asdict()
+        except pyais.exceptions.AISBaseException:  # of several sentences, which has no position, or unknown
+            message = {"msg_type": "no position"}
+        if "lat" not in message or not math.isfinite(float(message["lat"])) or abs(message["lat"]) > 90.0:
+            self.unread[f"{name} of type {message.get('msg_type')}"] += 1
+            return
+        self.count += 1
+        at = np.array([place], dtype=float)
+        for what, (field, unit, none) in OWN_SHIP.items():
+            value = float(message.get(field, none))
+            self._keep(f"{name}.{what}", unit, at, np.array([value]), np.array([value < none]))
+        self._received([prefix], at)
+
+    def _take(
+        self, name: str, numbers: list[int], prefixes: list[str], texts: list[str], stars: list[str], ends: list[str]
+    ) -> None:
+        """Lines of one talker and sentence: places, what is before it, the sentence, its star and its checksum."""
+        good = _checked(texts, stars, ends)
+        if 2 * (checked := sum(map(bool, stars))) > len(stars) > checked:  # others have one: these are cut
+            good = [own and bool(star) for own, star in zip(good, stars, strict=True)]
+        if not all(good):
+            self.broken += len(good) - sum(good)
+            numbers, prefixes = list(compress(numbers, good)), list(compress(prefixes, good))
+            texts, stars = list(compress(texts, good)), list(compress(stars, good))
+        if not texts:
+            return
+        self.count += len(texts)
+        self.unchecked += len(texts) - sum(map(len, stars))
+        commas = [text.count(",") for text in texts]
+        most = max(commas)
+        cells = ",".join([text + "," * (most - own) for text, own in zip(texts, commas, strict=True)]).split(",")
+        columns = [cells[place :: most + 1] for place in range(1, most + 1)]
+        places = closed(np.array(numbers, dtype=float))
         if name in MAKERS:
             for what, place in MAKERS[name][1].items():
-                values = _numbers([row[place] if place < len(row) else "" for row in rows])
-                good = np.isfinite(values)
-                self._keep(f"{name}.{what}", "deg", places[good], values[good])
-            self._received([prefix for _, prefix, _ in group], places)
+                if place < len(columns):
+                    values = _numbers(columns[place])
+                    self._keep(f"{name}.{what}", "deg", places, values, np.isfinite(values))
+            self._received(prefixes, places)
             return
         kind, at = name[-3:], PLACES[name[-3:]]
 
-        def column(field: str) -> list[str]:
-            return [row[at[field]] if at[field] < len(row) else "" for row in rows]
+        def column(field: str) -> Sequence[str]:
+            return columns[at[field]] if at[field] < len(columns) else [""] * len(places)
 
         if kind in DOUBTS:
             doubtful, words = DOUBTS[kind]
-            self.doubtful.update(f"{words[mark]} ({name})" for mark in column(doubtful) if mark in words)
+            marks = Counter(column(doubtful))
+            self.doubtful.update({f"{words[mark]} ({name})": marks[mark] for mark in words if marks[mark]})
         if kind == "DTM":
             self.datums.update(datum for datum in column("datum") if datum not in WGS84)
         elif kind in MACHINES:
-            self._by_machine(name, rows, places, column)
+            self._by_machine(name, places, column)
         elif kind == "XDR":
-            self._transducers(name, rows, places)
+            self._transducers(name, list(zip(*columns, strict=True)), places)
         else:
-            marks = ["", *(f".{mark}" for mark in "RT")] if kind == "MWV" else [""]
-            for item in FIELDS[kind].split():
-                field, unit, *valid = item.split(":")
-                unit, _, sign = unit.partition("/")
-                values = _numbers(column(field))
-                if field in ("lat", "lon"):
-                    values = np.floor(values / 100.0) + values % 100.0 / 60.0
-                if sign:
-                    values *= np.where(np.isin(column(sign), ("S", "W")), -1.0, 1.0)
-                if kind == "MWV" and field == "speed":
-                    values *= [WIND_UNITS.get(text, np.nan) for text in column("speedu")]
-                good = np.isfinite(values)
-                if valid:
-                    good &= ~np.isin(column(valid[0]), list(INVALID))
-                for mark in marks[1:] or marks:
-                    own = good & (np.array(column("reference")) == mark[1:]) if mark else good
-                    self._keep(f"{name}.{ORDERS.get(field, field)}{mark}", unit, places[own], values[own])
+            self._fields(name, places, column)
         if kind in TIMED:
             self._anchor(kind, places, column)
-        self._received([prefix for _, prefix, _ in group], places)
+        self._received(prefixes, places)
 
-    def _keep(self, name: str, unit: str, places: Array, values: Array) -> None:
-        if len(values):
-            self.blocks.add(f"{name}|{unit}|place", places)
-            self.blocks.add(f"{name}|{unit}|value", values)
+    def _fields(self, name: str, places: Array, column: Callable[[str], Sequence[str]]) -> None:
+        """Readings that stand in fields of their own."""
+        kind = name[-3:]
+        marks = ["R", "T"] if kind == "MWV" else [""]
+        valid_by: dict[str, np.ndarray] = {}
+        for item in FIELDS[kind].split():
+            field, unit, *valid = item.split(":")
+            unit, _, sign = unit.partition("/")
+            values = _numbers(column(field))
+            if field in ("lat", "lon"):
+                values = np.floor(values / 100.0) + values % 100.0 / 60.0
+            if sign:
+                values *= np.where(_among(column(sign), ("S", "W")), -1.0, 1.0)
+            if kind == "MWV" and field == "speed":
+                values *= [WIND_UNITS.get(text, np.nan) for text in column("speedu")]
+            good = np.isfinite(values)
+            if valid and valid[0] not in valid_by:
+                valid_by[valid[0]] = ~_among(column(valid[0]), INVALID)
+            good &= valid_by[valid[0]] if valid else True
+            for mark in marks:
+                own = good & _among(column("reference"), (mark,)) if mark else good
+                self._keep(f"{name}.{ORDERS.get(field, field)}{f'.{mark}' * bool(mark)}", unit, places, values, own)
 
-    def _by_machine(self, name: str, rows: list[list[str]], places: Array, column: Callable[[str], list[str]]) -> None:
+    def _keep(self, name: str, unit: str, places: Array, values: Array, good: np.ndarray) -> None:
+        """Readings where they are good; places of a sentence whose readings all are, are kept once."""
+        if good.any():
+            whole = good.all()
+            self.blocks.add(f"{name}|{unit}|place", places if whole else places[good])
+            self.blocks.add(f"{name}|{unit}|value", values if whole else values[good])
+
+    def _by_machine(self, name: str, places: Array, column: Callable[[str], Sequence[str]]) -> None:
         """Revolutions and azimuth of each engine, shaft or thruster by its number.
 
         Odd engines are to starboard, even ones to port; odd thrusters are at the bow, even ones at the stern.
         """
         number, parts = MACHINES[name[-3:]]
-        sources = column("source") if name[-3:] == "RPM" else ["T" if number == "thrusternum" else "E"] * len(rows)
-        keys = np.array([f"{source}{own}" for source, own in zip(sources, column(number), strict=True)])
+        numbers = column(number)
+        kind = "T" if number == "thrusternum" else "E"
+        sources = column("source") if name[-3:] == "RPM" else [kind] * len(places)
+        keys = list(zip(sources, numbers, strict=True))
         for field, words, mode, unit in parts:
             values = _numbers(column(field))
-            modes = np.array(column(mode or "status") if mode or name[-3:] == "RPM" else [""] * len(rows))
-            good = np.isfinite(values) & ~np.isin(modes, list(INVALID))
-            for key in np.unique(keys):
+            modes = column(mode or "status") if mode or name[-3:] == "RPM" else [""] * len(places)
+            good, percent = np.isfinite(values) & ~_among(modes, INVALID), _among(modes, ("P",))
+            for source, own in sorted(set(keys)):
+                here = good & _among(keys, ((source, own),))
                 for per_cent in (False, True):
-                    own = good & (keys == key) & ((modes == "P") == per_cent)
                     self._keep(
-                        f"{name}.{words} {_machine(key)}", "percent" if per_cent else unit, places[own], values[own]
-                    )
+                        f"{name}.{words} {_machine(source + own)}", "percent" if per_cent else unit, places, values,
+                        here & (percent == per_cent),
+                    )  # fmt: skip
 
-    def _transducers(self, name: str, rows: list[list[str]], places: Array) -> None:
+    def _transducers(self, name: str, rows: Sequence[Sequence[str]], places: Array) -> None:
         """Each transducer by its name."""
         found: dict[tuple[str, str], list[tuple[float, float]]] = {}
         for place, row in zip(places.tolist(), rows, strict=True):
@@ -205,18 +271,18 @@ class Sentences:
                 else:
                     self.no_numbers += bool(value)
         for (label, unit), pairs in found.items():
-            self._keep(f"{name}.{label}", unit, *np.array(pairs).T)
+            at, values = np.array(pairs).T
+            self._keep(f"{name}.{label}", unit, at, values, np.ones(len(at), dtype=bool))
 
-    def _anchor(self, kind: str, places: Array, column: Callable[[str], list[str]]) -> None:
+    def _anchor(self, kind: str, places: Array, column: Callable[[str], Sequence[str]]) -> None:
         """Times of day, with the date where the sentence has it."""
         clock = _numbers(column("time"))
         second = np.floor(clock / 1e4) * 3600.0 + np.floor(clock / 100 % 100) * 60.0 + clock % 100.0
         day = np.full(len(clock), np.nan)
         if kind == "RMC":
-            dates = _numbers(column("date"))
-            texts = [f"{2000 + d % 100 if d % 100 < 80 else 1900 + d % 100}-{d // 100 % 100:02}-{d // 10000:02}"
-                     if d == d else "" for d in (int(x) if x == x else np.nan for x in dates)]  # fmt: skip
-            day = read_stamps(texts).day
+            texts = column("date")
+            days = dict(zip(set(texts), read_stamps([_iso(text) for text in set(texts)]).day.tolist(), strict=True))
+            day = np.array([days[text] for text in texts])
         elif kind == "ZDA":
             parts = [column(field) for field in ("year", "month", "day")]
             day = read_stamps(["-".join(row) for row in zip(*parts, strict=True)]).day
@@ -224,7 +290,7 @@ class Sentences:
         self.blocks.add("anchor|second", second)
         self.blocks.add("anchor|day", day)
 
-    def _received(self, prefixes: list[str], places: Array) -> None:
+    def _received(self, prefixes: Sequence[str], places: Array) -> None:
         """Times of reception, which stand before the sentence."""
         if not any(prefixes):
             return
@@ -264,14 +330,20 @@ class Sentences:
 
     def channels(self, stamps: Array, at: Array) -> list[Channel]:
         """All channels, their readings spread over the time from one stamp (e,) to the next."""
-        found = []
+        found: list[Channel] = []
+        times: dict[tuple[int, ...], Array] = {}  # by the blocks of places, which fields of a sentence share
         for key in [key for key in self.blocks.parts if key.endswith("|value")]:
             name, unit, _ = key.split("|")
-            time_s = spread(self.blocks.joined(f"{name}|{unit}|place"), stamps, at)
+            blocks = self.blocks.parts[f"{name}|{unit}|place"]
+            same = tuple(map(id, blocks))
+            if same not in times:
+                times[same] = closed(spread(np.concatenate(blocks), stamps, at))
+            time_s, values = times[same], self.blocks.joined(key)
             known = np.isfinite(time_s)
-            if known.any():
-                values = self.blocks.joined(key)[known]
-                found.append(Channel(name=name, source=self.source, unit=unit, time_s=time_s[known], values=values))
+            if not known.all():
+                time_s, values = time_s[known], values[known]
+            if len(values):
+                found.append(Channel(name=name, source=self.source, unit=unit, time_s=time_s, values=values))
         return found
 
 
@@ -295,12 +367,29 @@ def _stamp_in(prefix: str) -> str:
     return found[0] if found else ""
 
 
+def _iso(text: str) -> str:
+    """A date of RMC, ddmmyy, as year, month and day; "" for none."""
+    if not text.isdecimal():
+        return ""
+    date = int(text)
+    year = date % 100 + (2000 if date % 100 < 80 else 1900)
+    return f"{year}-{date // 100 % 100:02}-{date // 10000:02}"
+
+
+def _among(texts: Sequence[object], words: Collection[object]) -> np.ndarray:
+    """(k,) whether a cell is one of these."""
+    own = set(texts).intersection(words)
+    if not own:
+        return np.zeros(len(texts), dtype=bool)
+    return np.fromiter((text in own for text in texts), dtype=bool, count=len(texts))
+
+
 def _numbers(texts: Sequence[str]) -> Array:
     """Numbers of cells, nan where there is none."""
     try:
-        return np.array([text or "nan" for text in texts], dtype=float)
+        return np.fromiter(map(float, texts), dtype=float, count=len(texts))
     except ValueError:
-        return np.array([_number(text) for text in texts])
+        return np.array([_number(text) if text else np.nan for text in texts])
 
 
 def _number(text: str) -> float:
@@ -310,16 +399,14 @@ def _number(text: str) -> float:
         return np.nan
 
 
-def _checked(bodies: Sequence[str]) -> Array:
-    """(k,) 1 where the checksum of a sentence is right, 0 where it has none, -1 where it is wrong."""
-    parts = [body.partition("*") for body in bodies]
-    texts = [text.encode("latin-1", "replace") or b"\0" for text, _, _ in parts]
+def _checked(texts: Sequence[str], stars: Sequence[str], ends: Sequence[str]) -> list[bool]:
+    """Whether the checksum of each sentence is right, or it has none."""
     starts = np.cumsum([0, *map(len, texts)])[:-1]
-    sums = np.bitwise_xor.reduceat(np.frombuffer(b"".join(texts), dtype=np.uint8), starts)
-    said = [_hex(end) if star else None for _, star, end in parts]
-    return np.array(
-        [0 if value is None else 1 if value == own else -1 for value, own in zip(said, sums.tolist(), strict=True)]
-    )
+    signs = "".join(texts).encode("latin-1", "replace")  # one for each letter
+    sums = np.bitwise_xor.reduceat(np.frombuffer(signs, dtype=np.uint8), starts).tolist()
+    if all(stars) and list(map(TWO_DIGITS.get, ends)) == sums:
+        return [True] * len(sums)
+    return [not star or _hex(end) == own for star, end, own in zip(stars, ends, sums, strict=True)]
 
 
 def _hex(text: str) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import zipfile
+from dataclasses import replace
 from datetime import datetime, time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -44,16 +44,26 @@ def _check_archive(path: Path) -> None:
 def _first_sheet(book: Any, path: Path, sample_time_s: float) -> Log:
     try:
         for sheet in book.worksheets:
-            rows = itertools.islice(sheet.iter_rows(values_only=True), MOST_ROWS + 1)
-            lines = ["\t".join(map(_text, row)) for row in rows if any(map(_filled, row))]
-            if len(lines) > MOST_ROWS:
-                raise FileError(path, "", f"has more than {MOST_ROWS} rows, which no spreadsheet has: export it as CSV")
-            if len(lines) < 2:
-                continue
             with TemporaryDirectory(prefix="expdesign-") as folder:
                 copy = Path(folder) / path.name
-                copy.write_text("\n".join(lines) + "\n", encoding="utf-8")
-                return read_text(copy, sample_time_s)
+                with copy.open("w", encoding="utf-8") as file:
+                    rows = (row for row in sheet.iter_rows(values_only=True) if any(map(_filled, row)))
+                    count = 0
+                    for count, row in enumerate(rows, start=1):
+                        file.write("\t".join(map(_text, row)) + "\n")
+                        if count > MOST_ROWS:
+                            break
+                if count > MOST_ROWS:
+                    raise FileError(
+                        path, "", f"has more than {MOST_ROWS} rows, which no spreadsheet has: export it as CSV"
+                    )
+                if count < 2:
+                    continue
+                log = read_text(copy, sample_time_s)
+            others = [other.title for other in book.worksheets if other is not sheet]
+            unused = [f"sheet {name}" for name in others]
+            full = f"all {MOST_ROWS} rows of the sheet are filled: what came later may be lost; export as CSV"
+            return replace(log, unused=(*log.unused, *unused), notes=(*log.notes, *[full] * (count == MOST_ROWS)))
     finally:
         book.close()
     raise FileError(path, "", "has no sheet with rows, expected a header and one row per sample")
@@ -76,9 +86,14 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
     import pyarrow
     import pyarrow.parquet
 
-    table = pyarrow.parquet.read_table(path)
-    columns = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
+    columns, unused = {}, []
+    file = pyarrow.parquet.ParquetFile(path)
+    for name in file.schema_arrow.names:  # one at a time, so that the file is not in the memory twice
+        column = file.read([name]).column(0)
+        if pyarrow.types.is_dictionary(column.type):
+            column = column.cast(column.type.value_type)
+        if pyarrow.types.is_decimal(column.type):
+            column = column.cast(pyarrow.float64())
         kind = column.type
         if pyarrow.types.is_temporal(kind):
             columns[name] = np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
@@ -86,4 +101,7 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
             columns[name] = np.asarray(column.to_numpy(), dtype=float)
         elif pyarrow.types.is_string(kind) or pyarrow.types.is_large_string(kind):
             columns[name] = np.asarray(column.to_numpy(), dtype=object)
-    return columns_log(path.name, columns, sample_time_s)
+        else:
+            unused.append(f"{name} ({kind})")
+    log = columns_log(path.name, columns, sample_time_s)
+    return replace(log, unused=(*log.unused, *unused))

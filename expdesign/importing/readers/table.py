@@ -16,7 +16,7 @@ from expdesign.importing.channels import GNSS, NONE, OWN, Blocks, spread
 from expdesign.importing.clocks import clock_of
 from expdesign.importing.readers.cells import degrees, kind_of, port_signs, sided, signs
 from expdesign.importing.readers.dialect import Dialect
-from expdesign.importing.times import Stamps, read_stamps, tells_month_first
+from expdesign.importing.times import Stamps, halves_of_days, read_stamps, tells_month_first
 from expdesign.importing.units import counted, words
 from expdesign.records.file import MISSING
 from expdesign.values import Array
@@ -45,8 +45,9 @@ class TextTable:
     time_name: str = "time"
 
     def __post_init__(self) -> None:
-        cells = re.split("[,;\t ]", " ".join(self.sample))
-        self.month_first = tells_month_first(cells)
+        cells = re.split('[,;\t" ]', " ".join(self.sample))
+        self.halves = halves_of_days(cells)
+        self.month_first = tells_month_first(cells) or self.halves
         self.ambiguous = next(filter(AMBIGUOUS.fullmatch, cells), "")
         rows = [row for line in self.sample if (row := next(iter(self.dialect.rows([line])), []))]
         rows = [row for row in rows[self.dialect.header :] if len(row) == len(self.dialect.names)]
@@ -149,8 +150,9 @@ class TextTable:
         self.time_name = clock.name
         if others := [name for name in stamped if name not in taken]:
             notes.append(f"{', '.join(others)}: another time, not used")
-        if self.ambiguous and not self.month_first:
-            notes.append(f"dates such as {self.ambiguous} are read with the day first")
+        if self.ambiguous and (self.halves or not self.month_first):
+            first = "month first, as times have AM and PM" if self.halves else "day first"
+            notes.append(f"dates such as {self.ambiguous} are read with the {first}")
         place = self.blocks.joined("place")
         if times is None and len(stamps) > 1:
             times, kind = spread(place, stamps, at), GNSS

@@ -7,6 +7,7 @@ own stand between sentences with satellite time, and are spread evenly from one 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from expdesign.importing.readers.nmea import Sentences
 from expdesign.importing.readers.table import TextTable
 from expdesign.importing.units import counted
 
-BLOCK_BYTES = 1 << 22  # read at once
+BLOCK_BYTES = 1 << 20  # read at once
 SNIFFED = 400  # lines that a dialect is told from
 MOST_COLUMNS = 2000
 
@@ -40,21 +41,23 @@ def read_text(path: Path, sample_time_s: float) -> Log:
         raise FileError(path, "", "is empty, expected a log")
     if (wide := max(line.count(separator) for line in sample[:2] for separator in SEPARATORS[:-1])) > MOST_COLUMNS:
         raise FileError(path, "row 1", f"has {wide + 1} columns, expected at most {MOST_COLUMNS}")
-    plain = [line for line in sample if "$" not in line and not line.startswith("!") and line.strip()]
+    plain = [line for line in sample if not _is_sentence(line) and line.strip()]
     dialect = sniffed(plain)
     table = None if dialect is None else TextTable(path, dialect, plain)
-    sentences, place, other = Sentences(path.name), 0, 0
+    sentences, place, other, before, cut = Sentences(path.name), 0, 0, "", False
     with path.open(encoding=encoding, errors="replace", newline=None) as file:
         while lines := file.readlines(BLOCK_BYTES):
-            marked = [
-                (place + k, line) for k, line in enumerate(lines) if "$" in line or line.startswith("!")
-            ]  # fmt: skip
+            marked = [(place + k, line) for k, line in enumerate(lines) if _is_sentence(line)]
             if marked:
                 sentences.add(marked)
-                left = [(place + k, x) for k, x in enumerate(lines) if "$" not in x and not x.startswith("!")]
+                left = [(place + k, line) for k, line in enumerate(lines) if not _is_sentence(line)]
             else:
                 left = list(enumerate(lines, start=place))
             left = [pair for pair in left if not pair[1].isspace()]
+            if left:
+                before, last = left[-2][1] if len(left) > 1 else before, left[-1][1]
+                cut = dialect is not None and dialect.is_cut(last, before)
+                left, before = left[:-1] if cut else left, last
             if table is not None:
                 table.add(left)
             else:
@@ -63,7 +66,9 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     if not sentences.count and table is None:
         expected = "a table of numbers with a header, NMEA 0183, or a format of expdesign explain import"
         raise FileError(path, "", f"holds no rows of numbers and no NMEA sentences that are read, expected {expected}")
-    return _joined(path, sentences, table, other, sample_time_s)
+    log = _joined(path, sentences, table, other, sample_time_s)
+    words = "left out the last line, which has no end and may be cut"
+    return replace(log, notes=(words, *log.notes)) if cut else log
 
 
 def _joined(path: Path, sentences: Sentences, table: TextTable | None, other: int, sample_time_s: float) -> Log:
@@ -100,6 +105,11 @@ def _joined(path: Path, sentences: Sentences, table: TextTable | None, other: in
         found, clock_notes = channels_of(columns, times, source=path.name, units=table.units, what=table.time_name)
         channels, notes, unused = [*channels, *found], [*notes, *clock_notes], [*unused, *table.texts()]
     return Log(source=path.name, clock=clock, channels=tuple(channels), notes=tuple(notes), unused=tuple(unused))
+
+
+def _is_sentence(line: str) -> bool:
+    """Whether a line is, or ends in, a sentence of NMEA 0183; reports of the own ship may stand behind a time."""
+    return "$" in line or line.startswith("!") or "VDO," in line
 
 
 def _line_notes(sentences: Sentences, other: int) -> Iterator[str]:

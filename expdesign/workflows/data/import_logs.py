@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -46,6 +46,7 @@ from expdesign.importing import (
     guess,
     inputs_of,
     lag_of,
+    length_of_speed_m,
     presumed,
     read_log,
     sampled,
@@ -54,17 +55,22 @@ from expdesign.importing import (
     typical_length_m,
     zone_lag_of,
 )
+from expdesign.importing.mapping import SOG
 from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
-from expdesign.signals import Record
-from expdesign.values import Array
+from expdesign.signals import Batch, Record
+from expdesign.values import closed
 from expdesign.vessel import Vessel
 from expdesign.workflows.outcome import Outcome, command_text
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
+MOST_COMPARED = 200_000
+"""Rows in which instruments are compared with each other: more tell nothing new, and would fill the memory."""
+WRITTEN_AT_ONCE = 20_000
+"""Rows."""
 MOVED = 3.0  # standard errors from which a computer's clock is set by what another file saw
 FORMATS = {"time_s": "%.6f", "lat_deg": "%.9f", "lon_deg": "%.9f"}
 PRESUMED = (
@@ -132,8 +138,10 @@ def import_logs(
     })  # fmt: skip
     try:
         columns = _columns(read, mapping)
+        read = [log.without_readings() for log in read]
         progress("setting clocks", 0.62)
         mapping, table, more = _one_time_scale(read, columns, mapping, given is not None)
+        del columns
         notes += more
         progress("resampling", 0.66)
         found = sampled(table, mapping)
@@ -141,35 +149,39 @@ def import_logs(
         _leave_mapping(error, folder, mapping, read, notes, command)
         raise
     notes += found.notes
+    answers, sensors = followed(table), sensor_keys(found)
+    found = replace(found, channels={})
+    del table  # readings are not needed any more, and a day of them is large
     size_m = mapping.length_m or typical_length_m(found.stretches)
     runs, more = _runs(found, track, size_m)
     notes += more
     progress("checking the runs", 0.75)
-    texts, kept, rejected, more = _tried(runs, found, ship, mapping, size_m, within(progress, 0.75, 0.95))
-    notes += more
-    if not kept:
-        why = "; ".join(f"{where}: {reason}" for where, reason in rejected) or "no helm or engine order acts in it"
-        none = NothingToWrite(f"no run of the record can be used. {why}")
-        _leave_mapping(none, folder, mapping, read, notes, command)
-        raise none
-    content = ImportContent(
-        logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(texts),
-        rejected=tuple(rejected),
-        followed=followed(table), sensors=sensor_keys(found), notes=tuple(notes),
-        origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-        version=__version__, vessel=str(vessel or "VESSEL.toml"),
-    )  # fmt: skip
-    progress("writing", 0.95)
-    document = import_document(content, folder)
-    files: dict[str, Content] = {
-        **texts,
-        "mapping.toml": mapping_toml(mapping, read, command=command),
-        INSTRUMENTS: instruments_toml(content),
-        "import.json": import_json(content),
-        "import.html": partial(document_html, document),
-    }
-    before = earlier_files(folder)
-    written = write_files(folder, files)
+    with TemporaryDirectory(prefix="expdesign-") as scratch:
+        within_s = within(progress, 0.75, 0.95)
+        tables, kept, rejected, more = _tried(runs, found, ship, mapping, size_m, Path(scratch), within_s)
+        notes += more
+        if not kept:
+            why = "; ".join(f"{where}: {reason}" for where, reason in rejected) or "no helm or engine order acts in it"
+            none = NothingToWrite(f"no run of the record can be used. {why}")
+            _leave_mapping(none, folder, mapping, read, notes, command)
+            raise none
+        content = ImportContent(
+            logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(tables),
+            rejected=tuple(rejected), followed=answers, sensors=sensors, notes=tuple(notes),
+            origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
+            version=__version__, vessel=str(vessel or "VESSEL.toml"),
+        )  # fmt: skip
+        progress("writing", 0.95)
+        document = import_document(content, folder)
+        files: dict[str, Content] = {
+            **tables,
+            "mapping.toml": mapping_toml(mapping, read, command=command),
+            INSTRUMENTS: instruments_toml(content),
+            "import.json": import_json(content),
+            "import.html": partial(document_html, document),
+        }
+        before = earlier_files(folder)
+        written = write_files(folder, files)
     for name in before - set(files):
         with suppress(OSError):
             (folder / name).unlink()
@@ -226,6 +238,9 @@ def _one_time_scale(
         NothingToWrite: nothing tells how a clock stands to the others.
     """
     clocks = {clock.file: clock for clock in mapping.files}
+    speeds = [own[name].values for own in columns.values() for name in (SOG, "u_mps") if name in own]
+    typical_m = length_of_speed_m(np.concatenate(speeds) if speeds else np.zeros(0))
+    length_m = (mapping.length_m, 0.0) if mapping.length_m else (typical_m, typical_m)
     order = sorted(logs, key=lambda log: TRUSTED.index(log.clock))
     table: dict[str, Channel] = {}
     notes = []
@@ -245,8 +260,8 @@ def _one_time_scale(
         own, clock = columns[log.source], clocks.get(log.source, FileClock(file=log.source))
         if table and own and not (stated and log.source in clocks):
             near = log.clock != OWN and order[0].clock != OWN
-            lag = lag_of(own, table, near=near)
-            zone = zone_lag_of(own, table) if lag is None and near else None
+            lag = lag_of(own, table, near=near, length_m=length_m)
+            zone = zone_lag_of(own, table, length_m=length_m) if lag is None and near else None
             if zone is not None:
                 lag, what = zone
                 notes.append(f"{log.source}: its clock is {what}")
@@ -269,11 +284,17 @@ def _one_time_scale(
         elif not table:
             notes.append(f"times are those of {log.source}: {log.clock}")
         clocks[log.source] = clock
-        table |= {
-            name: replace(channel, time_s=channel.time_s + clock.offset_s)
-            for name, channel in own.items() if name not in table
-        }  # fmt: skip
+        table |= {name: channel for name, channel in _moved(own, clock.offset_s).items() if name not in table}
     return replace(mapping, files=tuple(clocks[log.source] for log in logs)), table, notes
+
+
+def _moved(own: Mapping[str, Channel], offset_s: float) -> dict[str, Channel]:
+    """Channels at later times; those that share times go on to."""
+    if not offset_s:
+        return dict(own)
+    times = {id(channel.time_s): channel.time_s for channel in own.values()}
+    later = {key: closed(time_s + offset_s) for key, time_s in times.items()}
+    return {name: replace(channel, time_s=later[id(channel.time_s)]) for name, channel in own.items()}
 
 
 def _leave_mapping(
@@ -303,15 +324,18 @@ def _runs(found: Sampled, track: object, length_m: float) -> tuple[list[Run], li
 
 
 def _tried(
-    runs: Sequence[Run], found: Sampled, ship: Vessel | None, mapping: Decisions, length_m: float, progress: Progress
-) -> tuple[dict[str, str], list[Run], list[tuple[str, str]], list[str]]:
-    """Texts of the runs' files as other commands accept them, these runs with families, those refused, and notes."""
+    runs: Sequence[Run], found: Sampled, ship: Vessel | None, mapping: Decisions, length_m: float, scratch: Path,
+    progress: Progress,
+) -> tuple[dict[str, Path], list[Run], list[tuple[str, str]], list[str]]:  # fmt: skip
+    """The runs' files as other commands accept them, these runs with families, those refused, and notes."""
     notes: list[str] = []
     if not runs:
         return {}, [], [], []
     if not inputs_of(runs[0].stretch.columns):
         kept = [replace(run, name="track") for run in runs]
-        tracks = {file_name(k, run): _csv(run, found) for k, run in enumerate(kept, start=1)}
+        tracks = {
+            file_name(k, run): _written(scratch / f"run {k}.csv", run, found) for k, run in enumerate(kept, start=1)
+        }
         notes.append(
             "no channel is an order or a position of a rudder or a propeller: the track is written as it is, and "
             "estimate and diagnose need such inputs"
@@ -325,35 +349,40 @@ def _tried(
             sides=sides(mapping),
         )  # fmt: skip
     assert taken is not None
-    batches, kept, refused = [], [], []
-    texts: dict[str, str] = {}
+    batches: list[Batch] = []
+    kept, refused = [], []
+    tables: dict[str, Path] = {}
     said: dict[str, list[str]] = {}
     outputs = OUTPUTS if "heading_rad" in runs[0].stretch.columns else ()
-    with TemporaryDirectory(prefix="expdesign-") as folder:
-        for k, run in enumerate(runs, start=1):
-            progress(f"checking run {k} of {len(runs)}", k / (len(runs) + 1))
-            text = _csv(run, found)
-            path = Path(folder) / f"run {k}.csv"
-            path.write_text(text, encoding="utf-8")
-            begins = run.stretch.time_s[0] - _origin_s(found)
-            try:
-                record = load_records(
-                    path, vessel_inputs=taken.model.inputs, heading_std_rad=taken.sensors.heading_rad or None,
-                    outputs=outputs, actuators=taken.model.actuators if ship is not None else (),
-                )  # fmt: skip
-            except (FileError, InputError) as error:
-                what = f"{error.key} {error.problem}" if isinstance(error, FileError) else str(error)
-                refused.append(
-                    (f"from {begins:.0f} s on, {len(run.stretch) * found.sample_time_s:.0f} s", what.strip())
-                )
-                continue
-            kept.append(replace(run, family=run.name or family(taken, record.batches[0])))
-            name = file_name(len(kept), kept[-1])
-            texts[name] = text
+    rows = sum(len(run.stretch) for run in runs)
+    share, compared = min(1.0, MOST_COMPARED / rows), 0
+    for k, run in enumerate(runs, start=1):
+        progress(f"checking run {k} of {len(runs)}", k / (len(runs) + 1))
+        path = _written(scratch / f"run {k}.csv", run, found)
+        begins = run.stretch.time_s[0] - _origin_s(found)
+        try:
+            record = load_records(
+                path, vessel_inputs=taken.model.inputs, heading_std_rad=taken.sensors.heading_rad or None,
+                outputs=outputs, actuators=taken.model.actuators if ship is not None else (),
+            )  # fmt: skip
+        except (FileError, InputError) as error:
+            what = f"{error.key} {error.problem}" if isinstance(error, FileError) else str(error)
+            refused.append((f"from {begins:.0f} s on, {len(run.stretch) * found.sample_time_s:.0f} s", what.strip()))
+            continue
+        kept.append(replace(run, family=run.name or family(taken, record.batches[0])))
+        name = file_name(len(kept), kept[-1])
+        tables[name] = path
+        if len(kept) * share >= compared + 1 or not batches:
+            compared += 1
             batches += [replace(batch, name=batch.name.replace(path.name, name)) for batch in record.batches]
-            for line in record.notes:
-                if not (note := line.partition(": ")[2]).startswith(OF_FRAMES):
-                    said.setdefault(note, []).append(name)
+        for line in record.notes:
+            if not (note := line.partition(": ")[2]).startswith(OF_FRAMES):
+                said.setdefault(note, []).append(name)
+    if compared < len(kept):
+        notes.append(
+            f"instruments are compared with each other in {compared} of {len(kept)} runs, evenly over the log, as "
+            f"its {rows} rows are more than are needed"
+        )
     if batches:
         whole = Record(batches=tuple(batches))
         if ship is None:
@@ -362,7 +391,7 @@ def _tried(
         if ship is None:
             doubts = tuple(_without_file(doubt) for doubt in doubts)
         notes += [*doubts, *(f"{_some(names, kept)}{note}" for note, names in said.items())]
-    return texts, kept, refused, notes
+    return tables, kept, refused, notes
 
 
 def _some(names: Sequence[str], runs: Sequence[Run]) -> str:
@@ -382,7 +411,7 @@ def _origin_s(found: Sampled) -> float:
     return float(found.stretches[0].time_s[0])
 
 
-def _csv(run: Run, found: Sampled) -> str:
+def _written(path: Path, run: Run, found: Sampled) -> Path:
     """A run as a file of ours; headings begin within a turn."""
     columns = {"time_s": run.stretch.time_s - _origin_s(found), **run.stretch.columns}
     names = [*[name for name in FIRST if name in columns], *sorted(set(columns) - set(FIRST))]
@@ -392,7 +421,11 @@ def _csv(run: Run, found: Sampled) -> str:
     for name in names:
         if name.removeprefix("reached_")[:1] == "a" and name.endswith("_rad"):
             columns[name] = columns[name] - whole_turns(columns[name][0])
-    row: str = ",".join(FORMATS.get(name, "%.8g") for name in names)
-    table: Array = np.column_stack([columns[name] for name in names])
-    lines: Callable[[list[float]], str] = lambda values: row % tuple(values)  # noqa: E731
-    return "\n".join([",".join(names), *map(lines, table.tolist())]) + "\n"
+    row = ",".join(FORMATS.get(name, "%.8g") for name in names) + "\n"
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(names) + "\n")
+        for first in range(0, len(run.stretch), WRITTEN_AT_ONCE):
+            part = slice(first, first + WRITTEN_AT_ONCE)
+            table = np.column_stack([columns[name][part] for name in names])
+            file.writelines(row % tuple(values) for values in table.tolist())
+    return path

@@ -53,10 +53,16 @@ def workers(
         raise InputError(f"--jobs is {jobs}, expected a whole number of 0 or more")
     memory = nullcontext() if cache is None else remembering(user_memory() if cache else None)
     place = on_cluster(scheduler) if scheduler is not None else local_processes(jobs or processors(), load=load)
+    with memory, place, rarely_collected():
+        yield
+
+
+@contextmanager
+def rarely_collected() -> Iterator[None]:
+    """In this block cycles of garbage are looked for more rarely."""
     before = gc.get_threshold()
     gc.set_threshold(FEW_CYCLES)
     try:
-        with memory, place:
-            yield
+        yield
     finally:
         gc.set_threshold(*before)
