@@ -254,7 +254,10 @@ def incline(
     read_s: Annotated[
         float,
         typer.Option(
-            "--read-s", metavar="T", min=0.0, help="Time over which a reading of heel is averaged; acts in [roll.waves]."
+            "--read-s",
+            metavar="T",
+            min=0.0,
+            help="Time over which a reading of heel is averaged; acts in [roll.waves].",
         ),
     ] = 60.0,
     out: OutInclined = None,

@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 from expdesign.export.files import finite, strict_json
 from expdesign.export.roll_words import change_words, stability_words
 from expdesign.export.words import HOUR, counted, hours, percent, times, told_apart, when
-from expdesign.monitoring import Alarm, Calibration, Call, Change, RollEvent, RollWatch, State, calls_of
+from expdesign.monitoring import (
+    AS_LIKELY,
+    EQUATIONS,
+    Alarm,
+    Calibration,
+    Call,
+    Change,
+    RollEvent,
+    RollWatch,
+    State,
+    calls_of,
+)
 from expdesign.values import Array
 
 # A watch over roll as sentences and JSON.
@@ -270,6 +281,12 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     if alarm.as_likely:
         others = few([content.changes[number].words for number in alarm.as_likely])
         text += f" The data are explained as well by: {others}."
+    if alarm.pushes:
+        better = "better" if max(gain for _, gain in alarm.pushes) > AS_LIKELY else "as well"
+        text += (
+            f" A steady push in {' or '.join(pushed(content, alarm))} by wind or current since then explains them {better}, "
+            "with the ship as she was."
+        )
     if alarm.unexplained > content.limit:
         text += (
             " More than this one change is needed to explain them: one cause may change several parameters at once, as "
@@ -278,6 +295,13 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     if not alarm.settled:
         text += " The size is not yet settled."
     return text
+
+
+def pushed(content: MonitorContent, alarm: Alarm) -> list[str]:
+    """Equations in which a steady push would do what the change does, the likeliest first."""
+    named = {change.effect: change for change in content.changes}
+    axes = [EQUATIONS[name] for name in EQUATIONS if f"inertia:{name}" in named]
+    return [axes[axis] for axis, _ in sorted(alarm.pushes, key=lambda one: -one[1])]
 
 
 def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
@@ -422,5 +446,6 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "std": alarm.std * change.size,
         "in_words": f"{change.words} by {size_in_words(content, alarm)}",
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
+        "as_likely_pushes": pushed(content, alarm),
         "settled": alarm.settled,
     }
