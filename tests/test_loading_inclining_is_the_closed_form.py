@@ -64,7 +64,7 @@ BEAM_ON = Waves(height_m=0.01, period_s=1.6, from_rad=np.pi / 2)
 
 
 def test_means_of_drawn_roll_in_waves_have_the_errors_that_are_told() -> None:
-    """Records of the ship at rest in drawn waves, an ordinary differential equation solved over time; 4 standard errors."""
+    """Records of the ship at rest in drawn waves, a differential equation solved over time; 4 standard errors."""
     pendulum = roll_model().pendulum
     assert pendulum is not None
     righting, step_s, read_s = pendulum.righting_nm, 0.1, 7.3

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.errors import InputError
+from expdesign.values import Array
 from expdesign.vessel import RollPendulum
 from expdesign.vessel.masses import G_MPS2
 
@@ -114,10 +115,10 @@ def heel_in_waves(pendulum: RollPendulum, read_s: float) -> tuple[float, float]:
     if pendulum.waves is None:
         return 0.0, 0.0
     highest = 3.0 * 2.0 * math.pi / pendulum.waves.period_s
-    w = highest / WAVE_FREQUENCIES * np.arange(1, WAVE_FREQUENCIES + 1)
+    w: Array = np.linspace(0.0, highest, WAVE_FREQUENCIES + 1)[1:]
     beam_on = 2.0 * pendulum.waves.met_density(w, 0.0)  # which is that of all courses alike
     righting = pendulum.righting_nm
     gain = np.abs(righting / (righting - pendulum.inertia_kgm2 * w**2 + 1j * pendulum.parameters["d"] * w))
     density = gain**2 * beam_on
     kept = np.sinc(w * read_s / (2.0 * math.pi)) ** 2
-    return tuple(math.sqrt(float(np.sum(density * share)) * w[0]) for share in (1.0, kept))
+    return math.sqrt(float(density.sum() * w[0])), math.sqrt(float(density @ kept * w[0]))

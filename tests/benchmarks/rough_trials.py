@@ -1,6 +1,6 @@
 """Step and roll trials in weather, by simulations that are not the project's: how often it is right what is said.
 
-`python tests/benchmarks/rough_trials.py STUDY [--seeds N] [--seed FIRST] [--only CASE]`, one row for each case of a study:
+`python tests/benchmarks/rough_trials.py STUDY [--seeds N] [--seed FIRST] [--only CASE]`, a row for each case:
 
 steps: shares of 95 % intervals that hold, in gusts and in a current; hysteresis found; holds astern; halves.
 holds: at 1 Hz, shares of trials with a model when held for as long as there is, and as is said to do.

@@ -89,8 +89,8 @@ def _in_waves(
 ) -> tuple[str, ...]:
     """What the waves of the vessel file do to readings of heel [deg] and to a decay."""
     heel = (
-        f"The waves of [roll.waves] roll her by {rolling:.2g} degrees rms, beam on. Averaged over {read_s:g} s they leave "
-        f"{left:.2g} degrees in a change of heel, which count beside the {heel_std_deg:g} degrees of the reading."
+        f"The waves of [roll.waves] roll her by {rolling:.2g} degrees rms, beam on. Averaged over {read_s:g} s they "
+        f"leave {left:.2g} degrees in a change of heel, which count beside the {heel_std_deg:g} degrees of the reading."
     )
     decay = "They disturb a decay, too: --period-std-s must hold what they do to the period."
     return (heel,) if period_std_s is None else (heel, decay)
