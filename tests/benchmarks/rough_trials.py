@@ -50,9 +50,10 @@ def _identified(seed: int, craft: Craft) -> StepTrial:
 
 
 def _covered(seeds: range, craft: Craft) -> str:
-    found: dict[str, list[bool]] = {"U": [], "r": [], "T": []}
+    found: dict[str, list[bool]] = {"U": [], "r": [], "T": [], "dead time": []}
     for seed in seeds:
         trial = _identified(seed, craft)
+        found["dead time"] += [abs(value - craft.delay_s) < 1.96 * std for value, std in trial.delays]
         for one in trial.samples:
             if one.plateau is None:
                 continue
