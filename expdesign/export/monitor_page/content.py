@@ -207,19 +207,21 @@ def _call(content: MonitorContent, call: Call) -> str:
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     statistic, limit = told_apart(alarm.statistic, content.limit)
+    weather, push = "", ""
+    if alarm.pushes:
+        better = "better" if max(gain for _, gain in alarm.pushes) > AS_LIKELY else "as well"
+        weather = " or the weather"
+        push = (
+            f", or a steady push in {' or '.join(pushed(content, alarm))} by wind or current, which explains the data "
+            f"{better}"
+        )
     text = (
-        f"Since {when(alarm.since_s)} the ship is another: {change.words} by {size_in_words(content, alarm)}. "
-        f"The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
+        f"Since {when(alarm.since_s)} the ship{weather} is another: {change.words} by {size_in_words(content, alarm)}"
+        f"{push}. The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
     )
     if alarm.as_likely:
         others = few([content.changes[number].words for number in alarm.as_likely])
         text += f" The data are explained as well by: {others}."
-    if alarm.pushes:
-        better = "better" if max(gain for _, gain in alarm.pushes) > AS_LIKELY else "as well"
-        text += (
-            f" A steady push in {' or '.join(pushed(content, alarm))} by wind or current since then explains them "
-            f"{better}, with the ship as she was."
-        )
     if alarm.unexplained > content.limit:
         text += (
             " More than this one change is needed to explain them: one cause may change several parameters at once, as "
