@@ -15,7 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll import Body, Case, Load, RollEstimate, Run, build_problem, estimate_roll, low_pass, prepared
+from expdesign.roll import (
+    Body,
+    Case,
+    Load,
+    RollEstimate,
+    Run,
+    build_problem,
+    estimate_roll,
+    low_pass,
+    metacentric_height,
+    prepared,
+)
 
 G = 9.81
 MASS_KG, MASS_HEIGHT_M, SENSOR_HEIGHT_M, BEAM_M, SPEED_MPS = 300e3, 0.4, 4.0, 8.0, 5.0
@@ -123,3 +134,19 @@ def estimated(seed: int, sea: Sea, **told: float) -> RollEstimate:
     ready = prepared(cases, low_pass(cases, roll_hz=1.0 / PERIOD_S))
     problem = build_problem(body, ready, beam_m=BEAM_M, roll_hz=1.0 / PERIOD_S, known={"k": K}, start={})
     return estimate_roll(problem)
+
+
+def deviations(one: RollEstimate) -> list[float]:
+    """Errors of the estimated parameters but the load's in their standard deviations."""
+    truth = {"A_x": A1 - MASS_KG * MASS_HEIGHT_M**2, "d": D, "K_r": K_R, "K_vd": K_VD, "K_delta": K_DELTA, "z_f": 0.0}
+    return [(one.values[name] - truth[name]) / one.std[name] for name in truth]
+
+
+def height_deviations(one: RollEstimate, sea: Sea) -> list[float]:
+    """Errors of the metacentric heights of the three load cases in their standard deviations."""
+    found = []
+    for case, (mass, height) in zip(one.problem.cases, ((0.0, 0.0), KNOWN, sea.load), strict=True):
+        truth = (K + G * (S0 - mass * height)) / (G * (MASS_KG + mass))
+        value, std = metacentric_height(one, case.load)
+        found.append((value - truth) / std)
+    return found

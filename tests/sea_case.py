@@ -34,6 +34,7 @@ class Ship:
     mass: float = 1.0  # and inertia in yaw
     rudder_rad: float = 0.0  # by which the rudder stands beside what is measured
     gyro: float = 1.0  # scale of the yaw rate
+    push_radps2: float = 0.0  # of the weather and not of the ship: a force in yaw that grows to this within an hour
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +69,7 @@ CASES = {
     "rudder + 2 degrees": Ship(rudder_rad=np.deg2rad(2.0)),
     "yaw rate times 0.97": Ship(gyro=0.97),
     "mass + 12 %": Ship(mass=1.12),
+    "wind in yaw over an hour": Ship(push_radps2=1e-4),
 }
 
 
@@ -88,6 +90,7 @@ def sailed(
     later = {name: np.array([getattr(ship, name) for ship in ships]) for name in vars(ships[0])}
     before = {name: np.full(len(ships), value) for name, value in vars(Ship()).items()}
     v, step_s, samples = len(ships), 1.0 / sea.hz, seconds * sea.hz
+    slow[:, 2] += np.clip(np.arange(samples) * step_s - since_s, 0, HOUR)[:, None] / HOUR * later["push_radps2"]
     table = np.empty((samples, len(NAMES), v))
     state = np.zeros((6, v))  # u, v, r, north, east, heading
     state[0] = 4.0

@@ -2,17 +2,20 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from design_case import SCENARIOS
 from expdesign.cli import main
 from expdesign.errors import InputError
-from expdesign.loading import heel_of_shift, inclining
+from expdesign.loading import heel_in_waves, heel_of_shift, inclining
 from expdesign.scenario import load_vessel
-from rolling_ship import ROLL_MODEL
+from expdesign.waves import Waves
+from rolling_ship import ROLL_MODEL, roll_model
 
 SHIP = {"displacement_kg": 3.7e6, "metacentric_height_m": 1.3}
 TEST = {**SHIP, "mass_kg": 2e4, "shift_m": 10.0, "period_s": 9.0}
@@ -55,6 +58,45 @@ def test_four_shifts_halve_the_error_and_no_decay_leaves_the_inertia_open() -> N
 def test_what_is_no_inclining_test_is_not_taken(name: str, value: float, line: str) -> None:
     with pytest.raises(InputError, match=line):
         inclining(**{**TEST, "heel_std_rad": 1e-4, name: value})
+
+
+BEAM_ON = Waves(height_m=0.01, period_s=1.6, from_rad=np.pi / 2)
+
+
+def test_means_of_drawn_roll_in_waves_have_the_errors_that_are_told() -> None:
+    """Records of the ship at rest in drawn waves, a differential equation solved over time; 4 standard errors."""
+    pendulum = roll_model().pendulum
+    assert pendulum is not None
+    righting, step_s, read_s = pendulum.righting_nm, 0.1, 7.3
+    ship = scipy.signal.lti([righting], [pendulum.inertia_kgm2, pendulum.parameters["d"], righting])
+    time = step_s * np.arange(6000)
+    slope = BEAM_ON.slope(np.zeros((len(time), 3)), step_s, np.random.default_rng(4))
+    roll = scipy.signal.lsim(ship, slope, time)[1][200:]
+    rms, left = heel_in_waves(replace(pendulum, waves=BEAM_ON), read_s)
+    each = round(read_s / step_s)
+    means = roll[: len(roll) // each * each].reshape(-1, each).mean(axis=1)
+    assert means.std() == pytest.approx(left, rel=4.0 / np.sqrt(2 * len(means)))
+    assert roll.std() == pytest.approx(rms, rel=0.1)
+    assert left < 0.1 * rms
+    assert heel_in_waves(replace(pendulum, waves=BEAM_ON), 0.0) == pytest.approx((rms, rms))
+
+
+def test_waves_of_the_vessel_file_count_in_heel_and_longer_readings_help(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rough = tmp_path / "rough.toml"
+    waves = "\n[roll.waves]\nheight_m = 0.01\nperiod_s = 1.6\nfrom_deg = 90.0\n"
+    rough.write_text(ROLL_MODEL.read_text() + waves)
+    stds = {}
+    for name, vessel, more in (("calm", ROLL_MODEL, ()), ("long", rough, ("600",)), ("short", rough, ("5",))):
+        asked = ("--read-s", *more) if more else ()
+        assert inclined("--out", str(tmp_path / name), *asked, "--period-std-s", "0.02", vessel=vessel) == 0
+        told = json.loads((tmp_path / name / "incline.json").read_text())
+        stds[name] = told["tests"][0]["metacentric_height_std_m"]
+        printed = " ".join(capsys.readouterr().out.split())
+        assert ("The waves of [roll.waves] roll her by" in printed) == (vessel is rough)
+        assert ("They disturb a decay, too" in printed) == (vessel is rough)
+    assert stds["calm"] < stds["long"] < 0.5 * stds["short"]
 
 
 def inclined(*more: str, vessel: Path = ROLL_MODEL) -> int:

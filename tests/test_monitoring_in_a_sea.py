@@ -19,12 +19,16 @@ from expdesign.monitoring import (
     WHITE,
     Alarm,
     Calibration,
+    Grams,
     Noise,
     Rules,
     State,
     calibrate,
     grams_and_noise,
     grams_of,
+    later_part,
+    restored_alarm,
+    saved,
     stretch_length,
     threshold,
     watch,
@@ -158,13 +162,33 @@ def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
 ) -> None:
     quick = Sea(pushed_s=5.0, wave_radps=np.deg2rad(0.25))
     slow = Sea(pushed_s=5.0, yaw_radps2=3.0 * PUSHED.yaw_radps2)
-    found = 0
-    for sea, seed in ((quick, 8), (slow, 8), (slow, 9), (slow, 10)):
-        (table,) = sailed([CASES["drag + 15 %"]], 2 * HOUR, seeds=[seed], sea=sea, since_s=HOUR)
+    for sea in (quick, slow):
+        (table,) = sailed([CASES["drag + 15 %"]], 2 * HOUR, seeds=[8], sea=sea, since_s=HOUR)
         state, names = alarms_of(vessel, known, table)
-        found += names[:1] in (["theta:X_uu"], ["theta:X_nn"], ["gain"])
+        assert names[:1] in (["theta:X_uu"], ["theta:X_nn"], ["gain"])
         assert state.left_out_s < 0.2 * state.judged_s
-    assert found == 4
+
+
+def test_wind_that_turns_her_is_named_beside_the_change_that_it_looks_like(
+    vessel: Vessel, known: tuple[Noise, Calibration]
+) -> None:
+    """At a steady speed a moment of the wind is an offset of the rudder, and nothing in surge or sway is either."""
+    (table,) = sailed([Ship(push_radps2=3e-4)], HOUR, seeds=[12], sea=PUSHED)
+    changes, noise, grams = stretches(vessel, table, known=known[0])
+    record = as_record(vessel, table)
+    ship = extended_model(vessel, record)
+
+    def again(shift: np.ndarray, since_s: float) -> Grams:
+        changed = ship.with_effects({c.effect: c.size * x for c, x in zip(changes, shift.tolist(), strict=True) if x})
+        part, begins_s = later_part(record, [0.0], since_s, grams.stretch_s)
+        return grams_of(changed, part, changes, begins_s=begins_s, stretch_s=grams.stretch_s, noise=noise)
+
+    rules = Rules(limit=threshold(int(known[1].watched.sum()), 30 * 24 * HOUR / grams.stretch_s))
+    state, _, _, _ = watch(known[1], State.begun(known[1], time_s=0.0), grams, rules=rules, again=again)
+    assert state.alarm is not None
+    assert changes[state.alarm.change].effect == "offset:rudder"
+    assert [axis for axis, _ in state.alarm.pushes] == [2]
+    assert restored_alarm(json.loads(json.dumps(saved(state.alarm)))) == state.alarm
 
 
 @pytest.mark.slow

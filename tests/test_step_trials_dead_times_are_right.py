@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.step_trials.dead_times import turn_entry
+from expdesign.step_trials.dead_times import dead_time, turn_entry
 from expdesign.step_trials.holds import Hold, Sailed
 from expdesign.step_trials.responses import Transient, fit_first_order, second_order, shared_delay
 from expdesign.step_trials.samples import Plateau, StepSample
@@ -87,3 +87,18 @@ def test_a_vessel_that_loses_most_of_its_speed_is_not_scaled() -> None:
     entry = turn_entry(batch, step)
     assert entry.values == pytest.approx(batch.state[: len(entry.values), 1])
     assert entry.after == step.transient.after
+
+
+def test_a_dead_time_of_few_responses_is_no_surer_than_they_are() -> None:
+    """One response scatters by nothing, and two may agree; of many the scatter counts."""
+    _, step = turning_step(0.0)
+    assert step.first_order is not None
+
+    def of(delays: list[float]) -> tuple[float, float]:
+        parts = [replace(step.first_order, delay_s=delay, delay_std_s=0.2) for delay in delays]
+        return dead_time([replace(step, first_order=part) for part in parts], 1)
+
+    assert of([0.4]) == pytest.approx((0.4, 0.2 * np.sqrt(np.pi / 2)))
+    assert 0.02 < of([0.40, 0.42])[1] < 0.2
+    wide = of(np.random.default_rng(1).normal(2.0, 0.5, 200).tolist())[1]
+    assert wide == pytest.approx(0.5 / np.sqrt(200) * np.sqrt(np.pi / 2), rel=0.2)

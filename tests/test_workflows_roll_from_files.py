@@ -35,9 +35,9 @@ def test_three_files_give_the_load_and_say_what_they_do_not_tell(tmp_path: Path)
     assert "measure how far the accelerometer is from the rotation axis" in page
 
 
-def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
+def test_with_k_known_all_else_is_found_of_the_model_and_by_froude_s_law_of_the_ship(tmp_path: Path) -> None:
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
-    outcome = roll(three(tmp_path), tmp_path / "out", loads=loads)
+    outcome = roll(three(tmp_path), tmp_path / "out", loads=loads, scale=24.0)
     found = outcome.summary
     assert (found["rank"], found["free"], found["held"]) == (8, 8, [])
     assert "wrong sign" not in str(outcome.document)
@@ -46,6 +46,21 @@ def test_with_k_known_all_else_is_found(tmp_path: Path) -> None:
     assert isinstance(stds, dict)
     for name, std in stds.items():
         assert abs(values[name] - truth(name)) < 4 * std, name
+    _told_by_froude(tmp_path / "out")
+    with pytest.raises(InputError, match="--scale is 0, expected more than 0"):
+        roll(three(tmp_path), tmp_path / "none", loads=loads, scale=0.0)
+
+
+def _told_by_froude(out: Path) -> None:
+    """A model tells of a ship 24 times as long."""
+    found = json.loads((out / "roll.json").read_text())
+    for name, power in {"A_x": 5.0, "d": 4.5, "K_r": 4.5, "K_vd": 4.0, "K_delta": 4.0, "z_f": 1.0, "m": 3.0}.items():
+        model, ship = found["parameters"][name], found["at_full_scale"][name]
+        for key in ("value", "std"):
+            assert ship[key] == pytest.approx(24.0**power * model[key], rel=1e-12)
+    page = (out / "roll.html").read_text()
+    assert "24 times as long as her model" in page
+    assert f"{24.0**3 * found['parameters']['m']['value']:.4g}" in page
 
 
 def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
@@ -60,21 +75,6 @@ def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
     notes = roll(files, tmp_path / "out", loads=loads).document.all_notes
     assert "imu_lateral_mps2 or roll_rate_radps seems to have the wrong sign" in str(notes)
     assert "wrong sign" in (tmp_path / "out" / "roll.html").read_text()
-
-
-def test_a_model_tells_of_the_ship_by_froude_s_law(tmp_path: Path) -> None:
-    loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
-    roll(three(tmp_path), tmp_path / "out", loads=loads, scale=24.0)
-    found = json.loads((tmp_path / "out" / "roll.json").read_text())
-    for name, power in {"A_x": 5.0, "d": 4.5, "K_r": 4.5, "K_vd": 4.0, "K_delta": 4.0, "z_f": 1.0, "m": 3.0}.items():
-        model, ship = found["parameters"][name], found["at_full_scale"][name]
-        for key in ("value", "std"):
-            assert ship[key] == pytest.approx(24.0**power * model[key], rel=1e-12)
-    page = (tmp_path / "out" / "roll.html").read_text()
-    assert "24 times as long as her model" in page
-    assert f"{24.0**3 * found['parameters']['m']['value']:.4g}" in page
-    with pytest.raises(InputError, match="--scale is 0, expected more than 0"):
-        roll(three(tmp_path), tmp_path / "none", loads=loads, scale=0.0)
 
 
 def test_planned_rudders_are_instruments_and_said_to_be(tmp_path: Path) -> None:

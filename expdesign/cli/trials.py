@@ -251,6 +251,15 @@ def incline(
         typer.Option("--period-std-s", metavar="S", help="Standard deviation of a decay's period. Default: no decay."),
     ] = None,
     shifts: Annotated[int, typer.Option("--shifts", metavar="N", min=1, help="Shifts that are read.")] = 4,
+    read_s: Annotated[
+        float,
+        typer.Option(
+            "--read-s",
+            metavar="T",
+            min=0.0,
+            help="Time over which a reading of heel is averaged; acts in [roll.waves].",
+        ),
+    ] = 60.0,
     out: OutInclined = None,
 ) -> None:
     """Say what inclining tests tell: heel, and the accuracy of metacentric height and roll inertia.

@@ -9,11 +9,10 @@ import numpy as np
 from markupsafe import Markup
 
 from expdesign.export.document import Document, Mark, Table, filled, section
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import finite, plus_minus, strict_json
 from expdesign.export.words import percent
 from expdesign.roll import (
     EFFECTS,
-    G_MPS2,
     MEANINGS,
     PARAMETERS,
     TUNING,
@@ -23,6 +22,7 @@ from expdesign.roll import (
     NullSpace,
     RollEstimate,
     froude_scaled,
+    metacentric_height,
     roll_frequency,
     stiffness,
 )
@@ -113,8 +113,7 @@ def _sentences(content: RollContent) -> Iterator[str]:
         hertz = roll_frequency(estimate.theta, body, case.load)
         upright = f"a roll period of {1.0 / hertz:.3g} s" if hertz else "which does not keep her upright"
         if_so = f", for {' and '.join(estimate.held)} as held" if estimate.held else ""
-        mass = body.mass_kg + (estimate.values["m"] if case.load is None else case.load.mass_kg)
-        height = f"a metacentric height of {right / (G_MPS2 * mass):.3g} m"
+        height = f"a metacentric height of {plus_minus(*metacentric_height(estimate, case.load))} m"
         warned = "" if estimate.trusted else "Not to be trusted: "
         yield f"{warned}{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
     if estimate.trusted:
@@ -262,6 +261,10 @@ def roll_json(content: RollContent) -> str:
             "effects": {
                 name: {"value": value, "std": std, "meaning": EFFECTS[name][0], "unit": EFFECTS[name][1]}
                 for name, (value, std) in estimate.effects.items()
+            },
+            "metacentric_heights_m": {
+                case.name: dict(zip(("value", "std"), metacentric_height(estimate, case.load), strict=True))
+                for case in estimate.problem.cases
             },
             "load_interval_kg": None
             if estimate.load_interval is None

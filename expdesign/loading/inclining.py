@@ -6,8 +6,15 @@
 with the displaced mass D, which includes the shifted mass m, a shift y across the ship, and the period T of undamped
 roll. A mass raised by h lowers GM by m h / D.
 
+In waves, beam on at rest, roll phi of the slope s of the waves is
+
+    phi(w) = D g GM / (D g GM - I w^2 + i d w) s(w)
+
+and its mean over a time t keeps the share (sin(w t / 2) / (w t / 2))^2 of its density.
+
 Source: IMO, Intact Stability Code (2008), annex 1, for the inclining test; E. V. Lewis (ed.), Principles of Naval
-Architecture (1988), volume I, for its errors.
+Architecture (1988), volume I, for its errors; A. Papoulis, Probability, Random Variables, and Stochastic Processes
+(1991), 13.1, for means over a time.
 """
 
 from __future__ import annotations
@@ -15,7 +22,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from expdesign.errors import InputError
+from expdesign.values import Array
+from expdesign.vessel import RollPendulum
 from expdesign.vessel.masses import G_MPS2
 
 MOST_HEEL_RAD = math.radians(10.0)
@@ -83,3 +94,31 @@ def inclining(
         inertia_kgm2=inertia,
         inertia_std_kgm2=inertia * math.hypot(height_share, 2.0 * period_std_s / period_s),
     )
+
+
+WAVE_FREQUENCIES = 2000
+"""Even steps of frequency up to three times that of the peak, beyond which waves are not counted."""
+
+
+def heel_in_waves(pendulum: RollPendulum, read_s: float) -> tuple[float, float]:
+    """Roll by the waves of the vessel file, beam on at rest [rad rms], and what is left of it in a mean over a time.
+
+    Args:
+        pendulum: of a ship that stays upright.
+        read_s: time over which heel is averaged; 0 for a reading in a moment.
+
+    Raises:
+        InputError: read_s is negative.
+    """
+    if not 0 <= read_s < math.inf:
+        raise InputError(f"read_s is {read_s:g}, expected 0 or more")
+    if pendulum.waves is None:
+        return 0.0, 0.0
+    highest = 3.0 * 2.0 * math.pi / pendulum.waves.period_s
+    w: Array = np.linspace(0.0, highest, WAVE_FREQUENCIES + 1)[1:]
+    beam_on = 2.0 * pendulum.waves.met_density(w, 0.0)  # which is that of all courses alike
+    righting = pendulum.righting_nm
+    gain = np.abs(righting / (righting - pendulum.inertia_kgm2 * w**2 + 1j * pendulum.parameters["d"] * w))
+    density = gain**2 * beam_on
+    kept = np.sinc(w * read_s / (2.0 * math.pi)) ** 2
+    return math.sqrt(float(density.sum() * w[0])), math.sqrt(float(density @ kept * w[0]))

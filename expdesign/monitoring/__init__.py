@@ -13,9 +13,9 @@ Sources: E. S. Page, Biometrika 41 (1954), 100-115; G. Lorden, Annals of Mathema
 M. Basseville and I. V. Nikiforov, Detection of Abrupt Changes (1993), chapters 2 and 8 for the local approach.
 """
 
-from expdesign.monitoring.alarms import Again
+from expdesign.monitoring.alarms import AS_LIKELY, Again
 from expdesign.monitoring.calibration import Calibration, calibrate
-from expdesign.monitoring.changes import Change, watched_changes
+from expdesign.monitoring.changes import EQUATIONS, Change, watched_changes
 from expdesign.monitoring.cusum import calls_of, estimates, threshold, watch
 from expdesign.monitoring.evidence import KINDS, Grams, grams_and_noise, grams_of, joined, later_part, stretch_length
 from expdesign.monitoring.noise import WHITE, Noise

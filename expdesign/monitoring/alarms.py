@@ -148,18 +148,34 @@ def _simulated(state: State, calibration: Calibration, again: Again | None, rule
     )
     assert state.pending is not None
     alarm = _attributed(state, replace(alarm, change=best), told[best].sums, calibration, named=best)
+    if alarm.named:
+        return replace(state, alarm=alarm)
     others = tuple(cause for cause in rest if likely[cause] > likely[best] - AS_LIKELY)
-    return replace(state, alarm=alarm if alarm.named else replace(alarm, as_likely=others))
+    pushes = _pushes(gone_over(state, calibration, again, rules, None, 0.0), calibration, likely[best])
+    return replace(state, alarm=replace(alarm, as_likely=others, pushes=pushes))
+
+
+def _pushes(told: Told | None, calibration: Calibration, likely: float) -> tuple[tuple[int, float], ...]:
+    """Steady accelerations since the change that explain the data as well as the best cause, see `Alarm.pushes`."""
+    if told is None:
+        return ()
+    first = len(told.shift)
+    gains = [-_cost(told, place, calibration) / 2.0 - likely for place in range(first, told.sums.score.shape[1])]
+    return tuple((axis, gain) for axis, gain in enumerate(gains) if gain > -AS_LIKELY)
 
 
 def gone_over(
-    state: State, calibration: Calibration, again: Again, rules: Rules, cause: int, size: float
+    state: State, calibration: Calibration, again: Again, rules: Rules, cause: int | None, size: float
 ) -> Told | None:
-    """The data since the alarm's change, with the ship changed by a cause alone; None where they are not at hand."""
+    """The data since the alarm's change, with the ship changed by a cause alone; None where they are not at hand.
+
+    Without a cause the ship is as before, and steady accelerations stand as further changes behind those of the ship.
+    """
     assert state.pending is not None
     sums, m = state.pending, len(state.shift)
     shift = state.before.copy()
-    shift[cause] += size
+    if cause is not None:
+        shift[cause] += size
     grams = again(shift, float(sums.since_s[0]))
     first, last = np.searchsorted(grams.time_s, [sums.since_s[0] - 1e-6, state.until_s - 1e-6]).tolist()
     if not first < last or grams.time_s[0] > sums.since_s[0] + 1e-6:
@@ -168,17 +184,19 @@ def gone_over(
     stretches = stretches_of(grams, calibration.std, calibration.ramp).less(calibration.baseline)
     nuisance, until_s, cost = calibration.nuisance, float(sums.known_s[0]), 0.0
     known = Known(mean=sums.mean[0], covariance=sums.covariance[0])
-    sums = replace(
-        sums, taken=0.0 * sums.taken, score=0.0 * sums.score, information=0.0 * sums.information, stretches=np.zeros(1)
-    )
-    for index, products in enumerate(stretches.products):
+    columns = np.arange(stretches.products.shape[-1])
+    pushes = columns[:0] if cause is not None else columns[-1 - grams.ramps : -1]
+    columns, among = np.r_[:m, pushes, m : len(columns)], m + len(pushes)
+    sums = replace(Sums.begun(1, among, known, float(sums.since_s[0]), sums.rougher[0]), known_s=sums.known_s)
+    for index, whole in enumerate(stretches.products):
+        products = whole[np.ix_(columns, columns)]
         if grams.shoal[index] > calibration.shoal_limit:
             continue
         begin_s, end_s = float(grams.time_s[index]), float(grams.time_s[index] + grams.duration_s[index])
         if begin_s - until_s >= rules.port_s:
             known = calibration.called(known)
         faded, keep = after_gap(known, nuisance, end_s - until_s), nuisance.memory(end_s - until_s)
-        one = judged(products, m, faded, loads=calibration.loads)
+        one = judged(products, among, faded, loads=calibration.loads)
         count = float(stretches.counts[index])
         if not fits(one, count, calibration, changed=True):
             cost += calibration.misfit_limit * count  # whatever the cause
@@ -194,14 +212,15 @@ def gone_over(
 def fits(one: Judged, count: float, calibration: Calibration, *, changed: bool) -> bool:
     """Whether the misfit of a stretch is one that the reference shows, or a large change leaves."""
     unlinear = UNEXPLAINED_SHARE * float(one.quadratic) / max(count, 1.0) if changed else 0.0
-    misfit = misfit_of(float(one.quadratic), one.score, one.information, count)
+    own = slice(len(calibration.baseline))
+    misfit = misfit_of(float(one.quadratic), one.score[own], one.information[own, own], count)
     return misfit <= calibration.misfit_limit + unlinear
 
 
 def _cost(told: Told, cause: int, calibration: Calibration) -> float:
     """Squared errors at the size of a cause that leaves the least, and at the best baseline for it."""
     score, information = beside_baseline(told.sums, calibration)
-    by_baseline = told.sums.score[0] / calibration.common @ calibration.baseline_covariance @ score
+    by_baseline = told.sums.score[0] / calibration.common @ _baseline(calibration, len(score)) @ score
     return told.cost / calibration.common - float(by_baseline) - float(score[cause] ** 2 / information[cause, cause])
 
 
@@ -212,9 +231,15 @@ def beside_baseline(pending: Sums, calibration: Calibration) -> tuple[Array, Arr
     every score moves: the score J (d + b) of a change d has the covariance J + J B J, where b has the covariance B.
     """
     information = pending.information[0] / calibration.common
-    spread = np.eye(len(information)) + information @ calibration.baseline_covariance
+    spread = np.eye(len(information)) + information @ _baseline(calibration, len(information))
     score = np.linalg.solve(spread, pending.score[0] / calibration.common)
     return score, np.asarray(np.linalg.solve(spread, information), dtype=float)
+
+
+def _baseline(calibration: Calibration, count: int) -> Array:
+    """(count, count) covariance of the baseline, zero for what no reference shows."""
+    own = calibration.baseline_covariance
+    return np.pad(own, (0, count - len(own)))
 
 
 def _gains(score: Array, information: Array, calibration: Calibration, alarm: Alarm) -> Array:

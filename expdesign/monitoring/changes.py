@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from expdesign.diagnosis.model import ExtendedModel
@@ -68,7 +69,12 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
     changes.append(Change(effect="gain", size=size, unit=(0.01, "%"), words=words, whole=1.0))
     stems = dict.fromkeys(stem(name) for name in model.inputs)
     changes += [
-        Change(effect=f"offset:{name}", size=share * ANGLE_RAD, unit=(1.0, "rad"), words=f"offset of {what} angles")
+        Change(
+            effect=f"offset:{name}",
+            size=share * ANGLE_RAD,
+            unit=(math.radians(1.0), "degrees"),
+            words=f"offset of {what} angles",
+        )
         for name, what in (("a", "azimuth"), ("rudder", "rudder"))
         if name in stems
     ]

@@ -64,7 +64,8 @@ def restored_state(table: dict[str, Any]) -> State:
 
 def restored_alarm(table: dict[str, Any]) -> Alarm:
     """An alarm, read from what `saved` made of it."""
-    return Alarm(**{**table, "as_likely": tuple(table["as_likely"])})
+    pushes = tuple((axis, gain) for axis, gain in table["pushes"])
+    return Alarm(**{**table, "as_likely": tuple(table["as_likely"]), "pushes": pushes})
 
 
 def restored_noise(table: dict[str, Any]) -> Noise:

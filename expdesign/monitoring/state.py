@@ -25,6 +25,9 @@ class Alarm:
     value: float = 0.0
     std: float = 0.0
     as_likely: tuple[int, ...] = ()  # numbers of other changes that explain them as well, best first
+    # steady accelerations since then, of the modelled ones of surge, sway and yaw by number, that explain them as well
+    # without a change of the ship, each with its log-likelihood over that of the change
+    pushes: tuple[tuple[int, float], ...] = ()
     unexplained: float = 0.0  # log-likelihood that all changes together gain beyond the best one
     named: bool = False  # the change was named, and its size is being refined
     settled: bool = False  # its size, too, is as sure as it is going to be, and the watch goes on from the changed ship

@@ -11,7 +11,7 @@ Source: doctoral thesis on grey-box identification of ship roll with few sensors
 several load conditions), chapters 4 to 6.
 """
 
-from expdesign.roll.estimate import METHODS, RollEstimate, estimate_roll, fitted_pendulum
+from expdesign.roll.estimate import METHODS, RollEstimate, estimate_roll, fitted_pendulum, metacentric_height
 from expdesign.roll.model import (
     MEANINGS,
     PARAMETERS,

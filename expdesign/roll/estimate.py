@@ -13,6 +13,7 @@ Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -32,19 +33,21 @@ from expdesign.roll.effects import (
     without_effects,
 )
 from expdesign.roll.instruments import Weighted, chance_of_answers, folds, weighted_equations
-from expdesign.roll.model import PARAMETERS, discrete, named, relative_sensitivity, roll_frequency
+from expdesign.roll.model import PARAMETERS, discrete, named, relative_sensitivity, roll_frequency, stiffness
 from expdesign.roll.problem import RollProblem, noise_of, residuals_of, sampled, slopes_of, surprise_of
 from expdesign.roll.profile import load_interval
 from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
+from expdesign.vessel.masses import G_MPS2, Load
 
 AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
 MOST_ROUNDS = 12  # of instruments and noise models
 SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
 LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
 LEAST_ROUNDS = 3  # before effects are looked for
+SMALL_STEP = 1e-6  # of derivatives, in typical sizes of the parameters
 UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
 
 
@@ -292,6 +295,25 @@ def _strength(
     information, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
     regular = seeming + 1e-12 * np.trace(seeming) * np.eye(len(seeming))
     return float(scipy.linalg.eigh(information, regular, eigvals_only=True)[0])
+
+
+def metacentric_height(estimate: RollEstimate, load: Load | None) -> tuple[float, float]:
+    """Metacentric height with a load on board, and its standard deviation for the held parameters as they are [m].
+
+    Args:
+        estimate: of the parameters.
+        load: on board; None for the unknown one.
+    """
+    problem = estimate.problem
+
+    def height(theta: Array) -> float:
+        mass = theta[PARAMETERS.index("m")] if load is None else load.mass_kg
+        return stiffness(theta, problem.body, load) / (G_MPS2 * float(problem.body.mass_kg + mass))
+
+    steps = SMALL_STEP * np.diag(problem.scale)[problem.places]
+    changes = [height(estimate.theta + step) - height(estimate.theta - step) for step in steps]
+    slope = np.array(changes) / (2.0 * SMALL_STEP * problem.scale[problem.places])
+    return height(estimate.theta), math.sqrt(max(float(slope @ estimate.covariance @ slope), 0.0))
 
 
 # An estimate as the roll pendulum of a vessel.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
 from expdesign.progress import Progress, silent, within
 from expdesign.step_trials.holds import Hold, Sailed
@@ -18,6 +19,8 @@ from expdesign.step_trials.tuning import TUNING
 ENTRY_CONSTANTS, LEAST_ENTRY_SAMPLES = 2.0, 10
 
 
+MEDIAN_OVER_MEAN = math.sqrt(math.pi / 2.0)
+"""Standard error of a median by that of a mean, of normal values."""
 SPEED_DEGREE = 3
 """Degree of the polynomial in time that the speed follows during a response."""
 
@@ -32,15 +35,19 @@ def samples_and_delays(
     """
     free = (0.0, TUNING.most_delay_s)
     samples = step_samples(batches, holds, steady, delay_s=(free, free), progress=within(progress, 0.0, 0.5))
-    delays = _delay(samples, 0), _rudder_delay(batches, samples)
+    delays = dead_time(samples, 0), _rudder_delay(batches, samples)
     bounds = tuple((value, value) for value, _ in delays)
     again = within(progress, 0.5, 1.0)
     fitted = step_samples(batches, holds, steady, delay_s=(bounds[0], bounds[1]), progress=again)
     return without_outliers(fitted), delays
 
 
-def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
-    """Median of the dead times of first order responses, weighted by their information, and its standard error."""
+def dead_time(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
+    """Median of the dead times of first order responses, weighted by their information, and its standard error.
+
+    That is of how they scatter. A few may agree by chance: it is their own errors, where these lie between the scatter
+    and Student's multiple of it.
+    """
     own = [one.first_order for one in samples if one.counts and one.hold.channel == channel]
     found = np.array([max(0.0, part.delay_s) for part in own if part is not None])
     if not len(found):
@@ -49,15 +56,21 @@ def _delay(samples: Sequence[StepSample], channel: int) -> tuple[float, float]:
     order = np.argsort(found)
     share = np.cumsum(weights[order]) / weights.sum()
     middle = float(found[order][np.searchsorted(share, 0.5)])
-    spread = math.sqrt(float(np.sum(weights * (found - middle) ** 2) / weights.sum()))
-    return middle, 1.2533 * spread * math.sqrt(float(np.sum(weights**2))) / float(weights.sum())
+    whole, squares = float(weights.sum()), float(np.sum(weights**2))
+    scatter = float(np.sum(weights * (found - middle) ** 2)) / whole
+    effective = whole**2 / squares
+    by_own, by_scatter, most = math.sqrt(1.0 / whole), 0.0, math.inf
+    if effective > 1.0 + 1e-9:
+        by_scatter = math.sqrt(scatter / (effective - 1.0))
+        most = by_scatter * float(scipy.special.stdtrit(effective - 1.0, 0.975)) / 1.96
+    return middle, MEDIAN_OVER_MEAN * min(max(by_own, by_scatter), most)
 
 
 def _rudder_delay(batches: Sequence[Sailed], samples: Sequence[StepSample]) -> tuple[float, float]:
     """Dead time of the rudder from responses of one shape, where there are enough of them."""
     own = [one for one in samples if one.counts and one.hold.channel == 1]
     if len(own) < LEAST_GROUP:
-        return _delay(samples, 1)
+        return dead_time(samples, 1)
     return shared_delay([turn_entry(batches[one.hold.batch], one) for one in own], most_s=TUNING.most_delay_s)
 
 

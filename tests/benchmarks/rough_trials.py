@@ -1,6 +1,6 @@
 """Step and roll trials in weather, by simulations that are not the project's: how often it is right what is said.
 
-`python tests/benchmarks/rough_trials.py STUDY [--seeds N] [--only CASE]`, one row for each case of a study:
+`python tests/benchmarks/rough_trials.py STUDY [--seeds N] [--seed FIRST] [--only CASE]`, a row for each case:
 
 steps: shares of 95 % intervals that hold, in gusts and in a current; hysteresis found; holds astern; halves.
 holds: at 1 Hz, shares of trials with a model when held for as long as there is, and as is said to do.
@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.errors import ExpdesignError
 from expdesign.step_trials import StepTrial, controls_of, identify_steps
 from plain_craft import CONSTANTS_S, RATE_PER_RAD, ROUND, Craft, record, steady_speed
-from plain_roller import Sea, estimated
+from plain_roller import Sea, deviations, estimated, height_deviations
 
 LEVELS = tuple((n, a) for a in (0.15, 0.3) for n in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0))
 ASTERN = ((4.0, 0.2), (-4.0, 0.2), (-7.0, 0.2), (-4.0, 0.2), (4.0, 0.2))
@@ -33,6 +33,13 @@ SEAS = {
     "calm, rudder by the clock, damping 8 % by the square": Sea(zigzag_s=12.0, quadratic=0.08),
     "calm, damping by the square half of the linear one": Sea(quadratic=0.5),
     "waves, roll of 1 degree": Sea(roll_deg=1.0),
+    "waves of the roll period, roll of 1 degree": Sea(roll_deg=1.0, wave_s=7.5),
+    "waves, roll of 1 degree, rudder by the clock, damping 8 % by the square": Sea(
+        roll_deg=1.0, zigzag_s=12.0, quadratic=0.08
+    ),
+    "waves, roll of 1 degree, sensor 2 m before midships, tilted by 2 degrees": Sea(
+        roll_deg=1.0, forward_m=2.0, tilt_deg=2.0
+    ),
     "sensor 3 m before midships": Sea(forward_m=3.0),
     "tilt of 2 degrees, 2 m before, damping 20 % by the square": Sea(quadratic=0.2, forward_m=2.0, tilt_deg=2.0),
 }
@@ -42,10 +49,11 @@ def _identified(seed: int, craft: Craft) -> StepTrial:
     return identify_steps(record(seed, craft), controls_of(("n1", "rudder1")))
 
 
-def _covered(seeds: int, craft: Craft) -> str:
-    found: dict[str, list[bool]] = {"U": [], "r": [], "T": []}
-    for seed in range(seeds):
+def _covered(seeds: range, craft: Craft) -> str:
+    found: dict[str, list[bool]] = {"U": [], "r": [], "T": [], "dead time": []}
+    for seed in seeds:
         trial = _identified(seed, craft)
+        found["dead time"] += [abs(value - craft.delay_s) < 1.96 * std for value, std in trial.delays]
         for one in trial.samples:
             if one.plateau is None:
                 continue
@@ -63,18 +71,18 @@ def _covered(seeds: int, craft: Craft) -> str:
     return ", ".join(f"{name} {100 * np.mean(hits):.0f} % of {len(hits)}" for name, hits in found.items())
 
 
-def _hysteresis(seeds: int, craft: Craft) -> str:
+def _hysteresis(seeds: range, craft: Craft) -> str:
     found = 0
-    for seed in range(seeds):
+    for seed in seeds:
         said = [one for one in _identified(seed, craft).found if (one.kind, one.command) == ("hysteresis", "throttle")]
         found += any(one.p_value < 0.01 for one in said)
-    return f"said in {found} of {seeds}"
+    return f"said in {found} of {len(seeds)}"
 
 
-def _astern(seeds: int) -> str:
+def _astern(seeds: range) -> str:
     """Whether a hold astern gives a steady state, and how far its speed is from that ahead of the same propeller."""
     silent, worst = 0, 0.0
-    for seed in range(seeds):
+    for seed in seeds:
         try:
             trial = _identified(seed, Craft(steps=ROUND + ASTERN))
         except ExpdesignError:
@@ -82,12 +90,12 @@ def _astern(seeds: int) -> str:
         states = [(one.plateau.state[0], one.hold.commands[0]) for one in trial.samples if one.plateau is not None]
         apart = [abs(speed - 0.4 * n) for speed, n in states if n < 0]
         silent, worst = silent + bool(apart), max([worst, *apart])
-    return f"taken as steady ahead in {silent} of {seeds}" + (f", up to {worst:.2f} m/s off" if silent else "")
+    return f"taken as steady ahead in {silent} of {len(seeds)}" + (f", up to {worst:.2f} m/s off" if silent else "")
 
 
-def _half(seeds: int) -> str:
+def _half(seeds: range) -> str:
     found, errors = 0, []
-    for seed in range(seeds):
+    for seed in seeds:
         try:
             trial = _identified(seed, Craft(steps=ROUND[:7]))
         except ExpdesignError:
@@ -97,10 +105,10 @@ def _half(seeds: int) -> str:
         assert damping is not None
         errors += [damping.at(speed, 0.12) * 0.4 - speed for speed in (2.0, 3.0, 4.0)]
     rms = f", speeds within {np.sqrt(np.mean(np.square(errors))):.3f} m/s rms" if errors else ""
-    return f"the speed's half in {found} of {seeds}{rms}"
+    return f"the speed's half in {found} of {len(seeds)}{rms}"
 
 
-def steps(seeds: int) -> Iterator[tuple[str, str]]:
+def steps(seeds: range) -> Iterator[tuple[str, str]]:
     """Rows of step trials."""
     for name, craft in COVERED.items():
         yield f"intervals, {name}", _covered(seeds, craft)
@@ -110,11 +118,11 @@ def steps(seeds: int) -> Iterator[tuple[str, str]]:
     yield "steps of the throttle alone", _half(seeds)
 
 
-def holds(seeds: int) -> Iterator[tuple[str, str]]:
+def holds(seeds: range) -> Iterator[tuple[str, str]]:
     """Rows of short holds at 1 Hz."""
     for hold_s in (12.0, 20.0, 40.0):
         first, then, lengths = 0, 0, []
-        for seed in range(seeds):
+        for seed in seeds:
             try:
                 _identified(seed, Craft(step_s=1.0, hold_s=hold_s))
                 first += 1
@@ -130,27 +138,33 @@ def holds(seeds: int) -> Iterator[tuple[str, str]]:
             if lengths
             else ""
         )
-        yield f"1 Hz, holds of {hold_s:g} s", f"a model in {first} of {seeds}{said}"
+        yield f"1 Hz, holds of {hold_s:g} s", f"a model in {first} of {len(seeds)}{said}"
 
 
-def roll(seeds: int, only: str = "") -> Iterator[tuple[str, str]]:
+def roll(seeds: range, only: str = "") -> Iterator[tuple[str, str]]:
     """Rows of roll trials; intervals of two standard deviations where there is no profile."""
     for name, sea in SEAS.items():
         if not name.startswith(only):
             continue
         inside = trusted = answers = 0
-        errors = []
-        for seed in range(seeds):
+        errors, others, heights = [], [], []
+        for seed in seeds:
             one = estimated(seed, sea)
             value, std = one.values["m"], one.std["m"]
-            low, high = getattr(one, "load_interval", None) or (value - 1.96 * std, value + 1.96 * std)
+            low, high = one.load_interval or (value - 1.96 * std, value + 1.96 * std)
             trusted += one.trusted
             answers += one.answering
-            inside += one.trusted and low <= sea.load[0] <= high
-            errors += [value - sea.load[0]] * one.trusted
+            if not one.trusted:
+                continue
+            inside += low <= sea.load[0] <= high
+            errors.append(value - sea.load[0])
+            others += [abs(z) < 1.96 for z in deviations(one)]
+            heights += [abs(z) < 1.96 for z in height_deviations(one, sea)]
         rms = f", error {np.sqrt(np.mean(np.square(errors))):.0f} kg rms" if errors else ""
+        if others:
+            rms += f"; inside 95 %: other parameters {np.mean(others):.0%}, metacentric heights {np.mean(heights):.0%}"
         said = f"rudder said to answer in {answers}"
-        yield name, f"trusted {trusted} of {seeds}, load inside in {inside}{rms}; {said}"
+        yield name, f"trusted {trusted} of {len(seeds)}, load inside in {inside}{rms}; {said}"
 
 
 STUDIES = {"steps": steps, "holds": holds, "roll": roll}
@@ -159,11 +173,13 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("study", choices=STUDIES)
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0, help="the first of them")
     parser.add_argument("--only", default="", help="beginning of the names of cases of roll")
     asked = parser.parse_args()
     print("| case | found | processor s |\n|---|---|---|")
     begun = time.process_time()
-    rows = roll(asked.seeds, asked.only) if asked.study == "roll" else STUDIES[asked.study](asked.seeds)
+    several = range(asked.seed, asked.seed + asked.seeds)
+    rows = roll(several, asked.only) if asked.study == "roll" else STUDIES[asked.study](several)
     for case, text in rows:
         print(f"| {case} | {text} | {time.process_time() - begun:.0f} |", flush=True)
         begun = time.process_time()

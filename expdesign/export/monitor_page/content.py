@@ -4,81 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.export.files import finite, strict_json
-from expdesign.export.roll_words import change_words, stability_words
+from expdesign.export.monitor_page.rolled import roll_entry, roll_sentences
 from expdesign.export.words import HOUR, counted, hours, percent, times, told_apart, when
-from expdesign.monitoring import Alarm, Calibration, Call, Change, RollEvent, RollWatch, State, calls_of
+from expdesign.monitoring import (
+    AS_LIKELY,
+    EQUATIONS,
+    Alarm,
+    Calibration,
+    Call,
+    Change,
+    RollWatch,
+    State,
+    calls_of,
+)
 from expdesign.values import Array
-
-# A watch over roll as sentences and JSON.
-
-SHOWN = 5
-
-
-def roll_sentences(watch: RollWatch | None, *, false_alarm_days: float) -> tuple[str, ...]:
-    """The verdict on roll; nothing for a vessel file without [roll]."""
-    return () if watch is None else tuple(_sentences_roll(watch, false_alarm_days))
-
-
-def _sentences_roll(watch: RollWatch, days: float) -> Iterator[str]:
-    if not watch.judged_s:
-        why = f": {watch.reason}" if watch.reason else ""
-        yield f"Roll, [roll] of the vessel file, was not judged{why}."
-        return
-    if not watch.alarms:
-        yield (
-            f"She rolls as in the reference, in {hours(watch.judged_s)} that were judged, with at most one false "
-            f"alarm of any kind in {days:g} days on average."
-        )
-    yield from (_event(event) for event in watch.events[-SHOWN:])
-    if watch.left_out_s > watch.judged_s:
-        yield f"{hours(watch.left_out_s)} give no information about roll; the last reason: {watch.reason}."
-
-
-def _event(event: RollEvent) -> str:
-    call = ", after a port call, which raises no alarm" if event.after_call else ""
-    text = f"She rolls otherwise since a time between {when(event.since_s)} and {when(event.time_s)}{call}: "
-    if not event.causes:
-        return text + "no cause that is watched for explains it; expdesign roll estimates all."
-    text += change_words(event.causes, event.sizes, event.stds, load=event.load, values=event.values) + ". "
-    text += stability_words(*event.righting_nm, mass_kg=event.mass_kg, load=event.load)
-    if event.others:
-        text += f" Explained about as well by: {'; '.join(' and '.join(one) for one in event.others)}."
-    return text if event.settled else text + " The size is not yet settled."
-
-
-def roll_entry(watch: RollWatch | None, *, false_alarm_days: float) -> dict[str, Any]:
-    """The entry of roll in monitor.json; nothing for a vessel file without [roll]."""
-    if watch is None:
-        return {}
-    entry = {
-        "verdict": list(roll_sentences(watch, false_alarm_days=false_alarm_days)),
-        "judged_h": watch.judged_s / HOUR,
-        "not_judged_h": watch.left_out_s / HOUR,
-        "changes": [_entry(event) for event in watch.events],
-    }
-    return {"roll": entry}
-
-
-def _entry(event: RollEvent) -> dict[str, Any]:
-    sizes = zip(event.causes, event.sizes, event.stds, strict=True)
-    return {
-        "since_s": event.since_s,
-        "time_s": event.time_s,
-        "alarm": not event.after_call,
-        "settled": event.settled,
-        "p_value": event.p_value,
-        "causes": {cause: {"size": size, "std": std} for cause, size, std in sizes},
-        "load": None if event.load is None else {"mass_kg": event.load[0], "height_m": event.load[1]},
-        "righting_nm": [finite(value) for value in event.righting_nm],
-        "as_likely": [list(causes) for causes in event.others],
-    }
-
 
 ALIKE = 0.95
 """Correlation of scores from which two changes count as not distinguishable."""
@@ -263,9 +207,17 @@ def _call(content: MonitorContent, call: Call) -> str:
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     statistic, limit = told_apart(alarm.statistic, content.limit)
+    weather, push = "", ""
+    if alarm.pushes:
+        better = "better" if max(gain for _, gain in alarm.pushes) > AS_LIKELY else "as well"
+        weather = " or the weather"
+        push = (
+            f", or a steady push in {' or '.join(pushed(content, alarm))} by wind or current, which explains the data "
+            f"{better}"
+        )
     text = (
-        f"Since {when(alarm.since_s)} the ship is another: {change.words} by {size_in_words(content, alarm)}. "
-        f"The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
+        f"Since {when(alarm.since_s)} the ship{weather} is another: {change.words} by {size_in_words(content, alarm)}"
+        f"{push}. The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
     )
     if alarm.as_likely:
         others = few([content.changes[number].words for number in alarm.as_likely])
@@ -278,6 +230,13 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     if not alarm.settled:
         text += " The size is not yet settled."
     return text
+
+
+def pushed(content: MonitorContent, alarm: Alarm) -> list[str]:
+    """Equations in which a steady push would do what the change does, the likeliest first."""
+    named = {change.effect: change for change in content.changes}
+    axes = [EQUATIONS[name] for name in EQUATIONS if f"inertia:{name}" in named]
+    return [axes[axis] for axis, _ in sorted(alarm.pushes, key=lambda one: -one[1])]
 
 
 def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
@@ -422,5 +381,6 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "std": alarm.std * change.size,
         "in_words": f"{change.words} by {size_in_words(content, alarm)}",
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
+        "as_likely_pushes": pushed(content, alarm),
         "settled": alarm.settled,
     }

@@ -47,7 +47,7 @@ def coverage_figure(content: StepTrialContent) -> str:
     axes.plot(middles[:, 0], middles[:, 1], "x", color=VERMILION, markersize=4, label="middles of steps that count")
     axes.set_xlabel("speed U [m/s]")
     axes.set_ylabel("yaw rate r [rad/s]")
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(loc="best", fontsize=8)
     light_grid(axes)
     return svg(figure, key="coverage", label="Steady states and steps in the plane of speed and yaw rate")
 

@@ -110,7 +110,7 @@ class PendulumTable(Table):
     load: LoadTable = Field(default=LoadTable(), description="a table [roll.load]: what lies on board")
     waves: WavesTable | None = Field(
         default=None,
-        description="a table [roll.waves]: waves that roll the ship by their slope, in simulate and roll-plan",
+        description="a table [roll.waves]: waves that roll the ship by their slope, in simulate, incline and roll-plan",
     )
 
 
