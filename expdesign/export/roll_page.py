@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Mark, Table, filled, section
-from expdesign.export.files import finite, plus_minus, strict_json
+from expdesign.export.files import finite, strict_json
 from expdesign.export.words import percent
 from expdesign.roll import (
     EFFECTS,
