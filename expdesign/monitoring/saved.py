@@ -64,7 +64,7 @@ def restored_state(table: dict[str, Any]) -> State:
 
 def restored_alarm(table: dict[str, Any]) -> Alarm:
     """An alarm, read from what `saved` made of it."""
-    pushes = tuple((axis, gain) for axis, gain in table["pushes"])
+    pushes = tuple((axis, gain) for axis, gain in table.get("pushes", ()))
     return Alarm(**{**table, "as_likely": tuple(table["as_likely"]), "pushes": pushes})
 
 
