@@ -60,6 +60,8 @@ def test_a_headline_gives_the_few_numbers_of_a_cause_and_what_the_file_says():
     sizes = "north_mps 0.100 \N{PLUS-MINUS SIGN} 0.020, east_mps 0.100 \N{PLUS-MINUS SIGN} 0.020"
     assert f"lacks a current ({sizes})" in verdict([current], BEFORE)
     assert "lacks a current." in verdict([replace(current, estimates=(*flow, drag))], BEFORE)  # the table has them all
+    unknown = replace(current, estimates=(replace(drag, value=np.nan),))
+    assert "lacks a current." in verdict([unknown], BEFORE)
 
 
 def test_every_cause_of_a_verdict_has_its_own_number():

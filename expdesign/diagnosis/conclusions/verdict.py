@@ -193,7 +193,8 @@ def _with_sizes(item: Finding) -> str:
         says = "" if one.stated is None else f", the file says {plus_minus(one.stated, 0.0)}"
         sizes.append(f"{name}{plus_minus(one.value, one.std)}{says}")
     between = ", " if all(one.stated is None for one in item.estimates) else "; "
-    return f"{what} ({between.join(sizes)})" if 0 < len(sizes) <= MOST_SIZES else what
+    told = 0 < len(sizes) <= MOST_SIZES and all(np.isfinite(one.value) for one in item.estimates)
+    return f"{what} ({between.join(sizes)})" if told else what
 
 
 def _advice(findings: Sequence[Finding]) -> str:
