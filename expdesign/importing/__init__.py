@@ -14,7 +14,7 @@ Times count from 1970 UTC where a clock has a date. Angles are in radians, headi
 """
 
 from expdesign.importing.alignment import Lag, lag_of, zone_lag_of
-from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log
+from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log, joined
 from expdesign.importing.guess import guess
 from expdesign.importing.labels import family, fitted, presumed
 from expdesign.importing.machines import bow_signals, sides

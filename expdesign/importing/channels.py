@@ -23,6 +23,8 @@ RESET_S, RESET_STEPS = 2.0, 10.0
 """A step back in time of more than both, in seconds and usual steps, is a clock that began anew."""
 RESTART_GAP_S = 60.0
 """Put between readings before and after a clock began anew [s]."""
+ALIKE = 0.8  # share of channels by which two files are of one logger
+OVERLAP_S = 2.0  # by which the next file of a logger may begin before the end of the one before
 DAY_S = 86400.0
 LARGEST = 1e20
 """No reading of any quantity in any unit is as large; times in ns since 1970 are 2e18."""
@@ -193,3 +195,63 @@ class Blocks:
         if own is not None and len(own) > 1:
             own[:] = [np.concatenate(own)]  # in place of its blocks, so that both are not kept
         return own[0] if own else np.zeros(0)
+
+
+def joined(logs: Sequence[Log]) -> list[Log]:
+    """Logs, those that one logger wrote one after another as one, under the name of the first of them.
+
+    They have the same channels and clock, and times that do not overlap. A clock of its own that began anew in the next
+    file, with the very same channels, goes on after a gap.
+    """
+    found: list[Log] = []
+    for log in sorted(logs, key=_begin_s):
+        before = next((one for one in found if _goes_on(one, log)), None)
+        if before is None:
+            found.append(log)
+        else:
+            found[found.index(before)] = _with_next(before, log)
+    place = {log.source: number for number, log in enumerate(logs)}
+    return sorted(found, key=lambda log: place[log.source])
+
+
+def _begin_s(log: Log) -> float:
+    """When a log begins; of clocks of their own, nobody knows."""
+    own = log.clock in (OWN, NONE) or not log.channels
+    return -np.inf if own else min(float(channel.time_s[0]) for channel in log.channels)
+
+
+def _end_s(log: Log) -> float:
+    return max(float(channel.time_s[-1]) for channel in log.channels)
+
+
+def _goes_on(log: Log, later: Log) -> bool:
+    names, others = ({(channel.name, channel.unit) for channel in one.channels} for one in (log, later))
+    if log.clock != later.clock or log.clock == NONE or not names or not others:
+        return False
+    if log.clock == OWN:
+        return names == others
+    return len(names & others) >= ALIKE * max(len(names), len(others)) and _begin_s(later) > _end_s(log) - OVERLAP_S
+
+
+def _with_next(log: Log, later: Log) -> Log:
+    """A log and the one that goes on from it, as one."""
+    begin_s, end_s = min(float(channel.time_s[0]) for channel in later.channels), _end_s(log)
+    anew = log.clock == OWN and begin_s < end_s
+    shift_s = end_s + RESTART_GAP_S - begin_s if anew else 0.0
+    parts = {channel.name: [channel] for channel in log.channels}
+    for channel in later.channels:
+        parts.setdefault(channel.name, []).append(replace(channel, time_s=channel.time_s + shift_s))
+    how = "its clock began anew, so that it counts after a gap" if anew else "its times come after"
+    note = f"{later.source} has the same channels and is read as what comes next: {how}"
+    return replace(
+        log,
+        channels=tuple(_in_a_row(own, log.source) for own in parts.values()),
+        notes=(*log.notes, note, *(f"{later.source}: {text}" for text in later.notes)),
+        unused=tuple(dict.fromkeys((*log.unused, *later.unused))),
+    )
+
+
+def _in_a_row(parts: Sequence[Channel], source: str) -> Channel:
+    times, values = (np.concatenate(own) for own in ([one.time_s for one in parts], [one.values for one in parts]))
+    order = np.argsort(times, kind="stable")
+    return replace(parts[0], source=source, time_s=times[order], values=values[order])

@@ -45,6 +45,7 @@ from expdesign.importing import (
     followed,
     guess,
     inputs_of,
+    joined,
     lag_of,
     length_of_speed_m,
     presumed,
@@ -124,6 +125,7 @@ def import_logs(
     for k, path in enumerate(logs):
         progress(f"reading {path.name}", 0.6 * k / len(logs))
         read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0)))
+    read = joined(read)
     mapping = guess(read, () if ship is None else ship.actuators) if given is None else _checked(given, read, map_file)
     mapping = replace(
         mapping,
@@ -132,6 +134,11 @@ def import_logs(
     )
     folder = out or Path("runs") / f"{logs[0].stem}-runs"
     notes = [f"{log.source}: {note}" for log in read for note in log.notes]
+    used = {use.file for use in mapping.uses if use.column}
+    notes += [
+        f"{log.source}: nothing of it is used: its channels are none that are read, or those of other logs"
+        for log in read if log.channels and log.source not in used
+    ]  # fmt: skip
     command = command_text("import", logs, {
         "--vessel": vessel, "--plan": plan, "--map": map_file, "--sample-time": sample_time_s, "--length-m": length_m,
         "--out": out,

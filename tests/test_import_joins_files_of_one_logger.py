@@ -1,0 +1,92 @@
+"""Files that one logger wrote one after another are one log, whatever their order; others stand beside each other."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expdesign import workflows
+from expdesign.importing import COMPUTER, GNSS, NONE, OWN, Channel, Log, joined
+from expdesign.importing.channels import RESTART_GAP_S
+from instrumented_ship import NAMES, POSE, voyages, write_log
+
+
+def log(source: str, begin_s: float, clock: str, names: str = "abcde", unit: str = "") -> Log:
+    """A minute of readings that tell the file."""
+    time_s, values = begin_s + np.arange(60.0), np.full(60, float(source[-1]))
+    channels = tuple(Channel(name=name, source=source, unit=unit, time_s=time_s, values=values) for name in names)
+    return Log(source=source, clock=clock, channels=channels)
+
+
+@pytest.mark.parametrize("clock", [GNSS, COMPUTER])
+def test_files_are_put_in_the_order_of_their_times(clock: str) -> None:
+    (whole,) = joined([log("file 3", 7200.0, clock), log("file 1", 0.0, clock), log("file 2", 60.0, clock)])
+    assert whole.source == "file 1"
+    assert len(whole.notes) == 2
+    for channel in whole.channels:
+        assert channel.time_s[::60].tolist() == [0.0, 60.0, 7200.0]
+        assert channel.values[::60].tolist() == [1.0, 2.0, 3.0]
+        assert (np.diff(channel.time_s) > 0).all()
+
+
+def test_a_clock_of_its_own_that_begins_anew_goes_on_after_a_gap_and_one_that_does_not_goes_on() -> None:
+    (anew,) = joined([log("file 1", 0.0, OWN), log("file 2", 0.0, OWN)])
+    assert anew.channels[0].time_s[60] == 59.0 + RESTART_GAP_S
+    assert "began anew" in anew.notes[0]
+    (on,) = joined([log("file 1", 0.0, OWN), log("file 2", 70.0, OWN)])
+    assert on.channels[0].time_s[60] == 70.0
+    assert "come after" in on.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (log("file 1", 0.0, GNSS), log("file 2", 30.0, GNSS)),  # at once
+        (log("file 1", 0.0, GNSS), log("file 2", 60.0, GNSS, "abcxy")),  # other instruments
+        (log("file 1", 0.0, GNSS), log("file 2", 60.0, GNSS, unit="kn")),
+        (log("file 1", 0.0, GNSS), log("file 2", 60.0, COMPUTER)),
+        (log("file 1", 0.0, OWN), log("file 2", 0.0, OWN, "abcd")),
+        (log("file 1", 0.0, NONE), log("file 2", 60.0, NONE)),
+    ],
+)
+def test_what_is_no_next_file_of_the_same_logger_stays_apart(one: Log, other: Log) -> None:
+    assert joined([one, other]) == [one, other]
+
+
+def test_a_channel_that_is_in_some_files_alone_is_kept() -> None:
+    (whole,) = joined([log("file 1", 0.0, GNSS), log("file 2", 60.0, GNSS, "abcdef")])
+    assert {channel.name: len(channel) for channel in whole.channels} == {**dict.fromkeys("abcde", 120), "f": 60}
+
+
+def dated(path: Path, sailed: dict[str, np.ndarray], names: tuple[str, ...]) -> tuple[str, list[str]]:
+    """Header and rows of a log, with times since 1970."""
+    header, *rows = write_log(path, sailed, names).read_text(encoding="utf-8").splitlines()
+    rows = [f"{1.7e9 + float(row.partition(',')[0]):.1f},{row.partition(',')[2]}" for row in rows]
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return header, rows
+
+
+def test_a_log_in_parts_gives_the_runs_of_the_whole(tmp_path: Path) -> None:
+    """Written in parts at any sample; the files of the runs are the same to the last bit."""
+    (sailed,) = voyages(1, "zigzag", last_s=240.0, gust=0.3)
+    header, rows = dated(tmp_path / "whole.csv", sailed, POSE)
+    parts = [tmp_path / f"part{number}.csv" for number in (1, 2, 3)]
+    for path, own in zip(parts, (rows[:71], rows[71:150], rows[150:]), strict=True):
+        path.write_text("\n".join([header, *own]) + "\n", encoding="utf-8")
+    workflows.import_logs([tmp_path / "whole.csv"], tmp_path / "of-whole")
+    workflows.import_logs([parts[1], parts[2], parts[0]], tmp_path / "of-parts")
+    runs = sorted(path.name for path in (tmp_path / "of-whole").glob("*.csv"))
+    assert runs
+    assert runs == sorted(path.name for path in (tmp_path / "of-parts").glob("*.csv"))
+    for name in runs:
+        assert (tmp_path / "of-parts" / name).read_bytes() == (tmp_path / "of-whole" / name).read_bytes()
+
+
+def test_a_log_of_which_nothing_is_used_is_told(tmp_path: Path) -> None:
+    one, other = voyages(2, "zigzag", last_s=240.0, gust=0.3)
+    for name, own in (("one.csv", one), ("other.csv", other)):  # two loggers at once
+        dated(tmp_path / name, own, NAMES)
+    outcome = workflows.import_logs([tmp_path / "one.csv", tmp_path / "other.csv"], tmp_path / "out")
+    said = " ".join((tmp_path / "out" / "import.json").read_text(encoding="utf-8").split())
+    assert "other.csv: nothing of it is used" in said
+    assert any("other.csv: nothing of it is used" in note for note in outcome.document.notes)
