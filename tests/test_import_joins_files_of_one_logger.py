@@ -33,7 +33,7 @@ def test_a_clock_of_its_own_that_begins_anew_goes_on_after_a_gap_and_one_that_do
     (anew,) = joined([log("file 1", 0.0, OWN), log("file 2", 0.0, OWN)])
     assert anew.channels[0].time_s[60] == 59.0 + RESTART_GAP_S
     assert "began anew" in anew.notes[0]
-    (on,) = joined([log("file 1", 0.0, OWN), log("file 2", 70.0, OWN)])
+    (on,) = joined([log("file 2", 70.0, OWN), log("file 1", 0.0, OWN)])
     assert on.channels[0].time_s[60] == 70.0
     assert "come after" in on.notes[0]
 
@@ -51,6 +51,19 @@ def test_a_clock_of_its_own_that_begins_anew_goes_on_after_a_gap_and_one_that_do
 )
 def test_what_is_no_next_file_of_the_same_logger_stays_apart(one: Log, other: Log) -> None:
     assert joined([one, other]) == [one, other]
+
+
+def test_beside_another_log_nobody_knows_how_long_the_gap_of_a_clock_that_began_anew_was() -> None:
+    logs = [log("file 1", 0.0, OWN), log("file 2", 0.0, OWN), log("other 3", 0.0, GNSS, "xyz")]
+    assert joined(logs) == logs
+    later = [logs[0], log("file 2", 70.0, OWN), logs[2]]  # the same clock, which runs on
+    assert [one.source for one in joined(later)] == ["file 1", "other 3"]
+
+
+def test_a_file_of_which_the_mapping_speaks_stays_apart() -> None:
+    logs = [log("file 1", 0.0, GNSS), log("file 2", 60.0, GNSS)]
+    assert joined(logs, apart=["file 1"]) != logs
+    assert joined(logs, apart=["file 1", "file 2"]) == logs
 
 
 def test_a_channel_that_is_in_some_files_alone_is_kept() -> None:

@@ -5,7 +5,7 @@ Times count from 1970 UTC where the clock is that of a satellite receiver or a c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -197,57 +197,74 @@ class Blocks:
         return own[0] if own else np.zeros(0)
 
 
-def joined(logs: Sequence[Log]) -> list[Log]:
+def joined(logs: Sequence[Log], apart: Collection[str] = ()) -> list[Log]:
     """Logs, those that one logger wrote one after another as one, under the name of the first of them.
 
-    They have the same channels and clock, and times that do not overlap. A clock of its own that began anew in the next
-    file, with the very same channels, goes on after a gap.
+    They have the same channels and clock, and times that do not overlap. Where there is no other log, whose times they
+    would have to fit, a clock of its own that began anew in the next file goes on after a gap.
+
+    Args:
+        logs: as read.
+        apart: names of files that go on from no other.
     """
-    found: list[Log] = []
+    groups: list[list[Log]] = []
+    no_other = len({(log.clock, _names(log)) for log in logs}) == 1
     for log in sorted(logs, key=_begin_s):
-        before = next((one for one in found if _goes_on(one, log)), None)
-        if before is None:
-            found.append(log)
+        group = None if log.source in apart else next((one for one in groups if _goes_on(one[-1], log, no_other)), None)
+        if group is None:
+            groups.append([log])
         else:
-            found[found.index(before)] = _with_next(before, log)
+            group.append(_after(group[-1], log))
     place = {log.source: number for number, log in enumerate(logs)}
-    return sorted(found, key=lambda log: place[log.source])
+    return sorted((_as_one(group) for group in groups), key=lambda log: place[log.source])
+
+
+def _names(log: Log) -> frozenset[tuple[str, str]]:
+    return frozenset((channel.name, channel.unit) for channel in log.channels)
 
 
 def _begin_s(log: Log) -> float:
-    """When a log begins; of clocks of their own, nobody knows."""
-    own = log.clock in (OWN, NONE) or not log.channels
-    return -np.inf if own else min(float(channel.time_s[0]) for channel in log.channels)
+    return min((float(channel.time_s[0]) for channel in log.channels), default=0.0)
 
 
 def _end_s(log: Log) -> float:
     return max(float(channel.time_s[-1]) for channel in log.channels)
 
 
-def _goes_on(log: Log, later: Log) -> bool:
-    names, others = ({(channel.name, channel.unit) for channel in one.channels} for one in (log, later))
-    if log.clock != later.clock or log.clock == NONE or not names or not others:
+def _goes_on(log: Log, later: Log, no_other: bool) -> bool:
+    names, others = _names(log), _names(later)
+    if log.clock != later.clock or log.clock == NONE or len(names & others) < ALIKE * max(len(names), len(others), 1):
         return False
-    if log.clock == OWN:
-        return names == others
-    return len(names & others) >= ALIKE * max(len(names), len(others)) and _begin_s(later) > _end_s(log) - OVERLAP_S
+    return _begin_s(later) > _end_s(log) - OVERLAP_S or (log.clock == OWN and no_other)
 
 
-def _with_next(log: Log, later: Log) -> Log:
-    """A log and the one that goes on from it, as one."""
-    begin_s, end_s = min(float(channel.time_s[0]) for channel in later.channels), _end_s(log)
-    anew = log.clock == OWN and begin_s < end_s
-    shift_s = end_s + RESTART_GAP_S - begin_s if anew else 0.0
-    parts = {channel.name: [channel] for channel in log.channels}
-    for channel in later.channels:
-        parts.setdefault(channel.name, []).append(replace(channel, time_s=channel.time_s + shift_s))
+def _after(log: Log, later: Log) -> Log:
+    """The next log, on the clock of the one before, with a note on what it is."""
+    begin_s, end_s = _begin_s(later), _end_s(log)
+    anew = begin_s <= end_s - OVERLAP_S
     how = "its clock began anew, so that it counts after a gap" if anew else "its times come after"
-    note = f"{later.source} has the same channels and is read as what comes next: {how}"
+    note = f"has the same channels and is read as what comes next: {how}"
+    shift_s = end_s + RESTART_GAP_S - begin_s if anew else 0.0
+    channels = later.channels
+    if anew:
+        channels = tuple(replace(channel, time_s=channel.time_s + shift_s) for channel in channels)
+    return replace(later, channels=channels, notes=(note, *later.notes))
+
+
+def _as_one(group: Sequence[Log]) -> Log:
+    """Logs one after another as one."""
+    first, *others = group
+    if not others:
+        return first
+    parts: dict[str, list[Channel]] = {}
+    for log in group:
+        for channel in log.channels:
+            parts.setdefault(channel.name, []).append(channel)
     return replace(
-        log,
-        channels=tuple(_in_a_row(own, log.source) for own in parts.values()),
-        notes=(*log.notes, note, *(f"{later.source}: {text}" for text in later.notes)),
-        unused=tuple(dict.fromkeys((*log.unused, *later.unused))),
+        first,
+        channels=tuple(_in_a_row(own, first.source) for own in parts.values()),
+        notes=(*first.notes, *(f"{log.source}: {note}" for log in others for note in log.notes)),
+        unused=tuple(dict.fromkeys(text for log in group for text in log.unused)),
     )
 
 

@@ -125,7 +125,7 @@ def import_logs(
     for k, path in enumerate(logs):
         progress(f"reading {path.name}", 0.6 * k / len(logs))
         read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0)))
-    read = joined(read)
+    read = joined(read, apart=rates)
     mapping = guess(read, () if ship is None else ship.actuators) if given is None else _checked(given, read, map_file)
     mapping = replace(
         mapping,
@@ -200,6 +200,9 @@ def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Deci
     """The mapping, all of whose channels are there; those it does not name are not used."""
     assert path is not None
     there = {log.source: [channel.name for channel in log.channels] for log in logs}
+    for number, clock in enumerate(mapping.files, start=1):
+        if clock.file not in there:
+            raise FileError(path, f"file[{number}].file", f"is {clock.file!r}, expected one of {', '.join(there)}")
     for number, use in enumerate(mapping.uses, start=1):
         if use.file not in there:
             raise FileError(path, f"channel[{number}].file", f"is {use.file!r}, expected one of {', '.join(there)}")
