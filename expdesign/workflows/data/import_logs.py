@@ -121,10 +121,11 @@ def import_logs(
     given = None if map_file is None else load_mapping(map_file)
     track = None if plan is None else read_plan(plan)
     rates = {} if given is None else {clock.file: clock.sample_time_s for clock in given.files}
-    read = []
+    read: list[Log] = []
     for k, path in enumerate(logs):
         progress(f"reading {path.name}", 0.6 * k / len(logs))
-        read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0)))
+        beside = sum(log.size for log in read)
+        read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0), beside=beside))
     read = joined(read, apart=rates)
     mapping = guess(read, () if ship is None else ship.actuators) if given is None else _checked(given, read, map_file)
     mapping = replace(
