@@ -203,7 +203,7 @@ def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Deci
     there = {log.source: [channel.name for channel in log.channels] for log in logs}
     for number, clock in enumerate(mapping.files, start=1):
         if clock.file not in there:
-            raise FileError(path, f"file[{number}].file", f"is {clock.file!r}, expected one of {', '.join(there)}")
+            raise FileError(path, f"file[{number}].name", f"is {clock.file!r}, expected one of {', '.join(there)}")
     for number, use in enumerate(mapping.uses, start=1):
         if use.file not in there:
             raise FileError(path, f"channel[{number}].file", f"is {use.file!r}, expected one of {', '.join(there)}")
