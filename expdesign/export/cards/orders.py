@@ -18,7 +18,7 @@ from expdesign.plan.values import Leg
 from expdesign.simulation import steady_ahead
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
-from expdesign.vessel.hull import swept_area
+from expdesign.vessel.vessel import swept_area
 
 # largest error of the condensed orders, as a share of the range of each signal; larger where `most_order_rows` is
 # reached

@@ -17,9 +17,8 @@ from expdesign.export.estimate_page.figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
-from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.sensors import GAINS_AND_OFFSETS
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, parse_expression
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

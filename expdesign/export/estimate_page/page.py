@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from expdesign.assessment import Assessed, Assessment, sentence
-from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
+from expdesign.assessment.misfit import AHEAD_S
 from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import sample_notes
 from expdesign.export import words
@@ -137,7 +137,7 @@ FACTOR = 1.959964
 """Standard deviations to either side that hold 95 % of a normal distribution."""
 LIMIT_HEADER = (
     "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Parameter uncertainty",
-    "Fit limit by noise", "Error growth over the run", f"Error of {ASSESSMENT_TUNING.ahead_s:g} s prediction",
+    "Fit limit by noise", "Error growth over the run", f"Error of {AHEAD_S:g} s prediction",
 )  # fmt: skip
 
 

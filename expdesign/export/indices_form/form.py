@@ -12,7 +12,7 @@ from expdesign.export.files import strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
 from expdesign.vessel import Vessel
-from expdesign.vessel.environment import SEA_STATES
+from expdesign.vessel.vessel import SEA_STATES
 
 KINDS = {Circle: "turning circle", ZigZag: "zig-zag", Stop: "stopping", NotStandard: "no standard trial"}
 Found = Circle | ZigZag | Stop | NotStandard

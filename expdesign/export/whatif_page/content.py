@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from expdesign.export.files import strict_json
-from expdesign.export.tuning import TUNING
-from expdesign.export.words import percent, significant
+from expdesign.export.words import NOTICED, percent, significant
 from expdesign.values import Array
 
 DAY = ("day_s", "day_median_s", "day_95_s")
@@ -158,7 +157,7 @@ def _accuracy(first: Case, case: Case, against: Against) -> str:
     if against.same_accuracy_s is None:
         return f"Its runs take {minutes:.1f} min. Legs count in its accuracy, so whole days are compared."
     theirs = f"that the scenario's runs collect in {first.informative_s / 60:.1f} min"
-    if abs(against.accuracy - 1) < TUNING.noticed:
+    if abs(against.accuracy - 1) < NOTICED:
         return f"In {minutes:.1f} min its runs collect the information {theirs}."
     return (
         f"In {minutes:.1f} min its runs collect {_ratio(against.accuracy)} times the information {theirs}. "
@@ -176,11 +175,11 @@ def _ratio(value: float) -> str:
 
 def _parameters(against: Against) -> Iterator[str]:
     ratios = np.array(against.ratios)
-    if np.abs(ratios - 1).max() < TUNING.noticed:
-        yield f"No standard deviation changes by {percent(TUNING.noticed)} or more."
+    if np.abs(ratios - 1).max() < NOTICED:
+        yield f"No standard deviation changes by {percent(NOTICED)} or more."
         return
     best, worst = int(ratios.argmin()), int(ratios.argmax())
-    if ratios.max() / ratios.min() < 1 + 2 * TUNING.noticed:
+    if ratios.max() / ratios.min() < 1 + 2 * NOTICED:
         yield f"All standard deviations are about {_ratio(float(np.median(ratios)))} times those of the scenario."
         return
     least, most = (f"{_ratio(float(ratios[place]))} ({against.common[place]})" for place in (best, worst))

@@ -24,7 +24,7 @@ import numpy as np
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import CONTROL, Capability, HelmShip
+from expdesign.plan.control import APPROACH_HULLS, SETTLING_HULLS, Capability, HelmShip
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
@@ -231,7 +231,7 @@ def _speed_mps(water: LegWater, state: Array) -> float:
 def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
     vessel, speed = water.vessel, _speed_mps(water, task.end)
-    samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
+    samples = int(np.ceil(APPROACH_HULLS * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
     if _stops(task, water):
         return task, 0
     states = water.states(task.end, np.tile(task.end_inputs, (samples, 1)))
@@ -277,7 +277,7 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip
             first=first,
             last=last,
             off_m=off * STRAIGHT_OFF_HULLS * length,
-            into_m=stop * ship.stopping_m if stopping else settle * CONTROL.settling_hulls * length,
+            into_m=stop * ship.stopping_m if stopping else settle * SETTLING_HULLS * length,
         )
         for off, settle, stop in STRAIGHTS
     ]

@@ -25,6 +25,8 @@ from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
+DRIFT_ROUNDS = 3  # rounds in which the time of a leg and the drift in that time are made to agree
+
 GO_AROUND_RUN_UPS = 3.0  # expected time of go-arounds before a run that follows another at once, in run-ups, and
 SETTLED_RUN_UPS = 2.0  # length of leg, in run-ups, on which it falls to 1/e; of drawn trials with legs of 5 to 270 s
 

@@ -21,7 +21,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, polyline_length, shortest_path_tree
-from expdesign.plan.control import CONTROL, Helmsman, lengths
+from expdesign.plan.control import TRACK_LEAD, Helmsman, lengths
 from expdesign.plan.legs import dubins_curve
 from expdesign.values import Array
 
@@ -144,7 +144,7 @@ class PathFollowers:
             lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - self.goal[2])
             slow = np.minimum(
                 fastest * np.maximum(lengthways, SIDEWAYS_SPEED),
-                left[near] / (CONTROL.track_lead * helm.answer_s),
+                left[near] / (TRACK_LEAD * helm.answer_s),
             )
             speed[near] = np.minimum(speed[near], slow)
         leg = there - before

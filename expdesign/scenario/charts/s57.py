@@ -27,19 +27,23 @@ from pyogrio.errors import DataSourceError
 from expdesign.errors import NoPlan
 from expdesign.input_files import check_ends
 from expdesign.scenario.charts.area_tables import AreaTable
-from expdesign.scenario.charts.dangers import (
+from expdesign.scenario.charts.zones import (
     BUOYS,
     CLEARANCES,
     DANGERS,
     OVERHEAD,
     SOLID,
     UNSURVEYED,
+    Box,
     ChartedObject,
+    ChartZones,
+    OpenChart,
     ShipRules,
+    around,
     closed_water,
+    rule_text,
     united,
 )
-from expdesign.scenario.charts.zones import Box, ChartZones, OpenChart, around, rule_text
 from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 

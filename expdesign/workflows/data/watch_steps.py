@@ -29,7 +29,7 @@ from expdesign.monitoring import saved
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
-from expdesign.records.limits import check_limits, column_limits
+from expdesign.records.load import check_limits, column_limits
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,

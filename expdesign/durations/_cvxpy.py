@@ -19,8 +19,7 @@ import cvxpy as cp
 import numpy as np
 
 from expdesign.durations.concave import ConcaveProblem
-from expdesign.durations.criteria import LogDet, LogTrace, Measure
-from expdesign.durations.criteria.models import Indices, Piece
+from expdesign.durations.criteria import Indices, LogDet, LogTrace, Measure, Piece
 from expdesign.durations.limits import Polytope
 from expdesign.values import Array
 

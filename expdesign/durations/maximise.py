@@ -5,7 +5,7 @@ answer, gives the digits that an interior point lacks. Whatever found it, the ce
 
 Other problems, and those solved only to compare, are solved by the quickest method. For D without limits that is the
 working-set method of `large_scale`. Other smooth criteria of few candidates are solved by Newton's method from the
-middle of the limits. Of more candidates than `Tuning.conic_candidates` only a working set is solved at a time, by any
+middle of the limits. Of more candidates than `CONIC_CANDIDATES` only a working set is solved at a time, by any
 criterion and under any limits. E, and an optimum with singular information, have no method but cvxpy, which then
 solves the working sets.
 """
@@ -19,11 +19,17 @@ import numpy as np
 
 from expdesign.durations.certificate import Certificate, certify
 from expdesign.durations.concave import ConcaveProblem
-from expdesign.durations.criteria.models import Indices, Objective
-from expdesign.durations.maximise.large_scale import FIRST_GAP, MOST_SETS, d_optimal, rows_of, set_size
-from expdesign.durations.tuning import TUNING
+from expdesign.durations.criteria import Indices, Objective
+from expdesign.durations.large_scale import FIRST_GAP, MOST_SETS, d_optimal, rows_of, set_size
+from expdesign.durations.limits import LOOSENING
 from expdesign.errors import FloorOutOfReach, NoAnswer, NotInformative
 from expdesign.values import Array
+
+# most candidates of a problem that cvxpy solves as stated, and without a working set. With 18 parameters and 3 means it
+# takes 0.3 s of 14 candidates, 0.9 s of 300, 12 s of 10,000.
+CONIC_CANDIDATES = 300
+FLOOR_ROUNDING = 1e-6  # shortfall of a floor, as a logarithm, that counts as rounding
+LARGEST_GAP = 1e-6  # designs with a wider gap are not returned
 
 WIDE_GAP = 1e-7  # gap from which a design that no Newton step can sharpen is sought by other means, too
 TARGET_GAP = 1e-10  # gap at which Newton's method ends
@@ -68,14 +74,14 @@ def maximised(task: ConcaveProblem, kind: str = "", *, as_stated: bool = False) 
         numpy.linalg.LinAlgError: every feasible design is singular.
     """
     least = task.polytope.least
-    if not 1.0 - least.sum() > TUNING.loosening:  # least times take everything
+    if not 1.0 - least.sum() > LOOSENING:  # least times take everything
         return _proven(task, least / least.sum(), kind, method=NO_CHOICE)
     best = _by_cvxpy(task, kind) if as_stated and _moderate(task) else None
     if best is None or not best.gap < (TARGET_GAP if task.smooth else WIDE_GAP):
         few = best is not None and not task.smooth  # fewer at a time give an interior point more digits
         own = _plain_d(task, kind) or _by_working_sets(task, kind, few=few) or _by_newton(task, kind)
         best = min(filter(None, (best, own)), key=lambda found: found.gap, default=None)
-    if best is not None and best.gap < TUNING.largest_gap and _floors_kept(task, best.fractions):
+    if best is not None and best.gap < LARGEST_GAP and _floors_kept(task, best.fractions):
         return best
     best = best or _by_cvxpy(task, kind)
     if task.floors:
@@ -106,12 +112,12 @@ def _prices(proof: Certificate, names: Sequence[str]) -> Array:
 def _moderate(task: ConcaveProblem) -> bool:
     """Whether cvxpy takes seconds at most."""
     few = len(task.objective.pieces) + len(task.floors) <= CONIC_INEQUALITIES
-    return few and len(task.polytope.least) <= TUNING.conic_candidates
+    return few and len(task.polytope.least) <= CONIC_CANDIDATES
 
 
 def _by_cvxpy(task: ConcaveProblem, kind: str) -> Optimum | None:
     """The optimum of the problem as stated, sharpened; None where the solver gives no numbers, or useless ones."""
-    from expdesign.durations.maximise._cvxpy import conic_optimum
+    from expdesign.durations._cvxpy import conic_optimum
 
     answer = conic_optimum(task)
     if answer is None:
@@ -146,7 +152,7 @@ def _by_working_sets(task: ConcaveProblem, kind: str, *, few: bool = False) -> O
     """
     count, size = len(task.polytope.least), set_size(task.objective.dimension)
     best: Optimum | None = None
-    if count <= TUNING.conic_candidates and not few:
+    if count <= CONIC_CANDIDATES and not few:
         return None
     try:
         chosen = _first_set(task)
@@ -165,7 +171,7 @@ def _by_working_sets(task: ConcaveProblem, kind: str, *, few: bool = False) -> O
             chosen = np.union1d(chosen, rising[np.argsort(-_excess(here)[rising], kind="stable")[:size]])
     except (np.linalg.LinAlgError, NotInformative):
         return None
-    return best if best is not None and best.gap < TUNING.largest_gap else None
+    return best if best is not None and best.gap < LARGEST_GAP else None
 
 
 def _excess(here: Optimum) -> Array:
@@ -207,14 +213,14 @@ def _by_newton(task: ConcaveProblem, kind: str) -> Optimum | None:
         found = _sharpened(task, _proven(task, task.polytope.middle(), kind, method=NEWTON))
     except np.linalg.LinAlgError:
         return None
-    return found if found.gap < TUNING.largest_gap and _floors_kept(task, found.fractions) else None
+    return found if found.gap < LARGEST_GAP and _floors_kept(task, found.fractions) else None
 
 
 def _sharpened(task: ConcaveProblem, best: Optimum, *, least_steps: int = 0) -> Optimum:
     """An optimum with a gap no wider, by Newton's method under all limits, where every measure is smooth."""
     if not task.smooth:
         return best
-    from expdesign.durations.maximise._cvxpy import newton_step
+    from expdesign.durations._cvxpy import newton_step
 
     here = best
     for number in range(NEWTON_STEPS):
@@ -263,7 +269,7 @@ def _ascended(task: ConcaveProblem, here: Optimum, step: Array) -> Array | None:
 
 
 def _floors_kept(task: ConcaveProblem, w: Array) -> bool:
-    return all(floor.value(w) > -TUNING.floor_rounding for floor in task.floors)
+    return all(floor.value(w) > -FLOOR_ROUNDING for floor in task.floors)
 
 
 def _check_floors(task: ConcaveProblem, w: Array | None) -> None:

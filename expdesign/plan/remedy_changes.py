@@ -11,6 +11,7 @@ import numpy as np
 from expdesign.durations import DurationDesign, solve_durations
 from expdesign.errors import InputError, NoAnswer, NoPlan
 from expdesign.plan.assembly import (
+    TRANSITION_BEAM,
     confidence_of_run,
     leg_water,
     roomy_water,
@@ -25,7 +26,6 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import place_runs
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.values import SailedTrial
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import silent
@@ -137,7 +137,7 @@ def finds_places(problem: PlanProblem) -> bool:
         water = leg_water(problem, ship_on_legs(problem))
         space = search_space(problem, water, local_planner(water, problem.used), strict=True)
         repeats = [problem.repeats[run.name] for run in space.footprints]
-        place_runs(space, repeats, start=problem.start, width=PLAN.transition_beam, orders=0)
+        place_runs(space, repeats, start=problem.start, width=TRANSITION_BEAM, orders=0)
     except NoPlan:
         return False
     return True

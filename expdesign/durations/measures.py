@@ -18,8 +18,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from expdesign.durations.tuning import TUNING
 from expdesign.values import Array, seal
+
+ONE_THREAD = 260_000  # multiplications in a matrix product up to which OpenBLAS uses one thread
 
 
 class Measure(Protocol):
@@ -80,7 +81,7 @@ def gram(parts: Array) -> Array:
     """(c, c) inner products of (c, ...), in blocks small enough for one thread: on busy cores threads only wait."""
     flat = parts.reshape(len(parts), -1)
     other = flat.copy()  # a matrix times its own transpose has a product of its own, with threads at any size
-    size = max(1, math.isqrt(TUNING.one_thread // flat.shape[1]))
+    size = max(1, math.isqrt(ONE_THREAD // flat.shape[1]))
     products = np.empty((len(flat), len(flat)))
     for i in range(0, len(flat), size):
         for j in range(0, i + 1, size):

@@ -21,9 +21,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.durations.criteria.measures import gram, root
-from expdesign.durations.criteria.models import whitening
-from expdesign.durations.tuning import TUNING
+from expdesign.durations.criteria import whitening
+from expdesign.durations.measures import ONE_THREAD, gram, root
 from expdesign.values import Array, seal
 
 SMALLEST_SET = 50  # least size of a working set, and about as many as may join it at a time
@@ -134,7 +133,7 @@ class _Pool:
 
 def _chunks(flat: Array) -> Iterator[Array]:
     """Rows of (c, d), so many at a time that their product with (d, d) takes one thread and stays in the cache."""
-    length = max(1, TUNING.one_thread // flat.shape[1] ** 2)
+    length = max(1, ONE_THREAD // flat.shape[1] ** 2)
     return (flat[first : first + length] for first in range(0, len(flat), length))
 
 

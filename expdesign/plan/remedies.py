@@ -1,4 +1,8 @@
-"""What helps against a refusal, by the kind of obstacle."""
+"""What helps against a refusal: changes of one key for which the test that failed passes, each checked by that test.
+
+Few changes are tried, the most promising first, so that looking for a remedy takes no longer than planning. The refusal
+says what was not tried, and where no remedy could be checked.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from expdesign.plan.checked import Refused, accepted, promising, verified
 from expdesign.plan.legs import LegWater, escapes
 from expdesign.plan.local_planner import RunSpace
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies.changes import (
+from expdesign.plan.remedy_changes import (
     ACCEPTED,
     NONE,
     PLACES,
@@ -39,10 +43,13 @@ from expdesign.plan.remedies.changes import (
     with_settings,
     without_place,
 )
-from expdesign.plan.tuning import PLAN
 from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
+
+REPLANS = 2  # plans made after the first one, each with more room where drawn trials of the one before left the water
+# from the heading asked for at start and goal, tried as remedies to both sides [deg]
+TURNS_DEG: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))
 
 CLEARANCE_SHARES = (1.0, 0.75, 0.5, 0.0)  # of the largest clearance with which every run has a place, tried as remedies
 SAILED_SHARES = (0.5, 0.0)  # of the clearance asked for, tried as remedies where legs fail
@@ -105,7 +112,7 @@ def for_berth(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str
         turned = np.array([*pose[:2], heading_rad])
         return where.holds(turned[None]) and escapes(turned, where, backwards=backwards)
 
-    for turn_deg in (turn * side for turn in PLAN.turns_deg for side in (1, -1)):
+    for turn_deg in (turn * side for turn in TURNS_DEG for side in (1, -1)):
         heading_deg = round(float(np.degrees(pose[2])) + turn_deg) % 360
         if free(np.radians(heading_deg), water):
             yield f"{refused.which}.heading_deg = {heading_deg} has such a path; {REST}"
@@ -276,7 +283,7 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
     forecasts = map(hopeful, _forecasts(problem))
     lower = () if refused.confidence is None else (of_setting(problem, "confidence", refused.confidence),)
     tries = chain(islice(forecasts, 1), lower, without(names) if names else (), forecasts)
-    most = max(1, PLAN.replans + 1 - max(1, len(refused.tried)))
+    most = max(1, REPLANS + 1 - max(1, len(refused.tried)))
     yield from first_that_passes(tries, passes, ACCEPTED, more, tell=tell, most=most, affords=affords)
 
 
