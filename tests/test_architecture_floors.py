@@ -84,7 +84,7 @@ FLOORS = {
     "workflows": (
         ("outcome",),
         ("steps",),
-        ("planning", "trials", "data", "explanations"),
+        ("commands",),
         ("notebook",),
     ),
 }
@@ -260,7 +260,7 @@ def test_the_scan_sees_the_whole_package() -> None:
         ("conventions.py", "from expdesign.values import Array", "conventions imports values"),
         ("plan/solve.py", "import cvxpy as cp", "imports cvxpy"),
         ("durations/solve.py", "from casadi import MX", "imports casadi"),
-        ("workflows/data/figures.py", "import matplotlib.pyplot as plt", "imports matplotlib"),
+        ("workflows/commands/figures.py", "import matplotlib.pyplot as plt", "imports matplotlib"),
         ("vessel/terms.py", "eval('1')", "calls eval"),
         ("vessel/terms.py", "import builtins\nbuiltins.exec('1')", "calls exec"),
         ("vessel/terms.py", "import importlib\nimportlib.import_module('expdesign.cli')", "calls import_module"),

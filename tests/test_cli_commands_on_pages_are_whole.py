@@ -8,7 +8,7 @@ from typer.main import get_command
 from expdesign import workflows
 from expdesign.cli.app import WORKFLOWS
 from expdesign.cli.commands import app
-from expdesign.workflows.planning import run
+from expdesign.workflows.commands import run
 from short_examples import SCENARIOS
 
 WITHOUT_EFFECT = {"--out", "--quiet", "--json", "--jobs", "--scheduler", "--no-cache", "--help"}

@@ -27,8 +27,7 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.scenario.tables import Table
 from expdesign.vessel import STRUCTURES
 from expdesign.workflows import explain
-from expdesign.workflows.explanations.explain import TOPICS
-from expdesign.workflows.explanations.values import Explained
+from expdesign.workflows.commands.explain import TOPICS, Explained
 from scenario_files import spoil, write_scenario
 
 

@@ -11,7 +11,7 @@ from expdesign.errors import NotDrawn
 from expdesign.export import write_files
 from expdesign.export.folder import gaps
 from expdesign.export.pages.figures import page_figure
-from expdesign.workflows.data import estimate as command
+from expdesign.workflows.commands import estimate as command
 from synthetic_ship import sail, trial, vessel_file, write
 
 
@@ -22,11 +22,11 @@ def broken(*_: object, **__: object) -> str:
 def test_results_are_on_the_disk_while_the_page_is_drawn(tmp_path: Path):
     seen = []
 
-    def page() -> str:
+    def estimate_page() -> str:
         seen.append((tmp_path / "out.json").read_text("utf-8"))
         return "<p>drawn</p>"
 
-    paths = write_files(tmp_path, {"out.html": page, "out.json": "{}"})
+    paths = write_files(tmp_path, {"out.html": estimate_page, "out.json": "{}"})
     assert seen == ["{}"]
     assert [path.name for path in paths] == ["out.html", "out.json"]
     assert not gaps(paths)
@@ -43,11 +43,11 @@ def test_a_page_that_fails_is_replaced_by_one_that_says_so(tmp_path: Path):
 
 
 def test_an_interruption_of_the_page_leaves_results_and_no_half_page(tmp_path: Path):
-    def page() -> str:
+    def estimate_page() -> str:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_files(tmp_path, {"out.html": page, "out.json": "{}"})
+        write_files(tmp_path, {"out.html": estimate_page, "out.json": "{}"})
     assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
 
 
@@ -80,9 +80,9 @@ def test_the_command_tells_what_is_missing_and_ends_as_a_defect(
     if place == "page":
         monkeypatch.setattr(command, "document_html", broken)
     else:
-        from expdesign.export.estimate_page import page
+        from expdesign.export import estimate_page
 
-        monkeypatch.setattr(page, "interval_figure", page_figure(broken))
+        monkeypatch.setattr(estimate_page, "interval_figure", page_figure(broken))
     asked = ["estimate", str(data), "--vessel", str(ship), "--method", "ls", "--out", str(tmp_path / "out")]
     assert cli.main(asked) == 1
     assert "could not be drawn (KeyError" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from expdesign.cli import main
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
-from expdesign.workflows.planning.new import KINDS
+from expdesign.workflows.commands.new import KINDS
 from expdesign.workflows.steps.first_trial import (
     ABLE,
     DRAWN,

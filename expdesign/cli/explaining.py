@@ -15,7 +15,7 @@ from expdesign.cli.app import Json, app
 from expdesign.interruptions import interruptions_wait
 
 if TYPE_CHECKING:
-    from expdesign.workflows.explanations.values import Explained, Section, Topic
+    from expdesign.workflows.commands.explain import Explained, Section, Topic
 
 
 @app.command("explain")

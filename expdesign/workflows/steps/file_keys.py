@@ -1,22 +1,129 @@
-"""The keys of scenario, vessel, dictionary and area files, from the models that read them."""
+"""The keys of scenario, vessel, dictionary and area files, from the descriptions of the tables that read them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import types
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
 
 from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
 from expdesign.scenario.instruments_file import InstrumentsFile
-from expdesign.scenario.keys import Key, keys_of
 from expdesign.scenario.loads_file import LoadsFile
 from expdesign.scenario.mapping_file import COLUMNS_BESIDE, MappingFile
 from expdesign.scenario.scenario_file import ScenarioFile
-from expdesign.scenario.tables import Table
+from expdesign.scenario.tables import LARGEST, Table, shown
 from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, ActuatorTable, VesselTable
-from expdesign.workflows.explanations.values import Explained, Section, Topic
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explained:
+    """One thing that may be written."""
+
+    name: str  # as it is written; keys are dotted
+    meaning: str  # what it is, with its unit
+    default: str = ""  # what stands in for it; "required", "optional", or ""
+    allowed: str = ""  # the values it may have, or ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """Entries that belong together."""
+
+    name: str  # one word that asks for it
+    title: str  # what it is
+    entries: tuple[Explained, ...]  # what it explains
+
+
+@dataclass(frozen=True, kw_only=True)
+class Topic:
+    """Output of one call of `expdesign explain`."""
+
+    name: str  # the word that asks for it
+    title: str  # one line
+    text: str = ""  # a few sentences, or ""
+    sections: tuple[Section, ...]  # what it explains
+
+
+KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text", dict: "a table"}
+BOUNDS = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
+FILES = {"min_length": "at least", "max_length": "at most"}
+
+
+def keys_of(model: type[Table], prefix: str = "") -> Iterator[Explained]:
+    """All keys of a table and of the tables in it, in the order of the model."""
+    for name, field in model.fields().items():
+        inner, listed = table_in(field.annotation)
+        yield Explained(
+            name=f"{prefix}{name}",
+            meaning=field.description or "",
+            default=_default(field, inner),
+            allowed=_allowed(field.annotation, field.metadata),
+        )
+        if inner is not None:
+            yield from keys_of(inner, f"{prefix}{name}{'[]' if listed else ''}.")
+
+
+def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
+    """The table that a key holds, and whether it holds a list of them; None for a plain value."""
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation, False
+    for part in get_args(annotation):
+        inner, listed = table_in(part)
+        if inner is not None:
+            return inner, listed or get_origin(annotation) is list
+    return None, False
+
+
+def _default(field: FieldInfo, inner: type[Table] | None) -> str:
+    if field.is_required():
+        return "required"
+    value = None if inner is not None else field.get_default(call_default_factory=True, validated_data={})
+    if value is None or value in ({}, [], ""):
+        return "optional"
+    return f"[{', '.join(map(shown, value))}]" if isinstance(value, list) else shown(value)
+
+
+def _allowed(annotation: Any, metadata: list[Any]) -> str:
+    """A few words for a type and its limits."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _allowed(arguments[0], [*arguments[1:], *metadata])
+    if origin in (Union, types.UnionType):
+        return " or ".join(_allowed(part, metadata) for part in arguments if part is not type(None))
+    if origin is Literal:
+        return " or ".join(map(shown, arguments))
+    limits = [part for item in metadata for part in getattr(item, "metadata", [item])]
+    if origin is list:
+        sizes = {getattr(item, name) for item in limits for name in FILES if getattr(item, name, None) is not None}
+        count = f"{sizes.pop()} " if len(sizes) == 1 and len(limits) > 1 else ""
+        item, *limits_of_item = _allowed(arguments[0], []).removeprefix("a ").split(", ")
+        return ", ".join([f"a list of {count}{item if item == 'text' else _plural(item)}", *limits_of_item])
+    if origin is dict:
+        return f"a table of name = {_allowed(arguments[1], []).removeprefix('a ')}"
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return "a table"
+    words = [
+        f"{word} {getattr(item, bound):.5g}"
+        for item in limits
+        for bound, word in BOUNDS.items()
+        if abs(getattr(item, bound, None) or 0 if hasattr(item, bound) else LARGEST) < LARGEST
+    ]
+    return ", ".join([KINDS.get(annotation, "any"), *words])
+
+
+def _plural(kind: str) -> str:
+    """`list of 2 numbers` -> `lists of 2 numbers`."""
+    if kind.startswith("whole number"):
+        return kind.replace("whole number", "whole numbers", 1)
+    first, *rest = kind.split(" ", 1)
+    return " ".join([f"{first}s", *rest])
+
 
 VARIANTS = (
     "Paths are relative to their file. A variant for expdesign whatif is a file with only the keys that "
@@ -129,7 +236,7 @@ def area_topic() -> Topic:
 
 def _with_more(section: Section, model: type[Table]) -> Section:
     """A list of tables with the keys that all of them have."""
-    return replace(section, entries=(*section.entries, *_entries(keys_of(model, f"{section.name}[]."))))
+    return replace(section, entries=(*section.entries, *keys_of(model, f"{section.name}[].")))
 
 
 def _kinds() -> dict[type[Table], list[str]]:
@@ -143,20 +250,10 @@ def _kinds() -> dict[type[Table], list[str]]:
 def _kind(names: Sequence[str], table: type[Table]) -> Section:
     own = [key for key in keys_of(table, "actuators[].") if key.name.split(".")[-1] not in ActuatorTable.model_fields]
     title = f"entries of [[actuators]] with kind = {' or '.join(repr(name) for name in names)}"
-    return Section(name=names[0], title=title, entries=_entries(own))
+    return Section(name=names[0], title=title, entries=tuple(own))
 
 
 def _by_table(model: type[Table]) -> tuple[Section, ...]:
     """One section for each table at the top of a file."""
     groups = groupby(keys_of(model), key=lambda key: key.name.split(".")[0].removesuffix("[]"))
-    sections = []
-    for name, group in groups:
-        first, *rest = group
-        sections.append(Section(name=name, title=f"[{name}]", entries=_entries([first, *rest])))
-    return tuple(sections)
-
-
-def _entries(keys: Sequence[Key]) -> tuple[Explained, ...]:
-    return tuple(
-        Explained(name=key.name, meaning=key.meaning, default=key.default, allowed=key.allowed) for key in keys
-    )
+    return tuple(Section(name=name, title=f"[{name}]", entries=tuple(group)) for name, group in groups)

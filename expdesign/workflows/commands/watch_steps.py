@@ -42,9 +42,9 @@ from expdesign.step_trials.live import (
     restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.data.step_list import listed_steps
 from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import equipped
+from expdesign.workflows.steps.step_list import listed_steps
 
 STATE = "watch-steps-state.json"
 TO_DO = "steps-to-do.csv"

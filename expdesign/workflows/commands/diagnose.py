@@ -18,17 +18,16 @@ from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
 from expdesign.export import Content, write_files
-from expdesign.export.diagnosis_page import (
+from expdesign.export.diagnosis_page import accuracy_rows, diagnosis_html, diagnosis_notes
+from expdesign.export.diagnosis_results import (
     RollVerdict,
-    accuracy_rows,
-    diagnosis_html,
+    accuracy_entry,
     diagnosis_json,
-    diagnosis_notes,
     diagnosis_tables,
     extended_vessel,
+    finding_entry,
     roll_sentences,
 )
-from expdesign.export.diagnosis_page.results import accuracy_entry, finding_entry
 from expdesign.export.document import Table
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent

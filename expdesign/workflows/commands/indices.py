@@ -10,14 +10,8 @@ from expdesign import __version__
 from expdesign.errors import InputError
 from expdesign.export import Content, write_files
 from expdesign.export.document import Table
-from expdesign.export.indices_form import (
-    Held,
-    IndicesContent,
-    indices_html,
-    indices_json,
-    verdict_rows,
-    zigzag_rows,
-)
+from expdesign.export.indices_form import Held, IndicesContent, indices_json, verdict_rows, zigzag_rows
+from expdesign.export.indices_page import indices_html
 from expdesign.indices import NotStandard, StandardResults, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent

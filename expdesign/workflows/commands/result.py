@@ -11,7 +11,7 @@ from expdesign import __version__
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, write_files
 from expdesign.export.files import strict_json
-from expdesign.export.files.read_json import read_json
+from expdesign.export.files.text import read_json
 from expdesign.export.pages import document_html
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
 from expdesign.progress import Progress, silent

@@ -18,7 +18,8 @@ from expdesign.durations.rounding import whole_runs
 from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content, write_files
 from expdesign.export.pages import document_html
-from expdesign.export.whatif_page import Case, WhatIfContent, whatif_document, whatif_json
+from expdesign.export.whatif_content import Case, WhatIfContent, whatif_json
+from expdesign.export.whatif_page import whatif_document
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.information.expected import covariance_of_repeats
 from expdesign.memory import Memory, recalled, remembering, user_memory

@@ -12,7 +12,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from expdesign.export import words
-from expdesign.export.indices_form.form import IndicesContent, overshoots, shown, verdict_rows, verdict_word
+from expdesign.export.indices_form import IndicesContent, overshoots, shown, verdict_rows, verdict_word
 from expdesign.export.pages import page_template
 from expdesign.export.words import speed
 from expdesign.indices import DEPTH_BY_DRAUGHT, HIGHEST_SEA, STRONGEST_WIND, Circle, Stop, Verdict, ZigZag, beaufort

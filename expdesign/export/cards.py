@@ -12,7 +12,7 @@ import numpy as np
 
 from expdesign.conventions import to_n_frame
 from expdesign.export import words
-from expdesign.export.cards.orders import (
+from expdesign.export.card_orders import (
     HEADS,
     Danger,
     columns_of,
@@ -45,7 +45,7 @@ from expdesign.vessel import column_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-from expdesign.export.cards.orders import FARTHEST_DANGER_M
+from expdesign.export.card_orders import FARTHEST_DANGER_M
 
 RUNS_PER_SHEET = 3  # runs on one sheet
 NAMED_PARAMETERS = 4  # parameters named in the purpose of a run

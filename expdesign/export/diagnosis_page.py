@@ -17,7 +17,7 @@ from expdesign.diagnosis.conclusions import DIVERGED_FIT, accuracy_in_words, alt
 from expdesign.diagnosis.select import SELECTION_TUNING
 from expdesign.diagnosis.values import ErrorReduction, Estimate
 from expdesign.export import words
-from expdesign.export.diagnosis_page.figures import (
+from expdesign.export.diagnosis_figures import (
     ACCELERATION_AXES,
     growth_figure,
     has_sign,
@@ -26,7 +26,7 @@ from expdesign.export.diagnosis_page.figures import (
     suspect_figure,
     window_figure,
 )
-from expdesign.export.diagnosis_page.results import RollVerdict, roll_sentences
+from expdesign.export.diagnosis_results import RollVerdict, roll_sentences
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.progress import Progress, silent

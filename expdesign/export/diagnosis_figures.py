@@ -13,7 +13,7 @@ from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import Dependence, dependence
 from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_text, group_columns
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.export.estimate_page.figures import AXES, thinned
+from expdesign.export.estimate_figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force

@@ -19,7 +19,7 @@ from expdesign.export.pages.figures import (
     round_ticks,
     svg,
 )
-from expdesign.export.whatif_page.content import DAY, Case, WhatIfContent, explanations
+from expdesign.export.whatif_content import DAY, Case, WhatIfContent, explanations
 from expdesign.export.words import counted
 
 # Figures of variants: time for the same accuracy, standard deviation of each parameter, runs.

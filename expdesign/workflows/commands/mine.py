@@ -22,7 +22,8 @@ from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.data.labelled import (
+from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.steps.labelled import (
     Asked,
     labelled_design,
     labelled_files,
@@ -30,7 +31,6 @@ from expdesign.workflows.data.labelled import (
     labelled_tables,
     piece_of,
 )
-from expdesign.workflows.outcome import Outcome, command_text, document_of
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
 

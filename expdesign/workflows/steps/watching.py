@@ -37,7 +37,7 @@ from expdesign.roll.record import NEEDED, missing_columns, roll_run, with_one_so
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.watched_ship import PIECE, Asked, Known, Late, Read, Unread
+from expdesign.workflows.steps.watched_ship import PIECE, Asked, Known, Late, Read, Unread
 
 BETWEEN_FILES_S = 3600.0
 """Time from the end of a file to the beginning of the next, where its times begin again [s]."""

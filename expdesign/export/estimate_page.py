@@ -16,7 +16,7 @@ from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import sample_notes
 from expdesign.export import words
 from expdesign.export.document import Document, Figure, Items, Section, Table, filled, notes_of, section
-from expdesign.export.estimate_page.figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
+from expdesign.export.estimate_figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
 from expdesign.export.files import (
     breach_sentences,
     disturbance_table,

@@ -32,8 +32,10 @@ from expdesign.monitoring import (
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
-from expdesign.workflows.data.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
-from expdesign.workflows.data.watching import (
+from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.steps.measured import data_files, equipped
+from expdesign.workflows.steps.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
+from expdesign.workflows.steps.watching import (
     HOUR,
     Learning,
     Reading,
@@ -47,8 +49,6 @@ from expdesign.workflows.data.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.outcome import Outcome, command_text
-from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.workers import workers
 
 

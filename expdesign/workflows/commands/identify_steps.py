@@ -27,9 +27,9 @@ from expdesign.step_trials import (
 )
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.step_list import listed_steps
 from expdesign.workflows.outcome import Outcome, command_text
 from expdesign.workflows.steps.measured import data_files, equipped
+from expdesign.workflows.steps.step_list import listed_steps
 
 SIMULATED_STEP_S = 0.5
 """Least time between samples of a simulation that is compared with data [s]."""
