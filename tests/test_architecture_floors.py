@@ -14,7 +14,7 @@ ROOT = Path(expdesign.__file__).parent
 FLOORS = {
     "": (
         ("errors", "interruptions", "lazy", "progress", "threads"),
-        ("input_files", "processes"),
+        ("input_files", "processes", "requests"),
         ("memory",),
         ("conventions", "values"),
         ("signals", "sea_area", "waves"),

@@ -11,14 +11,13 @@ from rich.console import Console
 from rich.markdown import Markdown
 from rich.table import Table
 
-from expdesign.cli.app import Json, app
+from expdesign.cli.app import Json
 from expdesign.interruptions import interruptions_wait
 
 if TYPE_CHECKING:
     from expdesign.workflows.commands.explain import Explained, Section, Topic
 
 
-@app.command("explain")
 def explain(
     subject: Annotated[
         str, typer.Argument(metavar="TOPIC or NAME", help="A topic, a key such as design.total_s, or a family.")

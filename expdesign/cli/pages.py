@@ -10,14 +10,12 @@ from typing import Annotated
 
 import typer
 
-from expdesign.cli.app import app
 from expdesign.errors import InputError
 
 NEEDED = ("nicegui", "tomlkit")
 """Packages of the extra `web`."""
 
 
-@app.command("web")
 def web(
     folder: Annotated[
         Path, typer.Argument(metavar="FOLDER", help="Scenarios and results; nothing else is touched.")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
@@ -31,13 +31,14 @@ from expdesign.export.diagnosis_results import (
 from expdesign.export.document import Table
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
+from expdesign.requests import command_text
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
 from expdesign.scenario import load_scenario
 from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.measured import doubted, equipped, measured
 from expdesign.workflows.steps.workers import workers
 
@@ -85,10 +86,7 @@ def diagnose(
     reported.after = 0.0
     roll = _roll(ship, record)
     command = command_text(
-        "diagnose",
-        data,
-        {"--vessel": vessel, "--scenario": scenario, "--velocity": velocity, "--seed": seed},
-        usual={"--velocity": "auto"},
+        requests.Diagnose(data=tuple(data), vessel=vessel, scenario=scenario, velocity=velocity, seed=seed)
     )
     files: dict[str, Content] = {
         "diagnosis.json": diagnosis_json(found, roll),

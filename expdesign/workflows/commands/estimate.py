@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled
 from expdesign.errors import InputError
 from expdesign.export import Content, estimate_json, estimated_vessel, write_files
 from expdesign.export.estimate_page import EstimateContent, estimate_document
 from expdesign.export.pages import document_html
 from expdesign.progress import Progress, silent, within
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.requests import command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 from expdesign.workflows.steps.workers import workers
 
@@ -69,7 +70,11 @@ def estimate(
         begun = 0.01 if now is ship else 0.4
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
-    command = _command(data, vessel, tests, velocity, options)
+    command = command_text(requests.Estimate(
+        data=tuple(data), vessel=vessel, methods=options.methods, fixed=options.fixed, tests=tuple(tests),
+        velocity=velocity, mean=mean, blocks=blocks, start=start, motion=motion, horizon_s=horizon_s,
+        constant=constant, steered=steered, samples=samples, offset_mps=offset_mps, prior=prior,
+    ))  # fmt: skip
     content = EstimateContent(vessel=ship, found=found, command=command, version=__version__)
     document = estimate_document(content)
     files: dict[str, Content] = {
@@ -80,27 +85,3 @@ def estimate(
     written = write_files(out or Path("runs") / data[0].stem, files)
     progress("done", 1.0)
     return Outcome(files=written, document=document)
-
-
-def _command(data: Sequence[Path], vessel: Path, tests: Sequence[Path], velocity: str, options: EstimateOptions) -> str:
-    """What to type for the same estimates."""
-    stated = {"--vessel": vessel, "--test": tuple(tests), "--velocity": velocity, **_words(options)}
-    return command_text("estimate", data, stated, usual={"--velocity": "auto", **_words(EstimateOptions())})
-
-
-def _words(options: EstimateOptions) -> dict[str, object]:
-    """Values by their names on the command line."""
-    return {
-        "--method": options.methods,
-        "--fixed": options.fixed,
-        "--mean": options.mean,
-        "--blocks": options.blocks,
-        "--start": options.start,
-        "--motion": options.motion,
-        "--horizon": options.horizon_s,
-        "--constant": options.constant,
-        "--steered": options.steered,
-        "--samples": options.samples,
-        "--offset": options.offset_mps,
-        "--prior": options.prior,
-    }

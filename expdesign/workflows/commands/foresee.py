@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
 from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
@@ -17,9 +17,10 @@ from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
@@ -59,7 +60,7 @@ def foresee(
             raise InputError("--plan and --operation are given, expected one of them")
         return _operation(scenario, out, operation, seed=seed, jobs=jobs, cache=cache, progress=progress)
     case = loaded(scenario, progress)
-    words = command_text("foresee", [scenario], {"--plan": plan, "--seed": seed})
+    words = command_text(requests.Foresee(scenario=scenario, plan=plan, seed=seed))
     with workers(jobs, load=None, cache=cache):
         information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.15))
         offers = [item.primitive for item in information]
@@ -103,7 +104,7 @@ def _operation(
         scenario=case.name,
         vessel=case.vessel.name,
         found=found,
-        command=command_text("foresee", [scenario], {"--operation": voyages, "--seed": seed}),
+        command=command_text(requests.Foresee(scenario=scenario, operation=voyages, seed=seed)),
         version=__version__,
     )
     document = noted(case, operation_document(content))

@@ -7,13 +7,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.export import Content, vessel_toml, write_files
 from expdesign.export.pages import document_html
 from expdesign.export.step_trial_page import StepTrialContent, Validated, step_model_json, step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
+from expdesign.requests import command_text
 from expdesign.signals import Record
 from expdesign.step_trials import (
     Sailed,
@@ -27,7 +28,7 @@ from expdesign.step_trials import (
 )
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -85,7 +86,18 @@ def identify_steps(
         own=tuple(_validated(trial, batch) for batch in trial.batches),
         tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
         notes=(*told, *record.notes),
-        command=_command(data, vessel, throttle, rudder, tests, steps, velocity, seed),
+        command=command_text(
+            requests.IdentifySteps(
+                data=tuple(data),
+                vessel=vessel,
+                throttle=tuple(throttle),
+                rudder=tuple(rudder),
+                tests=tuple(tests),
+                steps=steps,
+                velocity=velocity,
+                seed=seed,
+            )
+        ),
         version=__version__,
     )
     progress("drawing the page", 0.9)
@@ -134,17 +146,6 @@ def _validated(trial: StepTrial, batch: Sailed) -> Validated:
         simulated=simulated,
         fit_percent=fit_percent(states, simulated),
     )
-
-
-def _command(
-    data: Sequence[Path], vessel: Path | None, throttle: Sequence[str], rudder: Sequence[str], tests: Sequence[Path],
-    steps: Path | None, velocity: str, seed: int,
-) -> str:  # fmt: skip
-    options = {
-        "--vessel": vessel, "--throttle": tuple(throttle), "--rudder": tuple(rudder), "--test": tuple(tests),
-        "--steps": steps, "--velocity": velocity, "--seed": seed,
-    }  # fmt: skip
-    return command_text("identify-steps", data, options, usual={"--velocity": "auto", "--seed": 0})
 
 
 def _comments(content: StepTrialContent) -> tuple[str, ...]:

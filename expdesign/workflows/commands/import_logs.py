@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.conventions import OUTPUTS, whole_turns
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, read_plan, write_files
@@ -61,11 +61,12 @@ from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
+from expdesign.requests import command_text
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.values import closed
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOST_COMPARED = 200_000
@@ -139,10 +140,10 @@ def import_logs(
         f"{log.source}: nothing of it is used: its channels are none that are read, or those of other logs"
         for log in read if log.channels and log.source not in used
     ]  # fmt: skip
-    command = command_text("import", logs, {
-        "--vessel": vessel, "--plan": plan, "--map": map_file, "--sample-time": sample_time_s, "--length-m": length_m,
-        "--out": out,
-    })  # fmt: skip
+    command = command_text(requests.Import(
+        logs=tuple(logs), vessel=vessel, plan=plan, map_file=map_file, sample_time_s=sample_time_s, length_m=length_m,
+        out=out,
+    ))  # fmt: skip
     try:
         columns = _columns(read, mapping)
         read = [log.without_readings() for log in read]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.export import Content, write_files
 from expdesign.export.document import Table
@@ -16,8 +16,9 @@ from expdesign.indices import NotStandard, StandardResults, measured_trial, stan
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
+from expdesign.requests import command_text
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.measured import data_files, equipped, measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
@@ -57,18 +58,16 @@ def indices(
         measured=seen,
         notes=(*told, *notes),
         command=command_text(
-            "indices",
-            data,
-            {
-                "--vessel": vessel,
-                "--speed-mps": speed_mps,
-                "--scale": scale,
-                "--antenna-forward-m": antenna_forward_m,
-                "--depth-m": depth_m,
-                "--wind-mps": wind_mps,
-                "--sea-state": sea_state,
-            },
-            usual={"--scale": 1.0, "--antenna-forward-m": 0.0},
+            requests.Indices(
+                data=tuple(data),
+                vessel=vessel,
+                speed_mps=speed_mps,
+                scale=scale,
+                antenna_forward_m=antenna_forward_m,
+                depth_m=depth_m,
+                wind_mps=wind_mps,
+                sea_state=sea_state,
+            )
         ),
         version=__version__,
         held=held,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import write_files
@@ -20,9 +20,10 @@ from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
+from expdesign.requests import command_text
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.labelled import (
     Asked,
     labelled_design,
@@ -76,21 +77,10 @@ def mine(
         raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
     progress("reading the data", 0.02)
     (ship, told), paths = equipped(vessel, data), data_files(data)
-    command = command_text(
-        "mine",
-        data,
-        {
-            "--vessel": vessel,
-            "--keep": keep,
-            "--piece": piece_s,
-            "--fixed": tuple(fixed),
-            "--mean": mean,
-            "--velocity": velocity,
-            "--labels": labels,
-            **({} if labels is None else {"--draws": draws, "--seed": seed}),
-        },
-        usual={"--mean": "complete", "--velocity": "auto", "--draws": 500, "--seed": 0},
-    )
+    command = command_text(requests.Mine(
+        data=tuple(data), vessel=vessel, keep=keep, piece_s=piece_s, fixed=tuple(fixed), mean=mean, velocity=velocity,
+        labels=labels, draws=draws, seed=seed,
+    ))  # fmt: skip
     folder = out or Path("runs") / data[0].stem
     if labels is not None:
         asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)

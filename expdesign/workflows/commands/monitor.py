@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import Content, write_files
 from expdesign.export.monitor_page import Moment, MonitorContent, budget_entries, monitor_document, monitor_json
@@ -32,7 +32,8 @@ from expdesign.monitoring import (
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.requests import command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
 from expdesign.workflows.steps.watching import (
@@ -112,10 +113,6 @@ MOST_ROWS = 20_000
 """Largest number of rows in a piece of a file."""
 WRITTEN_EVERY_S = 20.0
 """Time between writing files, from which a watch that is ended by force goes on [s]."""
-USUAL = {
-    "--learn-h": 24.0, "--false-alarm-days": 30.0, "--size": TUNING.relative_size, "--every-s": 3600.0,
-    "--port-h": 1.0, "--velocity": "auto", "--model": VESSEL,
-}  # fmt: skip
 
 
 def monitor(
@@ -166,12 +163,11 @@ def monitor(
         vessel=ship, told=told, size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
         port_s=HOUR * port_h, velocity=velocity, model=model,
     )  # fmt: skip
-    options = {
-        "--vessel": vessel, "--reference": tuple(reference), "--learn-h": learn_h, "--velocity": velocity,
-        "--false-alarm-days": false_alarm_days, "--size": size, "--every-s": every_s, "--port-h": port_h,
-        "--model": model, "--out": out, "--resume": resume,
-    }  # fmt: skip
-    command = command_text("monitor", data, options, usual=USUAL)
+    command = command_text(requests.Monitor(
+        data=tuple(data), vessel=vessel, reference=tuple(reference), learn_h=learn_h,
+        false_alarm_days=false_alarm_days, size=size, every_s=every_s, model=model, port_h=port_h, resume=resume,
+        velocity=velocity, out=out,
+    ))  # fmt: skip
     now = _resumed(folder / STATE, asked) if resume else _with_reference(Watch(), reference, asked, progress)
     work = _Work(asked=asked, folder=folder, command=command)
     for number, source in enumerate(data):

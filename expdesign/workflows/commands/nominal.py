@@ -5,14 +5,15 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.export import Content, write_files
 from expdesign.export.nominal_page import NominalContent, nominal_document, nominal_json, nominal_toml
 from expdesign.export.pages import document_html
 from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent
+from expdesign.requests import command_text
 from expdesign.scenario import load_card
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 
 
 def nominal(card: Path, out: Path | None, *, seed: int = 0, progress: Progress = silent) -> Outcome:
@@ -30,7 +31,7 @@ def nominal(card: Path, out: Path | None, *, seed: int = 0, progress: Progress =
     progress("reading the card", 0.0)
     found = fitted(load_card(card), seed=seed, progress=progress)
     content = NominalContent(
-        nominal=found, command=command_text("nominal", [card], {"--seed": seed}, usual={"--seed": 0}),
+        nominal=found, command=command_text(requests.Nominal(card=card, seed=seed)),
         version=__version__,
     )  # fmt: skip
     document = nominal_document(content)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from expdesign import requests
 from expdesign.durations import with_repeats
 from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, silent, within
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -44,7 +46,7 @@ def plan(
     """
     case = loaded(scenario, progress, vessel=vessel)
     check_plannable(case)
-    words = command_text("plan", [scenario], {"--vessel": vessel, "--durations": durations, "--seed": seed})
+    words = command_text(requests.Plan(scenario=scenario, vessel=vessel, durations=durations, seed=seed))
     with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
         return _plan(case, out, durations, seed, progress)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from expdesign import requests
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml, write_files
@@ -22,10 +23,11 @@ from expdesign.export.words import place
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -83,18 +85,10 @@ def replan(
         stopped=stopped,
         progress=within(progress, 0.0, 0.02),
     )
-    words = command_text(
-        "replan",
-        [scenario],
-        {
-            "--data": tuple(data),
-            "--vessel": vessel,
-            "--remaining": remaining_s,
-            "--interest": tuple(interest),
-            "--stopped": stopped,
-            "--seed": seed,
-        },
-    )
+    words = command_text(requests.Replan(
+        scenario=scenario, data=tuple(data), vessel=vessel, remaining_s=remaining_s, interest=tuple(interest),
+        stopped=stopped, seed=seed,
+    ))  # fmt: skip
     with (
         workers(jobs, scheduler=scheduler, cache=cache),
         drafted(replace(state.first, start=state.pose, vessel=state.ship), out, command=words),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, write_files
 from expdesign.export.files import strict_json
@@ -15,7 +15,8 @@ from expdesign.export.files.text import read_json
 from expdesign.export.pages import document_html
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
 from expdesign.progress import Progress, silent
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.requests import command_text
+from expdesign.workflows.outcome import Outcome
 
 Estimates = RootModel[dict[str, Estimated]]
 
@@ -47,7 +48,7 @@ def trial_result(
         plan=planned,
         estimate=best,
         indices=judged,
-        command=command_text("trial-result", [plan], {"--estimate": estimate, "--indices": indices}),
+        command=command_text(requests.TrialResult(plan=plan, estimate=estimate, indices=indices)),
         version=__version__,
     )
     document = result_document(content)

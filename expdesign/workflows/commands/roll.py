@@ -7,13 +7,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import Content, vessel_toml, write_files
 from expdesign.export.pages import document_html
 from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.progress import Progress, silent
 from expdesign.records import load_records
+from expdesign.requests import command_text
 from expdesign.roll import (
     TUNING,
     Body,
@@ -33,7 +34,7 @@ from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases
 from expdesign.signals import Batch
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.measured import equipped
 
 
@@ -90,17 +91,13 @@ def roll(
     estimate = estimate_roll(problem, method=method)
     _check_passed(estimate, filter_)
     notes += _turned(estimate)
-    options = {
-        "--loads": loads,
-        "--vessel": vessel,
-        "--rudder": tuple(rudder),
-        "--method": method,
-        "--lowpass-hz": lowpass_hz,
-        "--scale": scale,
-    }
+    asked = requests.Roll(
+        data=tuple(data), loads=loads, vessel=vessel, rudder=tuple(rudder), method=method, lowpass_hz=lowpass_hz,
+        scale=scale,
+    )  # fmt: skip
     content = RollContent(
         estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
-        command=command_text("roll", data, options, usual={"--method": "iv"}), version=__version__,
+        command=command_text(asked), version=__version__,
         scale=scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan, UnknownName
 from expdesign.export import Content, write_files
@@ -17,9 +17,10 @@ from expdesign.information import PrimitiveInformation
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, ending, silent, within
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
@@ -84,18 +85,14 @@ def roll_plan(
             aim=_aim(question, interest), most_loads=most_loads, progress=within(limited, 0.1, 0.3 if place else 0.9),
         )  # fmt: skip
         folder = out or Path("runs") / case.name
-        options = {
-            "--loads": loads,
-            "--most-loads": most_loads,
-            "--interest": tuple(interest),
-            "--place": place,
-            "--minutes": minutes,
-            "--seed": seed,
-        }
+        command = command_text(requests.RollPlan(
+            scenario=scenario, loads=loads, most_loads=most_loads, interest=tuple(interest), place=place,
+            minutes=minutes, seed=seed,
+        ))  # fmt: skip
         content = LoadContent(
             scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
             commands=_commands(scenario, folder, plan),
-            command=command_text("roll-plan", [scenario], options, usual={"--seed": 0, "--minutes": MOST_MINUTES}),
+            command=command,
             version=__version__,
         )  # fmt: skip
         placing = within(limited, 0.3, 1.0)
@@ -143,12 +140,13 @@ def _commands(scenario: Path, folder: Path, plan: LoadPlan) -> tuple[str, ...]:
     cases = range(len(plan.repeats))
     each = [
         command_text(
-            "plan", [scenario], {"--durations": folder / _runs_name(case), "--out": folder / f"case-{case + 1}"}
+            requests.Plan(scenario=scenario, out=folder / f"case-{case + 1}", durations=folder / _runs_name(case))
         )
         for case in cases
     ]
-    data = [f"case-{case + 1}.csv" for case in cases]
-    return (*each, command_text("roll", data, {"--loads": folder / "loads.toml", "--vessel": "VESSEL.toml"}))
+    data = tuple(Path(f"case-{case + 1}.csv") for case in cases)
+    roll = requests.Roll(data=data, loads=folder / "loads.toml", vessel=Path("VESSEL.toml"))
+    return (*each, command_text(roll))
 
 
 def _placed(

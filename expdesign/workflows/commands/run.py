@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from expdesign import requests
 from expdesign.progress import Progress, in_phases, silent
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -65,7 +67,7 @@ def run(
         out = out or Path("runs") / f"{case.name}-draft"
         check_no_trial(out)
     check_plannable(case)
-    words = command_text("run", [scenario], {"--vessel": vessel, "--draft": draft, "--seed": seed})
+    words = command_text(requests.Run(scenario=scenario, vessel=vessel, draft=draft, seed=seed))
     with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
         return _run(case, out, words, seed, progress)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
 from expdesign.export import vessel_toml, write_files
@@ -19,9 +19,10 @@ from expdesign.export.validation_page import ValidationContent, validation_docum
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import workers
@@ -92,9 +93,9 @@ def validate_design(
             if count and not item.excitation_condition
         ),
         command=command_text(
-            "validate",
-            [scenario],
-            {"--truth": truth, "--trials": trials, "--method": method, "--integrator": integrator, "--seed": seed},
+            requests.Validate(
+                scenario=scenario, truth=truth, trials=trials, method=method, integrator=integrator, seed=seed
+            )
         ),
         version=__version__,
     )

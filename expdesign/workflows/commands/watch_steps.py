@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.document import Table as TextTable
@@ -30,6 +30,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
 from expdesign.records.load import check_limits, column_limits
+from expdesign.requests import command_text
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,
@@ -42,7 +43,7 @@ from expdesign.step_trials.live import (
     restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.outcome import Outcome, command_text, document_of
+from expdesign.workflows.outcome import Outcome, document_of
 from expdesign.workflows.steps.measured import equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -121,11 +122,10 @@ def watch_steps(
     wanted = listed_steps(steps, ship.model.inputs, controls, ship)
     learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if learn_s is None else learn_s
     setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learnt_s, seed=seed)
-    options = {
-        "--steps": steps, "--vessel": vessel, "--throttle": tuple(throttle), "--rudder": tuple(rudder),
-        "--learn-s": learn_s, "--out": out, "--resume": resume, "--seed": seed,
-    }  # fmt: skip
-    command = command_text("watch-steps", [data], options, usual={"--learn-s": None, "--seed": 0})
+    command = command_text(requests.WatchSteps(
+        data=data, steps=steps, vessel=vessel, throttle=tuple(throttle), rudder=tuple(rudder), learn_s=learn_s,
+        resume=resume, out=out, seed=seed,
+    ))  # fmt: skip
     folder = out or Path("runs") / ("watch-steps" if data == STREAM else data.stem)
     work = _Work(setup=setup, folder=folder, command=command, actuators=ship.model.actuators)
     now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))

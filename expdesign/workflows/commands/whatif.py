@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import __version__, requests
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign, efficiencies, optimal_shares
 from expdesign.durations.rounding import whole_runs
@@ -27,9 +27,10 @@ from expdesign.plan.verify import track_covariance
 from expdesign.processes import as_finished, reported_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, command_text
+from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed, duration_problem
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
@@ -109,7 +110,9 @@ def whatif(
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
         planned=with_plan,
-        command=command_text("whatif", [scenario, *variants], {"--plan": with_plan, "--seed": seed}),
+        command=command_text(
+            requests.WhatIf(scenario=scenario, variants=tuple(variants), with_plan=with_plan, seed=seed)
+        ),
         version=__version__,
     )
     if all(case.problem for case in content.cases):

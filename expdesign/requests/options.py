@@ -1,35 +1,37 @@
-"""Arguments and options that several commands share, and checks of them before they are parsed."""
+"""What a command may be asked: an option or argument, and those that several commands share."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from itertools import takewhile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import Annotated, Any
 
 from expdesign.errors import InputError
 
-# Arguments before they are parsed, and checks that no file reader can make.
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a command, beside the type and the default of its field."""
+
+    flag: str = ""  # as it is typed; by default the name of the field
+    short: str = ""  # one letter, as in -o
+    metavar: str | None = None
+    help: str = ""
+    min: float | None = None
+    max: float | None = None
+    parser: Callable[[str], Any] | None = None  # of what is typed
+    callback: Callable[[Any], Any] | None = None  # checks the value, before the work begins
+    stated: bool = False  # whether the command that repeats a call states a usual value, too
 
 
-def repeat_option(arguments: Sequence[str], option: str, *, files: bool = False) -> list[str]:
-    """Spell out a list of values: `--format rtz gpx` becomes `--format rtz --format gpx`.
+@dataclass(frozen=True)
+class Argument:
+    """What is typed without a name."""
 
-    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a slash or
-    an ending that is no number: rtz-1.0 is a value.
-    """
-    spelled, rest = [], list(arguments)
-    while rest:
-        spelled.append(rest.pop(0))
-        if spelled[-1] == option and rest:
-            first, *more = rest
-            values = [first, *takewhile(_looks_like_file_or_value if files else _looks_like_value, more)]
-            spelled += [values[0], *(part for value in values[1:] for part in (option, value))]
-            rest = rest[len(values) :]
-    return spelled
+    metavar: str
+    help: str
 
 
 def parse_seed(text: str) -> int:
@@ -74,21 +76,12 @@ def _count(option: str, text: str) -> int:
     return int(text)
 
 
-def _looks_like_value(text: str) -> bool:
-    _, dot, ending = text.rpartition(".")
-    return not text.startswith("-") and "/" not in text and (not dot or ending.isdecimal())
-
-
-def _looks_like_file_or_value(text: str) -> bool:
-    return not text.startswith("-")
-
-
 # Arguments and options that several commands share.
 
 
 def out_option(default: str) -> object:
     """`--out`, checked; `default` says where results go without it."""
-    return typer.Option(
+    return Option(
         "--out", "-o", metavar="FOLDER", callback=check_out, help=f"Folder for the results. Default: {default}."
     )
 
@@ -104,13 +97,13 @@ OutWhatIf = Annotated[Path | None, out_option("runs/<scenario>-whatif")]
 
 ScenarioFile = Annotated[
     Path,
-    typer.Argument(
+    Argument(
         metavar="SCENARIO.toml", help="Names vessel, dictionary and area; see expdesign explain scenario for its keys."
     ),
 ]
 OtherVessel = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--vessel",
         metavar="VESSEL.toml",
         help="In place of the vessel file that the scenario names, e.g. vessel-steps.toml or vessel-estimated.toml.",
@@ -118,32 +111,29 @@ OtherVessel = Annotated[
 ]
 PlanFile = Annotated[
     Path,
-    typer.Argument(metavar="PLAN.json", help="A plan made before; its track.csv and commands.csv must lie beside it."),
+    Argument(metavar="PLAN.json", help="A plan made before; its track.csv and commands.csv must lie beside it."),
 ]
 DataFiles = Annotated[
-    list[Path],
-    typer.Argument(
+    tuple[Path, ...],
+    Argument(
         metavar="DATA.csv ...", help="Measured runs, or folders of them; see expdesign explain data for their columns."
     ),
 ]
-Seed = Annotated[
-    int,
-    typer.Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result."),
-]
+SEED = Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result.")
+Seed = Annotated[int, SEED]
+StatedSeed = Annotated[int, replace(SEED, stated=True)]
 MOST_TRIALS = 100_000
 """Simulated trials of a design, or of a manoeuvre, at most."""
 MOST_VOYAGES = 1000
 """Simulated voyages of each change in operation, at most."""
-Jobs = Annotated[
-    int, typer.Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")
-]
+Jobs = Annotated[int, Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")]
 Scheduler = Annotated[
     str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on instead, e.g. tcp://host:8786."),
+    Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on instead, e.g. tcp://host:8786."),
 ]
 NoCache = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--no-cache",
         help="Neither read nor keep results of earlier commands, as with EXPDESIGN_CACHE=off. That variable may also "
         "name the folder for them. Default: ~/.cache/expdesign, at most 256 MiB.",
@@ -151,19 +141,19 @@ NoCache = Annotated[
 ]
 Resume = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--resume",
         help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it had "
         "read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
     ),
 ]
 Fixed = Annotated[
-    list[str] | None,
-    typer.Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
+    tuple[str, ...],
+    Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
 ]
 Velocity = Annotated[
     str,
-    typer.Option(
+    Option(
         metavar="HOW",
         help="Source of u, v, r: measured; difference or smoothed, both from the pose; auto: measured where there are "
         "such columns, else difference.",
@@ -171,23 +161,23 @@ Velocity = Annotated[
 ]
 Mean = Annotated[
     str,
-    typer.Option(
+    Option(
         metavar="HOW",
         help="Mean subtracted from the instruments, against constant disturbances: complete, batch or none. Use none "
         "where an input never changes.",
     ),
 ]
 Throttle = Annotated[
-    list[str] | None,
-    typer.Option(
+    tuple[str, ...],
+    Option(
         "--throttle",
         metavar="NAME ...",
         help="Signals whose mean drives the vessel, e.g. n1. Default: all n, else tau_x.",
     ),
 ]
 Rudder = Annotated[
-    list[str] | None,
-    typer.Option(
+    tuple[str, ...],
+    Option(
         "--rudder",
         metavar="NAME ...",
         help="Signals whose mean turns it. Default: all rudder, else all a, else tau_psi, else half the difference "
