@@ -22,11 +22,11 @@ def broken(*_: object, **__: object) -> str:
 def test_results_are_on_the_disk_while_the_page_is_drawn(tmp_path: Path):
     seen = []
 
-    def estimate_page() -> str:
+    def page() -> str:
         seen.append((tmp_path / "out.json").read_text("utf-8"))
         return "<p>drawn</p>"
 
-    paths = write_files(tmp_path, {"out.html": estimate_page, "out.json": "{}"})
+    paths = write_files(tmp_path, {"out.html": page, "out.json": "{}"})
     assert seen == ["{}"]
     assert [path.name for path in paths] == ["out.html", "out.json"]
     assert not gaps(paths)
@@ -43,11 +43,11 @@ def test_a_page_that_fails_is_replaced_by_one_that_says_so(tmp_path: Path):
 
 
 def test_an_interruption_of_the_page_leaves_results_and_no_half_page(tmp_path: Path):
-    def estimate_page() -> str:
+    def page() -> str:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_files(tmp_path, {"out.html": estimate_page, "out.json": "{}"})
+        write_files(tmp_path, {"out.html": page, "out.json": "{}"})
     assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
 
 

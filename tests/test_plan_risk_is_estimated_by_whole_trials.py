@@ -14,7 +14,8 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
-from expdesign.plan.monte_carlo import guidance, risk
+from expdesign.plan.monte_carlo import guidance
+from expdesign.plan.monte_carlo import risk as monte_carlo_risk
 from expdesign.plan.monte_carlo.guidance import ARRIVED_HULLS, GO_AROUNDS, PARALLEL_SHARE, STANDSTILL_SHARE, Guidance
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, tolerances
 from expdesign.plan.monte_carlo.risk import CollisionCheck, Trials, estimate_risk, failed_chance_constraint, sail_trials
@@ -59,23 +60,23 @@ def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
 
 
 def test_nominal_ships_reach_the_goal_without_go_arounds():
-    _, risk = sailing(certain=True, draws=3)
-    assert risk.completed.all()
-    assert not risk.go_arounds.any()
+    _, trials = sailing(certain=True, draws=3)
+    assert trials.completed.all()
+    assert not trials.go_arounds.any()
     runs = [leg.kind == "primitive" for leg in planned().legs]
-    assert (risk.used[runs] < 1.0).all()
+    assert (trials.used[runs] < 1.0).all()
 
 
 def test_every_trial_has_one_outcome_and_runs_begin_within_tolerance():
     weather = Environment(current_std_mps=0.25)
-    _, risk = sailing(environment=weather, draws=30)
-    ends = risk.left.sum(axis=0) + risk.aborted.sum(axis=0) + risk.completed
+    _, trials = sailing(environment=weather, draws=30)
+    ends = trials.left.sum(axis=0) + trials.aborted.sum(axis=0) + trials.completed
     np.testing.assert_array_equal(ends, 1)
-    begun = ~np.isnan(risk.used)
-    assert (risk.used[begun] <= 1.0).all()
-    assert risk.go_arounds.max() <= GO_AROUNDS
-    over = np.cumsum(risk.left | risk.aborted, axis=0)[:-1] > 0
-    assert not risk.samples[1:][over].any()  # nothing is sailed after the end
+    begun = ~np.isnan(trials.used)
+    assert (trials.used[begun] <= 1.0).all()
+    assert trials.go_arounds.max() <= GO_AROUNDS
+    over = np.cumsum(trials.left | trials.aborted, axis=0)[:-1] > 0
+    assert not trials.samples[1:][over].any()  # nothing is sailed after the end
 
 
 def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_one_part(monkeypatch):
@@ -86,8 +87,8 @@ def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_o
         at_once.append(draws)
         return draw_truths(vessel, environment, draws, rng)
 
-    monkeypatch.setattr(risk, "TRIALS_AT_ONCE", 10)
-    monkeypatch.setattr(risk, "draw_truths", drawn)
+    monkeypatch.setattr(monte_carlo_risk, "TRIALS_AT_ONCE", 10)
+    monkeypatch.setattr(monte_carlo_risk, "draw_truths", drawn)
     _, parted = sailing(draws=25)
     assert at_once == [10, 10, 5]
     assert parted.used.shape == (len(planned().legs), 25)
@@ -230,13 +231,13 @@ def test_a_ship_that_does_not_arrive_is_given_up_when_the_plan_would_be_over(mon
 def test_water_that_ends_on_a_run_is_left_there_and_the_message_says_where():
     legs = planned().legs
     reach = float(planned().trajectory.pose[legs[0].last, 0])
-    water, risk = sailing(shapely.box(-400, -300, 400, reach), certain=True, draws=3)
-    assert risk.left[0].all()
-    assert not risk.samples[1:].any()
-    assert (np.abs(risk.place[0, :, 0] - reach) < water.vessel.length_m).all()
-    risk, risk = estimate_risk(water, planned(), rng=np.random.default_rng(0), draws=20)
-    message = failed_chance_constraint(risk, risk, legs, water.area, confidence=0.95)
-    lat, lon = water.area.frame.to_degrees(np.nanmedian(risk.place[0], axis=0))
+    water, trials = sailing(shapely.box(-400, -300, 400, reach), certain=True, draws=3)
+    assert trials.left[0].all()
+    assert not trials.samples[1:].any()
+    assert (np.abs(trials.place[0, :, 0] - reach) < water.vessel.length_m).all()
+    risk, trials = estimate_risk(water, planned(), rng=np.random.default_rng(0), draws=20)
+    message = failed_chance_constraint(risk, trials, legs, water.area, confidence=0.95)
+    lat, lon = water.area.frame.to_degrees(np.nanmedian(trials.place[0], axis=0))
     assert "in run 1, 'go'" in message
     assert f"{lat:.5f}, {lon:.5f}" in message
     assert risk.left == 1.0
@@ -261,25 +262,25 @@ def test_of_trials_that_no_longer_end_on_a_leg_as_many_end_on_those_after_it():
     """60 of 100 are aborted on the first leg, 20 of the 40 left leave the water on the second, 10 of 20 are aborted."""
     left, aborted = np.zeros((2, 3, 100), dtype=bool)
     aborted[0, :60], left[1, 60:80], aborted[2, 80:90] = True, True, True
-    risk = outcomes(left, aborted)
-    assert risk.shares() == pytest.approx((0.2, 0.7))
-    assert risk.shares([False, True, True]) == pytest.approx((0.5, 0.25))
-    assert risk.shares([True, True, False]) == pytest.approx((0.2, 0.6))
+    trials = outcomes(left, aborted)
+    assert trials.shares() == pytest.approx((0.2, 0.7))
+    assert trials.shares([False, True, True]) == pytest.approx((0.5, 0.25))
+    assert trials.shares([True, True, False]) == pytest.approx((0.2, 0.6))
 
 
 def test_the_chance_constraint_holds_or_fails_by_the_share_alone():
     legs = (Leg(kind="reposition", name="a", first=0, last=1), Leg(kind="primitive", name="a", first=1, last=2))
     left = np.zeros((2, 100), dtype=bool)
     left[0, :5] = True
-    risk = outcomes(left, np.zeros_like(left))
+    trials = outcomes(left, np.zeros_like(left))
     risk = replace(sailed_risk(), left=0.05, trials=100)
     assert risk.error == pytest.approx(np.sqrt(0.05 * 0.95 / 100))
     sea = leg_water(OPEN).area
     kept, broken = 1.0 - 0.05 - 1.01 * risk.error, 1.0 - 0.05 - 0.99 * risk.error
-    assert failed_chance_constraint(risk, risk, legs, sea, confidence=kept) == ""
-    assert "on the way to run 1" in failed_chance_constraint(risk, risk, legs, sea, confidence=broken)
+    assert failed_chance_constraint(risk, trials, legs, sea, confidence=kept) == ""
+    assert "on the way to run 1" in failed_chance_constraint(risk, trials, legs, sea, confidence=broken)
     none = replace(risk, left=0.0)
-    assert failed_chance_constraint(none, risk, legs, sea, confidence=0.9999) == ""
+    assert failed_chance_constraint(none, trials, legs, sea, confidence=0.9999) == ""
 
 
 def test_many_aborted_trials_give_a_warning_and_most_of_them_no_plan():
