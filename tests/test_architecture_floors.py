@@ -66,7 +66,7 @@ FLOORS = {
         ("diagnose",),
     ),
     "plan": (
-        ("values", "work_budget"),
+        ("values",),
         ("verify", "chart", "control", "runs"),
         ("problem",),
         ("legs",),

@@ -1,27 +1,141 @@
 """All commands: each request becomes a command of the same options, which hands them to its workflow.
 
-A workflow is loaded only when its command runs.
+A workflow is loaded only when its command runs. `explain` and `web` have no request: they write no results.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import inspect
+import json as json_text
+import secrets
 import warnings
+import webbrowser
 from collections.abc import Mapping
-from dataclasses import MISSING
+from dataclasses import MISSING, asdict
+from pathlib import Path
 from types import GenericAlias
-from typing import Annotated, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.table import Table
 
 from expdesign.cli.app import NO_ANSWER, Json, Quiet, app, shown_progress, tell_gaps
-from expdesign.cli.explaining import explain
-from expdesign.cli.pages import web
 from expdesign.cli.summary import as_json, print_summary, unverified
-from expdesign.errors import NotDrawn
+from expdesign.errors import InputError, NotDrawn
 from expdesign.interruptions import interruptions_wait
 from expdesign.requests import COMMANDS, Command, asked
 from expdesign.requests.options import Argument, Option
+
+if TYPE_CHECKING:
+    from expdesign.workflows.commands.explain import Explained, Section, Topic
+
+
+NEEDED = ("nicegui", "tomlkit")
+"""Packages of the extra `web`."""
+
+
+def web(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Scenarios and results; nothing else is touched.")
+    ] = Path(),
+    port: Annotated[
+        int, typer.Option("--port", metavar="N", min=0, max=65535, help="Of the address; 0 for any.")
+    ] = 8120,
+    host: Annotated[
+        str,
+        typer.Option(
+            "--host", metavar="ADDRESS", help="Address to be bound to. Other than this machine needs a token."
+        ),
+    ] = "127.0.0.1",
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+) -> None:
+    """Open a page on a folder of scenarios: draw the area, choose manoeuvres, plan, play, import and diagnose.
+
+    The page runs the commands of this program and shows each of them; files stay the truth. It can be opened on this
+    machine only, unless --host says otherwise; then the address that is printed holds a token. Ctrl-C ends it.
+
+    Example: expdesign web mytrial
+    """
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"the page needs {' and '.join(missing)}: pip install 'expdesign[web]'")
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder, expected one with scenarios, or an empty one")
+    from expdesign.web.server import LOOPBACK, serve
+
+    token = None if host in LOOPBACK else secrets.token_urlsafe(24)
+
+    def ready(address: str) -> None:
+        typer.echo(f"Open {address} in a browser. Ctrl-C ends it.")
+        if not no_browser:
+            webbrowser.open(address)
+
+    serve(folder, host=host, port=port, token=token, ready=ready)
+
+
+def explain(
+    subject: Annotated[
+        str, typer.Argument(metavar="TOPIC or NAME", help="A topic, a key such as design.total_s, or a family.")
+    ] = "",
+    json: Json = False,
+) -> None:
+    """Explain the keys of files and all names that can be chosen. Without a topic: list the topics.
+
+    Example: expdesign explain scenario
+    """
+    with interruptions_wait():
+        from expdesign.workflows import explain as explained
+
+        topic = explained(subject)
+    if json:
+        typer.echo(json_text.dumps(asdict(topic), indent=2, ensure_ascii=False))
+        return
+    console = Console(highlight=False, markup=False)
+    if console.is_terminal:
+        _show(console, topic)
+    else:
+        typer.echo("\n".join(_lines(topic)))
+
+
+def _show(console: Console, topic: Topic) -> None:
+    """Tables as wide as the terminal."""
+    console.print(topic.title, style="bold")
+    if topic.text:
+        console.print(topic.text if topic.sections else Markdown(topic.text))
+    for section in topic.sections:
+        console.print()
+        if section.title:
+            console.print(section.title, style="bold")
+        console.print(_table(section))
+
+
+def _table(section: Section) -> Table:
+    columns = [name for name in ("default", "allowed") if any(getattr(item, name) for item in section.entries)]
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="underline")
+    table.add_column("name", no_wrap=True)
+    for name in ("meaning", *columns):
+        table.add_column(name, overflow="fold")
+    for entry in section.entries:
+        table.add_row(entry.name, entry.meaning, *(getattr(entry, name) for name in columns))
+    return table
+
+
+def _lines(topic: Topic) -> list[str]:
+    """One line for each entry, for pipes."""
+    lines = [topic.title, *([topic.text] if topic.text else [])]
+    for section in topic.sections:
+        lines += ["", *([section.title] if section.title else []), *map(_line, section.entries)]
+    return lines
+
+
+def _line(entry: Explained) -> str:
+    stated = entry.default in ("", "required", "optional")
+    default = entry.default if stated else f"default {entry.default}"
+    notes = "; ".join(note for note in (default, entry.allowed) if note)
+    return f"{entry.name}: {entry.meaning}" + (f" ({notes})" if notes else "")
 
 
 def carry_out(command: Command, options: Mapping[str, object], *, quiet: bool, json: bool) -> None:

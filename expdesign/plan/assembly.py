@@ -36,7 +36,7 @@ from expdesign.plan.local_planner import (
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment

@@ -43,7 +43,7 @@ from expdesign.plan.remedy_changes import (
     with_settings,
     without_place,
 )
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 

@@ -26,8 +26,7 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
 from expdesign.plan.search import place_runs
-from expdesign.plan.values import SailedTrial
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import SailedTrial, WorkBudget
 from expdesign.progress import silent
 
 MOST_SEARCHES = 8  # narrow searches for places, each with a quarter of the partial plans, to check remedies

@@ -23,8 +23,7 @@ from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_st
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
-from expdesign.plan.values import Leg, Placement, Placements, SailedTrial
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import Leg, Placement, Placements, SailedTrial, WorkBudget
 from expdesign.progress import Progress
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array

@@ -34,8 +34,16 @@ if TYPE_CHECKING:
         steered_entry,
         unstable_warning,
     )
-    from expdesign.export.files.known import Known, Purchase, replan_json
-    from expdesign.export.files.plan_files import PlannedAccuracy, commands_csv, plan_json, planned_accuracy, track_csv
+    from expdesign.export.files.plan_files import (
+        Known,
+        PlannedAccuracy,
+        Purchase,
+        commands_csv,
+        plan_json,
+        planned_accuracy,
+        replan_json,
+        track_csv,
+    )
     from expdesign.export.files.text import finite, record_csv, strict_json
     from expdesign.export.files.vessel_file import vessel_toml
 else:

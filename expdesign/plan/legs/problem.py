@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from expdesign.plan.legs.water import BEYOND_ENDS, LegTask, LegWater, leg_speed_mps, room_beside, through_water
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import WorkBudget
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel

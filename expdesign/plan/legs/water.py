@@ -26,8 +26,7 @@ from expdesign.plan.chart import (
 )
 from expdesign.plan.control import Capability
 from expdesign.plan.legs._ompl import PLANE, roadmap_of, shortened
-from expdesign.plan.values import PathsName, PlanSettings
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import PathsName, PlanSettings, WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Trajectory
 from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, step_shares, to_body

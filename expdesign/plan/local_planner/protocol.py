@@ -18,8 +18,7 @@ from expdesign.plan.chart import ClearanceField, GoalDistance
 from expdesign.plan.control import AgileShip, Capability
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater
 from expdesign.plan.runs import Footprint
-from expdesign.plan.values import Placement
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import Placement, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
