@@ -1,18 +1,13 @@
 """Legs of ships that are steered by a helm: straight off, arcs that the ship can turn on, straight into the next run.
 
-First the ship recovers from what it was doing. From there the path is a Dubins curve of the ship's own turning radius
-between straights: one to accelerate, one in which the turn decays and, before a goal, the ship stops. Optimisation
-starts from steady turns along it; on long straights the ship is steady. The last part before a run is the run-up of the
-standard trials: steady speed, helm as it holds the course, engines as the run begins with.
+First the ship recovers from what it was doing: counter helm ends the turn, the engines go to transit speed. The search
+for places allows for the lengths that it turns and drifts meanwhile. From there the path is a Dubins curve of the
+ship's own turning radius between straights: one to accelerate, one in which the turn decays and, before a goal, the
+ship stops. Optimisation starts from steady turns along it. The last part before a run is the run-up of the standard
+trials: steady speed, helm as it holds the course, engines as the run begins with.
 
-Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
-
-Legs begin with it, and the search for places allows for it: a ship still turns and drifts for some lengths.
-
-The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
-
-There is nothing to optimise about it. The program of a leg of a hundred hull lengths that contains it is large, and
-IPOPT sometimes ends without an answer.
+On long straights the ship is steady at transit speed, with commands that hold it. There is nothing to optimise, and
+IPOPT sometimes ends without an answer for a leg of a hundred hull lengths.
 """
 
 from __future__ import annotations

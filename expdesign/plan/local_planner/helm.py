@@ -1,9 +1,8 @@
 """Local planner of helm-steered ships: arcs that the ship can turn on, in the time that changes of speed take.
 
-A rule for the time of legs of helm-steered ships: accelerate, go on, stop, as the ship's own simulation does.
-
-Such a ship needs distance to change its speed: on a leg too short for it, it has to go astern first, which takes long.
-It recovers from the run before, follows a Dubins curve, and goes straight for the last hull length before a run.
+Legs accelerate, go on and stop as the ship's own simulation does. Such a ship needs distance to change its speed: on a
+leg too short for it, it has to go astern first, which takes long. It recovers from the run before, follows a Dubins
+curve, and goes straight for the last hull length before a run.
 """
 
 from __future__ import annotations
