@@ -12,7 +12,7 @@ from typer.main import get_command
 from expdesign import workflows
 from expdesign.cli.commands import app, given
 from expdesign.cli.entry import LISTS, repeat_option
-from expdesign.requests import COMMANDS, Command, asked, command_text
+from expdesign.requests import COMMANDS, Command, command_text
 from expdesign.requests.options import Argument
 from expdesign.workflows.commands import run
 from short_examples import SCENARIOS
@@ -31,7 +31,7 @@ def unusual(command: Command) -> dict[str, object]:
             return (EXAMPLES[get_args(kind)[0]],) * 2
         return EXAMPLES[kind if isinstance(kind, type) else get_args(kind)[0]]
 
-    return {one.name: value(one.kind) for one in asked(command.request)}
+    return {one.name: value(one.kind) for one in command.asked}
 
 
 def read_back(command: Command, words: list[str]) -> dict[str, object]:
@@ -54,10 +54,10 @@ def test_the_line_that_repeats_a_command_is_read_back_as_its_request(command: Co
     _, name, *words = command_text(command.request(**values)).split()
     assert name == command.name
     assert read_back(command, words) == given(values)
-    arguments = [one for one in asked(command.request) if one.default is MISSING or isinstance(one.typed, Argument)]
+    arguments = [one for one in command.asked if one.default is MISSING or isinstance(one.typed, Argument)]
     least = {one.name: values[one.name] for one in arguments}
     _, _, *words = command_text(command.request(**least)).split()
-    usual = {one.name: one.default for one in asked(command.request) if one.name not in least}
+    usual = {one.name: one.default for one in command.asked if one.name not in least}
     assert read_back(command, words) == given({name: () if v is None else v for name, v in (least | usual).items()})
 
 
@@ -66,7 +66,7 @@ def test_a_workflow_takes_what_its_command_asks_with_the_same_defaults(command: 
     taken = dict(inspect.signature(getattr(workflows, command.workflow)).parameters)
     assert taken.pop("progress").default is not inspect.Parameter.empty
     assert (taken.pop("tell", None) is not None) == command.tells
-    stated = {one.name: one.default for one in asked(command.request)}
+    stated = {one.name: one.default for one in command.asked}
     assert set(taken) == set(given(stated))
     for name in stated.keys() - WITHOUT_EFFECT:
         default = inspect.Parameter.empty if stated[name] is MISSING else stated[name]
@@ -82,7 +82,7 @@ def test_a_workflow_that_gives_its_command_states_all_that_results_depend_on(com
         if isinstance(node, ast.Call) and ast.unparse(node.func) == f"requests.{command.request.__name__}"
     ]
     stated = {keyword.arg for call in calls for keyword in call.keywords}
-    assert not calls or {one.name for one in asked(command.request)} - WITHOUT_EFFECT <= stated
+    assert not calls or {one.name for one in command.asked} - WITHOUT_EFFECT <= stated
 
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:

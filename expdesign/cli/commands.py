@@ -26,7 +26,7 @@ from expdesign.cli.app import NO_ANSWER, Json, Quiet, app, shown_progress, tell_
 from expdesign.cli.summary import as_json, print_summary, unverified
 from expdesign.errors import InputError, NotDrawn
 from expdesign.interruptions import interruptions_wait
-from expdesign.requests import COMMANDS, Command, asked
+from expdesign.requests import COMMANDS, Command
 from expdesign.requests.options import Argument, Option
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def given(options: Mapping[str, object]) -> dict[str, object]:
 
 def register(command: Command) -> None:
     """Make a command of its request, with --quiet and --json besides."""
-    entries = tuple(asked(command.request))
+    entries = command.asked
     lists = {one.name for one in entries if get_origin(one.kind) is tuple}
 
     def run(*, quiet: bool, json: bool, **options: object) -> None:

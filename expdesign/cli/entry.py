@@ -24,12 +24,12 @@ from expdesign.cli.app import BUG, NO_ANSWER
 from expdesign.cli.commands import app
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
-from expdesign.requests import COMMANDS, asked
+from expdesign.requests import COMMANDS
 
 LISTS = {
     one.flag: get_args(one.kind)[0] is Path
     for command in COMMANDS
-    for one in asked(command.request)
+    for one in command.asked
     if one.flag and get_origin(one.kind) is tuple
 }
 """Options that take several values, and whether these are files."""

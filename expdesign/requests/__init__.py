@@ -6,12 +6,12 @@ The command line is made of these values, and so is the line that repeats a call
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass
+from functools import cached_property
 from typing import Any, get_args, get_type_hints
 
 from expdesign.requests.operation import Monitor, WatchSteps
-from expdesign.requests.options import Argument, Option
+from expdesign.requests.options import Argument, Option, Request
 from expdesign.requests.planning import (
     CheckRoute,
     Durations,
@@ -29,16 +29,6 @@ from expdesign.requests.trials import Foresee, Incline, Replan, Roll, Simulate, 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command:
-    """A command: its name, and the workflow that carries it out."""
-
-    name: str  # on the command line
-    request: type  # a dataclass; its docstring is the help
-    workflow: str  # name in `expdesign.workflows`
-    tells: bool = False  # whether the workflow also takes `tell`, for lines that are printed while it works
-
-
-@dataclass(frozen=True, kw_only=True)
 class Asked:
     """One option or argument of a command."""
 
@@ -53,7 +43,26 @@ class Asked:
         return "" if isinstance(self.typed, Argument) else self.typed.flag or f"--{self.name.replace('_', '-')}"
 
 
-def _command(name: str, request: type, *, workflow: str = "", tells: bool = False) -> Command:
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command: its name, and the workflow that carries it out."""
+
+    name: str  # on the command line
+    request: type[Request]
+    workflow: str  # name in `expdesign.workflows`
+    tells: bool = False  # whether the workflow also takes `tell`, for lines that are printed while it works
+
+    @cached_property
+    def asked(self) -> tuple[Asked, ...]:
+        """Options and arguments of the request, in their order."""
+        hints = get_type_hints(self.request, include_extras=True)
+        return tuple(
+            Asked(name=name, kind=kind, typed=typed, default=getattr(self.request, name, MISSING))
+            for name, (kind, typed) in ((name, get_args(hint)) for name, hint in hints.items())
+        )
+
+
+def _command(name: str, request: type[Request], *, workflow: str = "", tells: bool = False) -> Command:
     return Command(name=name, request=request, workflow=workflow or name.replace("-", "_"), tells=tells)
 
 
@@ -87,19 +96,11 @@ COMMANDS = (
 """In the order in which `--help` lists them."""
 
 
-def asked(request: type) -> Iterator[Asked]:
-    """Options and arguments of a request, in the order of its fields."""
-    hints = get_type_hints(request, include_extras=True)
-    for field in fields(request):
-        kind, typed = get_args(hints[field.name])
-        yield Asked(name=field.name, kind=kind, typed=typed, default=field.default)
-
-
-def command_text(request: object) -> str:
+def command_text(request: Request) -> str:
     """`expdesign COMMAND ARGUMENTS OPTIONS`, ready to be typed; options with their usual values are left out."""
     command = next(one for one in COMMANDS if one.request is type(request))
     arguments, options = list[str](), list[str]()
-    for one in asked(command.request):
+    for one in command.asked:
         value = getattr(request, one.name)
         words = [f"{item:g}" if isinstance(item, float) else str(item) for item in _listed(value)]
         if isinstance(one.typed, Argument):

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from expdesign.requests.options import Argument, Jobs, Option, OutByData, Resume, Rudder, Seed, Throttle, Velocity
+from expdesign.requests.options import (
+    Argument,
+    Jobs,
+    Option,
+    OutByData,
+    Request,
+    Resume,
+    Rudder,
+    Seed,
+    Throttle,
+    Velocity,
+)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Monitor:
+class Monitor(Request):
     """Watch a ship in operation: whether it still is the ship of its model, what changed, since when, by how much.
 
     Writes monitor.json, monitor.html, monitor-state.json and, after an alarm, since-change.csv for diagnose.
@@ -72,8 +81,7 @@ class Monitor:
     jobs: Jobs = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class WatchSteps:
+class WatchSteps(Request):
     """Tell during a step trial when the vessel is steady and which step is next; list what is left to sail.
 
     One line for each event, at once. Bad steps are named and put to the end. Writes steps-to-do.csv, a list of steps

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, dataclass_transform
 
 from expdesign.errors import InputError
 
@@ -32,6 +32,25 @@ class Argument:
 
     metavar: str
     help: str
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Request:
+    """What a command is asked: annotations are its options, class attributes their defaults, the docstring its help.
+
+    It is a frozen dataclass to the type checker. At run time it is less, as every command loads all of them.
+    """
+
+    def __init__(self, **values: object) -> None:
+        """Take values by name.
+
+        Raises:
+            TypeError: a name is unknown or missing.
+        """
+        known = type(self).__annotations__
+        if wrong := {*values} - {*known} | {name for name in known if name not in values and not hasattr(self, name)}:
+            raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
+        vars(self).update(values)
 
 
 def parse_seed(text: str) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +17,7 @@ from expdesign.requests.options import (
     OutByCard,
     OutWhatIf,
     PlanFile,
+    Request,
     ScenarioFile,
     Scheduler,
     Seed,
@@ -25,8 +25,7 @@ from expdesign.requests.options import (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class New:
+class New(Request):
     """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship.
 
     Example: expdesign new mytrial --kind twin-screw
@@ -39,8 +38,7 @@ class New:
     ] = "azimuth"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(Request):
     """Do everything: score, durations, plan, verification, route files, report.
 
     Example: expdesign run mytrial/scenario.toml
@@ -64,8 +62,7 @@ class Run:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Nominal:
+class Nominal(Request):
     """Make a vessel file from a ship's particulars and what her pilot card states of trials.
 
     Writes vessel.toml, with standard deviations and correlations; nominal.json and nominal.html: her trials predicted
@@ -82,8 +79,7 @@ class Nominal:
     seed: Seed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Score:
+class Score(Request):
     """Simulate the manoeuvres of the dictionary, and rank them by the information that each adds beside all others.
 
     Writes dictionary.json.
@@ -95,8 +91,7 @@ class Score:
     seed: Seed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Durations:
+class Durations(Request):
     """Choose how long to run each manoeuvre, with a certificate of how close to the optimum that is.
 
     Writes durations.json; with --grow also growth.json and dictionary-grown.toml, which any scenario can name;
@@ -125,8 +120,7 @@ class Durations:
     seed: Seed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Plan:
+class Plan(Request):
     """Plan one trajectory that runs the chosen manoeuvres in allowed water, and verify it.
 
     Writes plan.json, track.csv and commands.csv.
@@ -145,8 +139,7 @@ class Plan:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Export:
+class Export(Request):
     """Write a plan as route files for chart systems and autopilots: one leg for each run, and those between them.
 
     Example: expdesign export runs/helsinki/plan.json --format rtz gpx
@@ -186,15 +179,13 @@ class Export:
     out: OutBesidePlan = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckRoute:
+class CheckRoute(Request):
     """Check RTZ and GPX files beyond their schemas: ids, names, order of schedules, ranges, size."""
 
     files: Annotated[tuple[Path, ...], Argument(metavar="ROUTE.rtz ...", help="RTZ or GPX files of any origin.")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class WhatIf:
+class WhatIf(Request):
     """Compare variants of a scenario side by side: time, accuracy and cost.
 
     Writes whatif.json and whatif.html.
@@ -217,8 +208,7 @@ class WhatIf:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class RollPlan:
+class RollPlan(Request):
     """Choose known loads, and manoeuvres at each, that tell most about roll and an unknown load.
 
     The vessel file has a table of roll, whose uncertain parameters are sought. Writes roll-plan.html and

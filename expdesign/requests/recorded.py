@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +15,7 @@ from expdesign.requests.options import (
     OutByData,
     OutByLog,
     OutByVessel,
+    Request,
     Rudder,
     Seed,
     StatedSeed,
@@ -24,8 +24,7 @@ from expdesign.requests.options import (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Import:
+class Import(Request):
     """Turn logs, as ships and craft record them, into runs that the other commands read.
 
     Writes a CSV file for each run, mapping.toml with all decisions, instruments.toml with what the logs tell of
@@ -74,8 +73,7 @@ class Import:
     out: OutByLog = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Estimate(Request):
     """Estimate the model's parameters from measured data, with standard errors.
 
     Writes estimate.json, vessel-estimated.toml and estimate.html.
@@ -178,8 +176,7 @@ class Estimate:
     out: OutByData = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Diagnose:
+class Diagnose(Request):
     """Find the causes of the simulation error and extend the model by them.
 
     Writes diagnosis.json, diagnosis.html and vessel-extended.toml. The causes: expdesign explain causes
@@ -211,8 +208,7 @@ class Diagnose:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Indices:
+class Indices(Request):
     """Compute turning, zig-zag and stopping indices, simulated and measured, beside their IMO limits.
 
     Writes indices.json and indices.html.
@@ -247,8 +243,7 @@ class Indices:
     out: OutByVessel = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class IdentifySteps:
+class IdentifySteps(Request):
     """Identify a model of speed and yaw rate from steps of throttle and rudder, each held until the vessel is steady.
 
     Writes step-model.json, step-trial.html and, with --vessel, vessel-steps.toml: that vessel with the parameters,
@@ -285,8 +280,7 @@ class IdentifySteps:
     seed: Seed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mine:
+class Mine(Request):
     """Rank recorded runs by their information, and choose the few to estimate from.
 
     Writes mining.json and chosen.csv, which `estimate` reads. With --labels: dictionary.json, durations.json, and

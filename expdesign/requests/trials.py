@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +18,7 @@ from expdesign.requests.options import (
     OutByData,
     OutInclined,
     PlanFile,
+    Request,
     ScenarioFile,
     Scheduler,
     Seed,
@@ -26,8 +26,7 @@ from expdesign.requests.options import (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Foresee:
+class Foresee(Request):
     """Foresee what a diagnosis of the trial would find: the power of its test of every cause, before sailing.
 
     Writes foresee.json and foresee.html: also causes that it would not tell apart, and runs that would help. With
@@ -64,8 +63,7 @@ class Foresee:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Simulate:
+class Simulate(Request):
     """Rehearse a trial: run its commands on another vessel and measure with noise.
 
     Writes measured.csv.
@@ -83,8 +81,7 @@ class Simulate:
     seed: Seed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Validate:
+class Validate(Request):
     """Test a design in simulated trials: predicted and simulated accuracy, beside equal shares and random runs.
 
     Writes validation.json and validation.html. An interrupted call continues where it stopped.
@@ -122,8 +119,7 @@ class Validate:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrialResult:
+class TrialResult(Request):
     """Put what a trial promised beside what came out: one page for owner and class, with space to sign.
 
     Writes result.json and result.html: runs, accuracy of every parameter, indices and their limits.
@@ -143,8 +139,7 @@ class TrialResult:
     out: OutBesidePlan = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Replan:
+class Replan(Request):
     """Plan the rest of a trial, from the present position, with a model updated from the data.
 
     Writes what run writes, for the rest; replan.json with what is known and what the rest will add; and
@@ -199,8 +194,7 @@ class Replan:
     seed: StatedSeed = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Roll:
+class Roll(Request):
     """Estimate roll inertia, damping, stiffness and an unknown load from runs at one or more loads.
 
     Reads roll_rate_radps, imu_lateral_mps2, r_radps and the rudder. Writes roll.json and roll.html: parameters with
@@ -238,8 +232,7 @@ class Roll:
     out: OutByData = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Incline:
+class Incline(Request):
     """Say what inclining tests tell: heel, and the accuracy of metacentric height and roll inertia.
 
     Writes incline.json, with a row for every weight and shift.
