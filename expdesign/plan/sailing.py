@@ -24,7 +24,7 @@ from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
 from expdesign.plan.values import Leg, Placement, Placements, SailedTrial, WorkBudget
-from expdesign.progress import Progress
+from expdesign.progress import Progress, silent
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
@@ -244,7 +244,8 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
         phases.placing(*failures.placing())
-        placed = _placed(search, space, left, voyage.line, stuck)
+        # how long another try takes is not known
+        placed = _placed(search, space, left, voyage.line, stuck, silent if failures.tries else phases.placing)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
@@ -265,11 +266,12 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
 
 
 def _placed(
-    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str
+    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str, progress: Progress
 ) -> Placements:
     counts = [left[item.name] for item in space.footprints]
     try:
-        return search.place(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last)
+        exit_mps = float(line.state[3])
+        return search.place(space, counts, start=line.state[:3], exit_mps=exit_mps, last=line.last, progress=progress)
     except NoPlan as error:
         if not stuck:
             raise
