@@ -18,7 +18,7 @@ from pynmeagps import NMEAReader
 
 from expdesign.cli import main
 from expdesign.errors import FileError
-from expdesign.importing import guess, read_log
+from expdesign.importing import channels, guess, read_log
 from logged_trial import (
     RATE_RADPS,
     SHIP,
@@ -150,6 +150,39 @@ def test_a_voyage_is_imported_as_it_was_sailed(case: str, tmp_path: Path, trip: 
     rounded = 6e-5 if case.startswith("nmea 2000") else 2e-6
     assert all(found[key] < (2e-3 if key == "tau_psi" else rounded) for key in inputs)
     assert [run["what"] for run in said["runs"]] == ["zig-zag 20/20 starboard", "turning circle 35 starboard"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_log_beyond_the_limit_of_memory_is_refused_in_one_line(
+    case: str, tmp_path: Path, trip: Voyage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name, write, _, _ = CASES[case]
+    extra = EXTRA.get(getattr(write, "func", write))
+    if extra and importlib.util.find_spec(extra) is None:
+        pytest.skip(f"needs {extra}")
+    path = write(tmp_path / name, trip.every(50))
+    size = read_log(path).size
+    with pytest.raises(FileError, match="makes more than 60 million readings and times, which is the most of all logs"):
+        read_log(path, beside=channels.MOST_NUMBERS - size + 1)
+    monkeypatch.setattr(channels, "MOST_NUMBERS", size // 4)
+    with pytest.raises(FileError, match=r"holds more than .* million readings and times, which is the most at once"):
+        read_log(path)
+
+
+def test_a_line_without_end_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"time,lat,lon\n1,2,3\n" + b"4," * (1 << 24))
+    with pytest.raises(FileError, match="has a line of more than 16 MB"):
+        read_log(path)
+
+
+def test_a_file_of_matlab_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"a": {"b": np.zeros(200_000)}}, do_compression=True)
+    assert path.stat().st_size < 5000
+    monkeypatch.setattr(channels, "MOST_NUMBERS", 100_000)
+    with pytest.raises(FileError, match=r"holds more than 0\.1 million"):
+        read_log(path)
 
 
 @pytest.mark.parametrize(

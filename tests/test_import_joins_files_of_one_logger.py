@@ -1,5 +1,7 @@
 """Files that one logger wrote one after another are one log, whatever their order; others stand beside each other."""
 
+import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +95,29 @@ def test_a_log_in_parts_gives_the_runs_of_the_whole(tmp_path: Path) -> None:
     assert runs == sorted(path.name for path in (tmp_path / "of-parts").glob("*.csv"))
     for name in runs:
         assert (tmp_path / "of-parts" / name).read_bytes() == (tmp_path / "of-whole" / name).read_bytes()
+
+
+def test_years_between_two_files_take_no_memory(tmp_path: Path) -> None:
+    """Units and answers of actuators are those of each file; no array has a number for each second between."""
+    (sailed,) = voyages(1, "zigzag", last_s=240.0, gust=0.3)
+    header, rows = dated(tmp_path / "one.csv", sailed, NAMES)
+    later = [f"{float(row.partition(',')[0]) + 2e8:.1f},{row.partition(',')[2]}" for row in rows]
+    (tmp_path / "two.csv").write_text("\n".join([header, *later]) + "\n", encoding="utf-8")
+    said = []
+    for logs in (["one.csv"], ["one.csv", "two.csv"]):
+        tracemalloc.start()
+        workflows.import_logs([tmp_path / name for name in logs], tmp_path / "out")
+        said.append(
+            (
+                json.loads((tmp_path / "out" / "import.json").read_text(encoding="utf-8")),
+                tracemalloc.get_traced_memory()[1],
+            )
+        )
+        tracemalloc.stop()
+    (one, least), (both, most) = said
+    assert most < 2.0 * least  # a number for each second is 1.6 GB
+    assert len(both["runs"]) == 2 * len(one["runs"])
+    assert [run["what"] for run in both["runs"]] == 2 * [run["what"] for run in one["runs"]]
 
 
 def test_a_log_of_which_nothing_is_used_is_told(tmp_path: Path) -> None:

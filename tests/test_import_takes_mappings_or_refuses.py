@@ -69,6 +69,8 @@ BAD = {
     "unit": ('unit = "kn"', 'unit = "furlong"', "channel[3].unit: is 'furlong'"),
     "file": ('file = "a.csv"', 'file = "b.csv"', "channel[1].file: is 'b.csv', expected one of a.csv"),
     "channel": ('channel = "HDG"', 'channel = "HDGX"', "channel[5].channel: is 'HDGX', which a.csv has not"),
+    "name": ('name = "a.csv"', 'name = "b.csv"', "file[1].name: is 'b.csv', expected one of a.csv"),
+    "no scale": ("scale = 1.0", "scale = 0.0", "channel[1].scale: is 0, expected another number"),
     "key": ("length_m = 50.0", "lenght_m = 50.0", "lenght_m: is not a known key, did you mean 'length_m'"),
     "twice": (
         'column = "reached_rudder1_rad"',

@@ -52,6 +52,17 @@ def test_paths_are_looked_up_once_for_each_run(space, monkeypatch):
     assert max(asked) <= 20
 
 
+def test_each_run_and_each_order_is_told(space):
+    told = []
+    runs = place_runs(space, [5], start=START, width=20, progress=lambda what, share: told.append((what, share)))
+    assert [what for what, _ in told] == [
+        *(f"placing run {number} of {len(runs)}" for number in range(1, 6)), "moving runs closer to each other"
+    ]  # fmt: skip
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+
+
 def test_rows_chosen_from_several_sets_are_those_of_the_joined_set(space):
     parts = space.planner.successors(space, begun(space))
     joined = Successors.joined(parts)

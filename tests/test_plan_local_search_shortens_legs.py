@@ -10,7 +10,15 @@ import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.local_planner import SearchSpace, TriedTransition, run_ends
-from expdesign.plan.search.local_search import ChainEnds, measured_s, polished, runs_clear
+from expdesign.plan.search import local_search
+from expdesign.plan.search.local_search import (
+    MOST_POSES,
+    ChainEnds,
+    _longest_block,
+    measured_s,
+    polished,
+    runs_clear,
+)
 from plan_case import leg_water, primitive, space_of
 
 ISLAND = shapely.box(-60, -200, 60, 40)
@@ -44,6 +52,23 @@ def test_no_plan_takes_less_than_its_path_at_full_speed(space):
     ways = [space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
     way_m = sum(polyline_length(way) for way in ways)
     assert taken_s >= way_m / space.planner.times.speed_mps
+
+
+def test_the_work_of_a_sweep_does_not_grow_with_the_cube_of_the_runs():
+    for runs in range(1, 400):
+        longest = _longest_block(runs)
+        poses = sum(length * (runs - length + 1) for length in range(1, longest + 1))
+        assert poses <= MOST_POSES
+        whole = runs * (runs + 1) * (runs + 2) // 6  # of all blocks
+        assert (longest == runs) == (whole <= MOST_POSES)
+
+
+def test_short_blocks_alone_shorten_legs_of_many_runs(space, monkeypatch):
+    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    monkeypatch.setattr(local_search, "MOST_POSES", 3)
+    found, taken_s = polished(space, ends, [0, 0, 0], POSES)
+    assert runs_clear(space, np.zeros(3, dtype=int), found).all()
+    assert taken_s < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
 
 
 def test_a_mirrored_plan_in_mirrored_water_takes_as_long():

@@ -207,6 +207,15 @@ def test_a_plan_is_made_stopped_reloaded_and_played(page, folder: Path) -> None:
     assert "<route" in Path(download.value.path()).read_text()
 
 
+def test_a_draft_is_drawn_on_the_chart(page, folder: Path) -> None:
+    page.goto("/plan")
+    chart(page)
+    page.get_by_role("button", name="Draft", exact=True).click()
+    page.get_by_text("A draft is drawn on the chart").wait_for()
+    legs = json.loads((folder / "runs/craft-draft/plan.json").read_text())["legs"]
+    page.wait_for_selector(f"[data-sketched='{len(legs)}']")
+
+
 def test_variants_are_compared_and_a_page_that_is_older_says_so(page, folder: Path) -> None:
     (folder / "craft/longer.toml").write_text("[design]\ntotal_s = 240.0\n")
     page.goto("/whatif")

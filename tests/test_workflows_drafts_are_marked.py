@@ -7,8 +7,10 @@ import io
 import json
 import re
 from fnmatch import fnmatch
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from counted_work import counted_work
@@ -16,6 +18,7 @@ from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
 from expdesign.export.routes import read_plan
+from expdesign.web.answers import played
 from expdesign.workflows.steps.planned import SAILED_BY
 from short_examples import SHORTER, copied, example_run, example_work
 
@@ -103,6 +106,19 @@ def test_it_has_no_file_to_sail_by_and_none_can_be_made_from_it(draft):
     assert not [name for name in names for pattern in SAILED_BY if fnmatch(name, pattern)]
     with pytest.raises(FileError, match="nobody may sail a draft"):
         read_plan(draft[0] / "plan.json")
+
+
+def test_its_legs_are_where_a_chart_draws_them_too_coarse_to_sail_by(draft):
+    legs = planned(draft[0])["legs"]
+    sketch = played(str(draft[0] / "plan.json"))["sketch"]
+    assert [leg["places"] for leg in sketch] == [leg["sketch_deg"] for leg in legs]
+    assert all(len(leg["sketch_deg"]) <= 40 for leg in legs)
+    assert all(one["sketch_deg"][-1] == other["sketch_deg"][0] for one, other in pairwise(legs))
+    for leg in legs:
+        ends = [leg[end][axis] for axis in ("north_m", "east_m") for end in ("start", "end")]
+        north, east = (111_195.0 * np.ptp(np.array(leg["sketch_deg"])[[0, -1]], axis=0)).tolist()
+        assert north == pytest.approx(abs(ends[1] - ends[0]), abs=3.0 + 0.01 * abs(ends[1] - ends[0]))
+        assert east >= abs(ends[3] - ends[2]) - 3.0  # a degree of longitude is shorter
 
 
 def test_it_never_lies_beside_files_to_sail_by(draft, made_once):

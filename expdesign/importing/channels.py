@@ -5,7 +5,8 @@ Times count from 1970 UTC where the clock is that of a satellite receiver or a c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from array import array
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ Places = NDArray[np.signedinteger[Any]]
 GNSS, COMPUTER, OWN, NONE = "satellite time", "a computer's clock", "a clock of its own", "no clock"
 RESET_S, RESET_STEPS = 2.0, 10.0
 """A step back in time of more than both, in seconds and usual steps, is a clock that began anew."""
+TIME = " time"  # of rows, as no field is named
 RESTART_GAP_S = 60.0
 """Put between readings before and after a clock began anew [s]."""
 ALIKE = 0.8  # share of channels by which two files are of one logger
@@ -28,6 +30,18 @@ OVERLAP_S = 2.0  # by which the next file of a logger may begin before the end o
 DAY_S = 86400.0
 LARGEST = 1e20
 """No reading of any quantity in any unit is as large; times in ns since 1970 are 2e18."""
+MOST_NUMBERS = 60_000_000
+"""Readings and times that are kept of all logs of an import; see tests/benchmarks/imported_day.py for the memory."""
+
+
+class TooManyNumbers(Exception):
+    """A log has more readings and times than `MOST_NUMBERS`, which the message says in words."""
+
+
+def check_size(numbers: int) -> None:
+    """Raise TooManyNumbers where that many readings and times are too many."""
+    if numbers > MOST_NUMBERS:
+        raise TooManyNumbers(f"{MOST_NUMBERS / 1e6:g} million")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,9 +55,9 @@ class Channel:
     values: Array  # (k,) finite
 
     def __post_init__(self) -> None:
-        for array in (self.time_s, self.values):  # taken over, as a day of readings is not to be copied
-            if isinstance(array, np.ndarray):
-                closed(array)
+        for own in (self.time_s, self.values):  # taken over, as a day of readings is not to be copied
+            if isinstance(own, np.ndarray):
+                closed(own)
         seal(self, time_s="k", values="k")
 
     def __len__(self) -> int:
@@ -70,6 +84,12 @@ class Log:
     notes: tuple[str, ...] = ()  # what was broken, converted, taken for granted
     unused: tuple[str, ...] = ()  # what stands in the file and is no channel
 
+    @property
+    def size(self) -> int:
+        """Readings and times that it keeps; channels may share times."""
+        arrays = {id(part): len(part) for channel in self.channels for part in (channel.time_s, channel.values)}
+        return sum(arrays.values())
+
     def without_readings(self) -> Log:
         """The names of its channels alone."""
         return replace(self, channels=tuple(channel.without_readings() for channel in self.channels))
@@ -84,6 +104,7 @@ class Reader:
     fits: Callable[[Path, bytes], bool]  # whether a file that begins with these bytes is of this format
     read: Callable[[Path, float], Log]  # file, and time between rows where it has no clock (0 for unknown) -> log
     extra: str = ""  # of this package, which has to be installed
+    lines: bool = False  # whether it is text, whose lines are read one after another
 
 
 def epochs(stamps: Array, places: Array) -> tuple[Array, Array]:
@@ -184,9 +205,12 @@ class Blocks:
     """Arrays that grow block by block, by name."""
 
     parts: dict[str, list[Array]] = field(default_factory=dict)
+    size: int = 0  # numbers in all of them
 
     def add(self, name: str, values: Sequence[float] | Array) -> None:
-        """Append values of a name."""
+        """Append values of a name; raises TooManyNumbers."""
+        self.size += len(values)
+        check_size(self.size)
         self.parts.setdefault(name, []).append(np.asarray(values, dtype=float))
 
     def joined(self, name: str) -> Array:
@@ -195,6 +219,36 @@ class Blocks:
         if own is not None and len(own) > 1:
             own[:] = [np.concatenate(own)]  # in place of its blocks, so that both are not kept
         return own[0] if own else np.zeros(0)
+
+
+@dataclass
+class Rows:
+    """Tables that grow row by row, by name, as messages come; a number that a row lacks is nan."""
+
+    tables: dict[str, dict[str, array[float]]] = field(default_factory=dict)
+    size: int = 0  # numbers in all of them
+
+    def add(self, name: str, time_s: float, values: Iterable[tuple[str, float]]) -> None:
+        """Append a row to the table of a name; raises TooManyNumbers."""
+        table = self.tables.setdefault(name, {TIME: array("d")})
+        rows = len(table[TIME])
+        for key, value in (*values, (TIME, time_s)):
+            column = table.setdefault(key, array("d"))
+            missing = rows - len(column)
+            self.size += missing + 1
+            check_size(self.size)
+            column.extend([np.nan] * missing)
+            column.append(value)
+
+    def columns(self, name: str) -> tuple[Array, dict[str, Array]]:
+        """Times (k,) and columns (k,) of a table."""
+        table = self.tables[name]
+        rows = len(table[TIME])
+        found = {}
+        for key, column in table.items():
+            column.extend([np.nan] * (rows - len(column)))
+            found[key] = np.frombuffer(column)
+        return found.pop(TIME), found
 
 
 def joined(logs: Sequence[Log], apart: Collection[str] = ()) -> list[Log]:

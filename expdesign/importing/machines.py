@@ -105,6 +105,8 @@ def _is_reached(mark: Mark, roles: set[str], channel: Channel) -> tuple[bool, st
         return True, "feedback, as there is an order too"
     if "reached" in roles:
         return False, "the order, as there is feedback too"
+    if not np.ptp(channel.values):
+        return False, "an order, as it never changes"
     if jumps(channel.values):
         return False, "it jumps as an order does"
     return True, "it moves as an actuator does, so what was reached (give the column without reached_ for an order)"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.importing.channels import Channel
+from expdesign.importing.channels import Channel, Places
 from expdesign.importing.mapping import COG, MAGNETIC, SOG, VARIATION, Use, dimension
 from expdesign.importing.names import Mark, family_of, marked
 from expdesign.importing.units import FACTORS
@@ -158,20 +158,18 @@ def _parts_of_degrees(channel: Channel, chosen: dict[tuple[str, ...], Channel]) 
     values, units = channel.values, {"deg": 1.0, "ddeg": 0.1, "cdeg": 0.01}
     lat, lon = _places(channel, chosen)
     if lat is not lon and len(lat) == len(lon) and lat.source == channel.source:
-        times, step = _common(channel, lat)
-        if times is not None:
-            north, east = _metres(lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
-            way = _steps(np.interp(times, lat.time_s, north) + 1j * np.interp(times, lat.time_s, east), step)
-            at = times[: len(way)] + step * (times[1] - times[0]) / 2
-            nearest = values[np.clip(np.searchsorted(channel.time_s, at), 0, len(values) - 1)]
-            if (total := float(np.abs(way).sum())) > 0:
-                fits = {
-                    unit: float((way * np.exp(-1j * np.radians(share * nearest))).real.sum()) / total
-                    for unit, share in units.items()
-                }
-                best = max(fits, key=lambda unit: fits[unit])
-                if fits[best] > SURE:
-                    return best, f"so {best}, by the way of the positions"
+        windows = _windows(channel, lat)
+        north, east = _metres(lat, lon, marked(lat).unit or _place_unit(lat, lon, chosen)[0])
+        way = windows.changes(lat.time_s, north + 1j * east)
+        nearest = values[np.clip(np.searchsorted(channel.time_s, windows.middles), 0, len(values) - 1)]
+        if (total := float(np.abs(way).sum())) > 0:
+            fits = {
+                unit: float((way * np.exp(-1j * np.radians(share * nearest))).real.sum()) / total
+                for unit, share in units.items()
+            }
+            best = max(fits, key=lambda unit: fits[unit])
+            if fits[best] > SURE:
+                return best, f"so {best}, by the way of the positions"
     largest, jump = float(values.max()), float(np.abs(np.diff(values)).max(initial=0.0))
     for turn, unit in ((10 * TURN_DEG, "ddeg"), (100 * TURN_DEG, "cdeg")):
         if values.min() >= 0.0 and turn / 10.0 < largest <= turn and (jump > turn / 2 or values[0] > turn / 10.0):
@@ -217,12 +215,9 @@ def _turning(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[s
         return None
     degrees = np.abs(heading.values).max() > RADIANS["heading_rad"]
     angle = np.unwrap(heading.values * (np.pi / 180.0 if degrees else 1.0))
-    times, step = _common(channel, heading)
-    if times is None:
-        return None
-    turned = np.interp(times, heading.time_s, angle)
+    windows = _windows(channel, heading)
     area = np.concatenate([[0.0], np.cumsum((channel.values[1:] + channel.values[:-1]) / 2 * np.diff(channel.time_s))])
-    return _ratio(_steps(np.interp(times, channel.time_s, area), step), _steps(turned, step), heading.name)
+    return _ratio(windows.changes(channel.time_s, area), windows.changes(heading.time_s, angle), heading.name)
 
 
 def _going(channel: Channel, channels: Sequence[Channel], chosen: dict[tuple[str, ...], Channel]) -> _Ratio | None:
@@ -246,13 +241,10 @@ def _going_by(lat: Channel, lon: Channel, chosen: dict[tuple[str, ...], Channel]
 def _way(channel: Channel, lat: Channel, lon: Channel, unit: str) -> _Ratio | None:
     """The way over ground by the integral of a speed, with places in a unit."""
     north, east = _metres(lat, lon, unit)
-    times, step = _common(channel, lat)
-    if times is None:
-        return None
-    place = np.interp(times, lat.time_s, north) + 1j * np.interp(times, lat.time_s, east)
+    windows = _windows(channel, lat)
     area = np.concatenate([[0.0], np.cumsum((channel.values[1:] + channel.values[:-1]) / 2 * np.diff(channel.time_s))])
-    going = np.abs(_steps(place, step))
-    return _ratio(_steps(np.interp(times, channel.time_s, area), step), going, "the position", offset=False)
+    going = np.abs(windows.changes(lat.time_s, north + 1j * east))
+    return _ratio(windows.changes(channel.time_s, area), going, "the position", offset=False)
 
 
 def _metres(lat: Channel, lon: Channel, unit: str) -> tuple[Array, Array]:
@@ -264,22 +256,43 @@ def _metres(lat: Channel, lon: Channel, unit: str) -> tuple[Array, Array]:
     return 111195.0 * lat_deg, 111195.0 * lon_deg * np.cos(np.radians(lat_deg[0]))
 
 
-def _common(one: Channel, other: Channel) -> tuple[Array | None, int]:
-    """Even times that both channels cover, and the number of them in a window."""
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Windows of one length, over even times which two channels cover without a gap."""
+
+    times: Array  # (k,) [s]
+    begins: Places  # (w,) indices of times
+    length: int  # steps
+
+    @property
+    def middles(self) -> Array:
+        """Times (w,) [s]."""
+        return (self.times[self.begins] + self.times[self.begins + self.length]) / 2.0
+
+    def changes(self, at: Array, values: np.ndarray) -> np.ndarray:
+        """Changes (w,) over the windows of values (n,) at times (n,)."""
+        even = np.interp(self.times, at, values)
+        return np.asarray(even[self.begins + self.length] - even[self.begins])
+
+
+def _windows(one: Channel, other: Channel) -> _Windows:
+    """Windows over the time that both channels cover; none where that is short."""
     first, last = max(one.time_s[0], other.time_s[0]), min(one.time_s[-1], other.time_s[-1])
-    step_s = max(one.interval_s, other.interval_s)
+    slower = max(one, other, key=lambda channel: channel.interval_s)
+    step_s = slower.interval_s
     if not np.isfinite(step_s) or not last - first > 4 * WINDOW * step_s:
-        return None, 0
-    times = np.arange(first, last, step_s)
-    return times, max(WINDOW, min(int(np.ceil(WINDOW_S / step_s)), len(times) // 4))
-
-
-def _steps(values: np.ndarray, window: int) -> np.ndarray:
-    return np.asarray(values[window:] - values[:-window])
+        return _Windows(np.zeros(0), np.zeros(0, dtype=int), WINDOW)
+    at = (slower.time_s - first) / step_s
+    places = np.unique(np.concatenate([np.floor(at), np.ceil(at)]))  # beside readings, so that a gap has none
+    places = places[(places >= 0) & (places * step_s < last - first)]
+    length = max(WINDOW, min(int(np.ceil(WINDOW_S / step_s)), len(places) // 4))
+    return _Windows(first + step_s * places, np.flatnonzero(places[length:] - places[:-length] == length), length)
 
 
 def _ratio(x: Array, y: Array, of: str, *, offset: bool = True) -> _Ratio | None:
-    """Ratio of y to x, and the share of y that it explains."""
+    """Ratio of y to x, and the share of y that it explains; None where there is nothing to tell it from."""
+    if not len(x):
+        return None
     x, y = (x - x.mean(), y - y.mean()) if offset else (x, y)
     if not (x @ x > 0 and y @ y > 0):
         return None

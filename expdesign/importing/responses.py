@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ MOVED = 0.05  # share of the range by which an order must change to count
 AFTER_S = 20.0  # of readings after a change of the order that are used, beside as long before
 LONGEST_S = 10.0  # dead time and lag that are sought
 CERTAIN = 3.0  # standard errors from zero at which a lag or a dead time is told
+LONGEST_GAP_S = 60.0  # of positions; the time beyond it counts for nothing
 FINE_S = 0.1  # of the simulation, at most
 SHIFTS = 2  # steps in which the moment of each move is found
 NO_LAG = 0.02  # steps below which a lag is none
@@ -57,8 +58,26 @@ def followed(found: Mapping[str, Channel]) -> tuple[Followed, ...]:
     return tuple(one for one in fits if one is not None)
 
 
+def _without_gaps(order: Channel, reached: Channel) -> tuple[Channel, Channel]:
+    """The same on a clock that stands still through most of each gap of the positions."""
+    gaps = np.diff(reached.time_s)
+    begins, lasts = reached.time_s[:-1][gaps > LONGEST_GAP_S], gaps[gaps > LONGEST_GAP_S]
+    if not len(lasts):
+        return order, reached
+
+    total = np.cumsum(lasts - LONGEST_GAP_S)
+    ends = np.column_stack([begins + LONGEST_GAP_S, begins + lasts]).ravel()
+    gone = np.column_stack([np.r_[0.0, total[:-1]], total]).ravel()
+
+    def moved(channel: Channel) -> Channel:
+        return replace(channel, time_s=channel.time_s - np.interp(channel.time_s, ends, gone))
+
+    return moved(order), moved(reached)
+
+
 def _fit(name: str, order: Channel, reached: Channel) -> Followed | None:
     turning = is_turning_input(name)
+    order, reached = _without_gaps(order, reached)
     read_s = min(max(reached.interval_s, 0.02), 1.0)
     step_s = read_s / math.ceil(read_s / FINE_S)
     first, last = max(order.time_s[0], reached.time_s[0]), min(order.time_s[-1], reached.time_s[-1])

@@ -27,7 +27,7 @@ from expdesign.plan.search import PlacementSearch, placement_search
 from expdesign.plan.timeline import Timeline
 from expdesign.plan.values import Placement, Placements, SailedTrial
 from expdesign.plan.work_budget import WorkBudget
-from expdesign.progress import Progress
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 FAILURE_S = 2.0  # least cost of a failed placement [s]
@@ -175,7 +175,8 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
     search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
     while True:
         phases.placing(*failures.placing())
-        placed = _placed(search, space, left, voyage.line, stuck)
+        # how long another try takes is not known
+        placed = _placed(search, space, left, voyage.line, stuck, silent if failures.tries else phases.placing)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
@@ -196,11 +197,12 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
 
 
 def _placed(
-    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str
+    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str, progress: Progress
 ) -> Placements:
     counts = [left[item.name] for item in space.footprints]
     try:
-        return search.place(space, counts, start=line.state[:3], exit_mps=float(line.state[3]), last=line.last)
+        exit_mps = float(line.state[3])
+        return search.place(space, counts, start=line.state[:3], exit_mps=exit_mps, last=line.last, progress=progress)
     except NoPlan as error:
         if not stuck:
             raise

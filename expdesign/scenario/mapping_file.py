@@ -101,6 +101,8 @@ def load_mapping(path: Path | str) -> Mapping:
 
 def _use(table: ChannelTable, entry: Entry) -> Use:
     column = table.column
+    if not table.scale:
+        raise entry.at("scale").error('is 0, expected another number; column = "" leaves a channel out')
     if column and column not in EXTRA_COLUMNS:
         known = meaning(column, 0)
         if not isinstance(known, Source):

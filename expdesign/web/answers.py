@@ -157,17 +157,28 @@ def durations_of(scenario: str) -> Answer:
 
 
 def played(plan: str) -> Answer:
-    """The track of a plan in degrees, with headings, commands and velocities, and its legs; or what is wrong."""
+    """The track of a plan in degrees, with headings, commands and velocities, and its legs; or what is wrong.
+
+    Of a draft, which nobody sails, only where its legs are.
+    """
     path = Path(plan)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if content.get("draft"):
+            names = said(path)
+            return {
+                "sketch": [
+                    {"kind": leg["kind"], "name": names.get(leg["name"], leg["name"]), "places": leg["sketch_deg"]}
+                    for leg in content["legs"]
+                ]
+            }
         track = path.with_name("track.csv")
         check_ends(track, "a track")
         header = track.open(encoding="utf-8").readline().strip().split(",")
         rows = np.loadtxt(track, delimiter=",", skiprows=1, ndmin=2)
         inputs = path.with_name("commands.csv").open(encoding="utf-8").readline().strip().split(",")[1:-1]
         orders = np.loadtxt(path.with_name("commands.csv"), delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, KeyError) as error:
         return {"problem": f"{plan} has no track beside it that can be played: {error}"}
     step = max(1, -(-len(rows) // MOST_PLAYED))
     columns = {name: np.round(rows[::step, index], 8).tolist() for index, name in enumerate(header)}

@@ -32,6 +32,7 @@ LATTICE_SENTENCE = (
 )
 
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
+SKETCHED, SKETCH_DECIMALS = 40, 5  # places of a leg of a draft, and decimals of their degrees
 
 
 def plan_json(
@@ -185,8 +186,16 @@ def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
         "end": _state(plan, leg.last),
         "duration_s": sample_seconds(leg.last - leg.first, plan.commands.sample_time_s),
         **({"path": leg.path} if leg.path else {}),
+        **({"sketch_deg": _sketch(plan, leg)} if plan.draft else {}),
         **_sailed_entry(plan, index),
     }
+
+
+def _sketch(plan: Plan, leg: Leg) -> list[list[float]]:
+    """Latitude and longitude of some places of a leg, enough for a drawing and too few and too coarse to sail by."""
+    places = np.unique(np.linspace(leg.first, leg.last, SKETCHED).round().astype(int))
+    degrees = plan.area.frame.to_degrees(plan.trajectory.pose[places, :2])
+    return [[round(value, SKETCH_DECIMALS) for value in place] for place in degrees.tolist()]
 
 
 def _state(plan: Plan, sample: int) -> dict[str, float]:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import Log, Reader
+from expdesign.importing.channels import Log, Reader, TooManyNumbers, check_size
 from expdesign.importing.fills import cleaned
 from expdesign.importing.readers.ardupilot import is_ardupilot, read_ardupilot
 from expdesign.importing.readers.matlab import read_matlab, read_matlab73
@@ -62,19 +62,19 @@ READERS = (
     ),
     Reader(
         name="Signal K", meaning="deltas as JSON, one a line, also behind the time and provider of a server's log",
-        fits=is_signalk, read=read_signalk,
+        fits=is_signalk, read=read_signalk, lines=True,
     ),
     Reader(
         name="NMEA 2000",
         meaning="as text, by nmea2000: plain and fast lines of canboat and Actisense, frames of Yacht Devices, "
         "candump -L; JSON of canboat's analyzer",
-        fits=is_n2k, read=read_n2k, extra="logs",
+        fits=is_n2k, read=read_n2k, extra="logs", lines=True,
     ),
     Reader(
         name="text",
         meaning="tables with any separator, decimal sign, header and clock; NMEA 0183, also behind times of reception, "
         "in TAG blocks or in OpenCPN's records, by the fields of pynmeagps; AIVDO, by pyais; both in one file",
-        fits=is_text, read=read_text,
+        fits=is_text, read=read_text, lines=True,
     ),
 )  # fmt: skip
 """All formats; what no other one begins like may be text."""
@@ -93,15 +93,20 @@ NO_LOGS = {
 """How files begin that are no logs -> what they are, and what would be right."""
 
 
-def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
+LONGEST_LINE = 1 << 24  # bytes
+
+
+def read_log(path: Path, *, sample_time_s: float = 0.0, beside: int = 0) -> Log:
     """What a file, or the folder of a bag, holds.
 
     Args:
         path: of it.
         sample_time_s: between rows of a table without a clock [s]; 0 where it is not known.
+        beside: readings and times of other logs of the import, which are kept with these.
 
     Raises:
-        FileError: missing, empty, of no known format or broken, or the library that reads it is not installed.
+        FileError: missing, empty, of no known format, broken or too large, or the library that reads it is not
+            installed.
     """
     check_ends(path, "a log")
     try:
@@ -116,14 +121,31 @@ def read_log(path: Path, *, sample_time_s: float = 0.0) -> Log:
         raise FileError(path, "", "is empty, expected a log")
     if what := next((words for magic, words in NO_LOGS.items() if head.startswith(magic)), ""):
         raise FileError(path, "", f"is {what}")
+    if not any(one.fits(path, head) for one in READERS if not one.lines):
+        _check_lines(path)
     reader = next(one for one in READERS if one.fits(path, head))
     try:
-        return cleaned(reader.read(path, sample_time_s))
+        log = cleaned(reader.read(path, sample_time_s))
+        check_size(beside + log.size)
+        return log
     except ModuleNotFoundError as error:
         hint = f"needs {error.name}: pip install 'expdesign[{reader.extra or 'logs'}]'"
         raise FileError(path, "", f"is {reader.name}, which {hint}") from None
+    except TooManyNumbers as most:
+        logs = "of all logs of an import: import fewer at once" if beside else "at once: import it in parts"
+        told = f"more than {most} readings and times, which is the most {logs}"
+        raise FileError(path, "", f"{'makes' if beside else 'holds'} {told}") from None
     except FileError:
         raise
     except Exception as error:  # libraries raise anything on broken files
         what = " ".join(f"{type(error).__name__}: {error}".split())[:160]
         raise FileError(path, "", f"begins like {reader.name} but cannot be read ({what})") from None
+
+
+def _check_lines(path: Path) -> None:
+    """Raise FileError where a line would not end, as it is read whole."""
+    with path.open("rb") as file:
+        while len(block := file.read(LONGEST_LINE)) == LONGEST_LINE:
+            if b"\n" not in block and b"\r" not in block:
+                size = f"{LONGEST_LINE / 2**20:g} MB"
+                raise FileError(path, "", f"has a line of more than {size}, expected a log in lines")

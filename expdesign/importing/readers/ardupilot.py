@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from expdesign.importing.channels import COMPUTER, GNSS, OWN, Channel, Log, channels_of
+from expdesign.importing.channels import COMPUTER, GNSS, OWN, Channel, Log, Rows, channels_of
 from expdesign.importing.units import unit_word
 
 READ = {"ATT", "GPS", "IMU", "RCOU", "RPM", "XKF1", "NKF1", "EKF1", "DPTH", "WIND", "RFND", "ESC", "AOA",
@@ -27,8 +27,12 @@ def read_ardupilot(path: Path, sample_time_s: float) -> Log:
     """
     from pymavlink import mavutil
 
-    source = mavutil.mavlink_connection(str(path))
-    rows: dict[str, dict[str, list[float]]] = {}
+    with closing(mavutil.mavlink_connection(str(path))) as source:
+        return _log(path, source)
+
+
+def _log(path: Path, source: Any) -> Log:
+    rows = Rows()
     units: dict[str, str] = {}
     functions: dict[str, int] = {}
     skipped: Counter[str] = Counter()
@@ -44,20 +48,18 @@ def read_ardupilot(path: Path, sample_time_s: float) -> Log:
             continue
         instance = next((getattr(message, key) for key in INSTANCES if key in message.get_fieldnames()), 0)
         name = f"{kind}[{instance}]" if instance else kind
-        table = rows.setdefault(name, {})
-        table.setdefault("time", []).append(message._timestamp)
-        for field in message.get_fieldnames():
-            value = getattr(message, field)
-            if isinstance(value, (int, float)) and field not in (*CLOCKS, *INSTANCES):
-                table.setdefault(field, []).append(float(value))
-                if f"{name}.{field}" not in units:
-                    units[f"{name}.{field}"] = _unit(message, field)
-    source.close()
+        values = [
+            (field, float(value)) for field in message.get_fieldnames()
+            if isinstance(value := getattr(message, field), (int, float)) and field not in (*CLOCKS, *INSTANCES)
+        ]  # fmt: skip
+        rows.add(name, message._timestamp, values)
+        for field, _ in values:
+            if f"{name}.{field}" not in units:
+                units[f"{name}.{field}"] = _unit(message, field)
     channels: list[Channel] = []
     notes: list[str] = []
-    for name, table in rows.items():
-        times = np.array(table.pop("time"))
-        whole = {field: np.array(values) for field, values in table.items() if len(values) == len(times)}
+    for name in rows.tables:
+        times, whole = rows.columns(name)
         names = {field: _named(name, field, functions) for field in whole}
         own = {names[field]: values for field, values in whole.items()}
         found, more = channels_of(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import Log
+from expdesign.importing.channels import MOST_NUMBERS, Log, check_size
 from expdesign.importing.readers.columns import columns_log, flat
 
 
@@ -18,12 +20,41 @@ def read_matlab(path: Path, sample_time_s: float) -> Log:
     """Vectors and matrices, also those in structures."""
     import scipy.io
 
+    check_size(_unpacked(path) // BYTES)
     content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
     objects: list[str] = []
     columns = {
         name: values for key, value in content.items() if key[:2] != "__" for name, values in _of(key, value, objects)
     }
     return _log(path, columns, objects, sample_time_s)
+
+
+BYTES = 8  # of a number
+COMPRESSED = 15
+BLOCK_BYTES = 1 << 16  # of which zlib makes at most a thousand times as many
+
+
+def _unpacked(path: Path) -> int:
+    """Bytes of a file of version 5 once it is unpacked, counted no further than matters.
+
+    Its elements begin with their kind and their length, each of 32 bits; those of kind 15 are compressed by zlib
+    (MathWorks, MAT-File Format, 2023).
+    """
+    total = 0
+    with path.open("rb") as file:
+        file.seek(126)
+        order: Literal["little", "big"] = "big" if file.read(2) == b"MI" else "little"
+        while len(tag := file.read(8)) == 8 and total <= MOST_NUMBERS * BYTES:
+            kind, length = (int.from_bytes(tag[part : part + 4], order) for part in (0, 4))
+            if kind != COMPRESSED:
+                total += length
+                file.seek(length, os.SEEK_CUR)
+                continue
+            inside = zlib.decompressobj()
+            while length > 0 and total <= MOST_NUMBERS * BYTES and (block := file.read(min(length, BLOCK_BYTES))):
+                length -= len(block)
+                total += len(inside.decompress(block))
+    return total
 
 
 OBJECT = (
@@ -61,10 +92,14 @@ def read_matlab73(path: Path, sample_time_s: float) -> Log:
 
     columns: dict[str, np.ndarray] = {}
     objects: list[str] = []
+    size = 0
 
     def take(name: str, item: Any) -> None:
+        nonlocal size
         if name.startswith("#"):
             return
+        size += item.size if isinstance(item, h5py.Dataset) else 0
+        check_size(size)
         if "MATLAB_object_decode" in item.attrs:
             objects.append(name)
         elif isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf":

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import COMPUTER, DAY_S, OWN, Channel, Log, set_right
+from expdesign.importing.channels import COMPUTER, DAY_S, OWN, Channel, Log, check_size, set_right
 from expdesign.importing.times import over_midnight, read_stamps
 from expdesign.importing.units import counted
 
@@ -88,7 +88,7 @@ def read_n2k(path: Path, sample_time_s: float) -> Log:
         raise FileError(path, "", "is NMEA 2000 without times, expected a record with them, as by candump -L")
     found: defaultdict[tuple[str, str, int], Series] = defaultdict(lambda: (array("d"), array("d")))
     unread: Counter[str] = Counter()
-    broken = 0
+    broken = size = 0
     for time_s, message in _messages(path, form):
         if message is None or time_s is None:
             broken += 1
@@ -110,6 +110,8 @@ def read_n2k(path: Path, sample_time_s: float) -> Log:
                 times, values = found[f"{name}{where}.{what}", units.get(unit, unit), source]
                 times.append(time_s)
                 values.append(float(value))
+                size += 2
+                check_size(size)
     if not found:
         raise FileError(path, "", "holds NMEA 2000 without rudder, heading, turn, engine, position or speed")
     return _log(path, found, unread, broken)

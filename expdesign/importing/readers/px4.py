@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign.importing.channels import GNSS, OWN, Channel, Log, channels_of
+from expdesign.importing.channels import GNSS, OWN, Channel, Log, channels_of, check_size
 
 READ = {
     "vehicle_global_position": {"lat": "deg", "lon": "deg", "vel_n": "mps", "vel_e": "mps", "yaw": "rad"},
@@ -28,12 +28,14 @@ READ = {
 NAMES = {"vel_n": "vn", "vel_n_m_s": "vn", "vx": "vn", "vel_e": "ve", "vel_e_m_s": "ve", "vy": "ve",
          "xyz[0]": "roll rate", "xyz[2]": "yaw rate", "latitude_deg": "lat", "longitude_deg": "lon"}  # fmt: skip
 LEAST_UTC_US = 1e15
+BYTES = 8  # of the file for a number, or more where topics are about the autopilot
 
 
 def read_px4(path: Path, sample_time_s: float) -> Log:
     """Positions, velocities, attitude, rates and outputs; times are those of satellites where a receiver gave them."""
     from pyulog import ULog
 
+    check_size(path.stat().st_size // BYTES)
     content = ULog(str(path))
     late_s, clock = _clock(content.data_list)
     channels: list[Channel] = []

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.importing.channels import COMPUTER, OWN, Channel, Log, channels_of
+from expdesign.importing.channels import COMPUTER, OWN, Channel, Log, Rows, channels_of
 
 DEEPEST = 4
 MOST_FIELDS = 48
@@ -29,7 +29,7 @@ def read_ros(path: Path, sample_time_s: float) -> Log:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    rows: dict[str, list[tuple[float, dict[str, float]]]] = {}
+    rows = Rows()
     skipped: Counter[str] = Counter()
     broken = 0
     with AnyReader([_bag(path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
@@ -47,16 +47,13 @@ def read_ros(path: Path, sample_time_s: float) -> Log:
                 continue
             stamp = getattr(getattr(message, "header", None), "stamp", None)
             own_s = stamp.sec + stamp.nanosec * 1e-9 if stamp is not None else 0.0
-            values = dict(_values(message, connection.msgtype))
-            if values:
-                rows.setdefault(connection.topic, []).append((own_s or stamp_ns * 1e-9, values))
+            if values := list(_values(message, connection.msgtype)):
+                rows.add(connection.topic, own_s or stamp_ns * 1e-9, values)
     channels: list[Channel] = []
     notes = [f"{broken} messages cannot be read and are left out"] if broken else []
-    for topic, samples in rows.items():
-        times = np.array([time_s for time_s, _ in samples])
-        columns = {
-            f"{topic}.{key}": np.array([values.get(key, math.nan) for _, values in samples]) for key in samples[0][1]
-        }
+    for topic in rows.tables:
+        times, own = rows.columns(topic)
+        columns = {f"{topic}.{key}": values for key, values in own.items()}
         units = {f"{topic}.{key}": unit for key, unit in UNITS.items()}
         found, more = channels_of(columns, times, source=path.name, units=units, what=topic)
         channels, notes = channels + found, notes + more

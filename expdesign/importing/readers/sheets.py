@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import Log
+from expdesign.importing.channels import Log, check_size
 from expdesign.importing.readers.columns import columns_log
 from expdesign.importing.readers.text import read_text
 
@@ -88,6 +88,7 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
 
     columns, unused = {}, []
     file = pyarrow.parquet.ParquetFile(path)
+    check_size(file.metadata.num_rows * len(file.schema_arrow.names))
     for name in file.schema_arrow.names:  # one at a time, so that the file is not in the memory twice
         column = file.read([name]).column(0)
         if pyarrow.types.is_dictionary(column.type):

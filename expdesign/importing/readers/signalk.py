@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import COMPUTER, Channel, Log, set_right
+from expdesign.importing.channels import COMPUTER, Channel, Log, check_size, set_right
 from expdesign.importing.units import counted
 from expdesign.values import Array
 
@@ -52,7 +52,7 @@ def read_signalk(path: Path, sample_time_s: float) -> Log:
     found: defaultdict[str, defaultdict[tuple[str, str], tuple[array[float], array[float]]]] = defaultdict(
         lambda: defaultdict(lambda: (array("d"), array("d")))
     )
-    own, broken, untimed = "", 0, 0
+    own, broken, untimed, size = "", 0, 0, 0
     others: Counter[str] = Counter()
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
@@ -76,6 +76,8 @@ def read_signalk(path: Path, sample_time_s: float) -> Log:
                     times, values = found[vessel][name, source]
                     times.append(time_s)
                     values.append(value)
+                    size += 2
+                    check_size(size)
     herself = _herself(found, own)
     channels, notes = _channels(path.name, found[herself])
     if not channels:

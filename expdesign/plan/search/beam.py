@@ -20,9 +20,11 @@ from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
 from expdesign.plan.search.local_search import EQUAL, ChainEnds, clear_successors, polished
 from expdesign.plan.values import Placement
 from expdesign.processes import in_order
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 BEAM_WIDTH = 400  # partial plans kept
+PLACING_SHARE = 0.6  # of the work before orders are polished, for progress
 POLISHED_ORDERS = 6  # orders of runs of which the best plan is polished; the best one then counts
 CHECKED_AT_ONCE, SORTED_AT_ONCE = 1024, 8192  # successors checked for clearance at a time, and sorted
 CELL_HULLS, HEADING_RAD = 2.0, 0.4  # places of which one successor is kept: their size in hull lengths, and in heading
@@ -72,6 +74,7 @@ def place_runs(
     last: str = "",
     width: int = BEAM_WIDTH,
     orders: int = POLISHED_ORDERS,
+    progress: Progress = silent,
 ) -> tuple[Placement, ...]:
     """Start poses of all runs in the order in which they are to be done.
 
@@ -83,6 +86,7 @@ def place_runs(
         last: name of the primitive that ends there, if any.
         width: partial plans kept.
         orders: of runs, of which the best plan is polished; 0 for none.
+        progress: told each run that is placed, and each order that is polished.
 
     Raises:
         NoPlan: some run does not fit anywhere the search can reach; the message names it and the place.
@@ -97,7 +101,9 @@ def place_runs(
         history=((),),
     )
     ahead = orders_ahead(space, repeats, made_good=path_exceeds_displacement(space, repeats, start))
-    for _ in range(int(np.sum(repeats))):
+    count = int(np.sum(repeats))
+    for number in range(count):
+        progress(f"placing run {number + 1} of {count}", PLACING_SHARE * number / count)
         beam = _advance(space, beam, width, ahead)
     final_s = np.round(beam.cost_s + space.planner.to_goal_s(space, beam), EQUAL)
     best = int(np.argmin(final_s))
@@ -107,7 +113,12 @@ def place_runs(
     if orders:
         ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
         chains = list(_different(beam, final_s, orders))
-        better = list(in_order(polished, (space, ends), chains))
+        better = []
+        for found in in_order(polished, (space, ends), chains):
+            better.append(found)
+            progress(
+                "moving runs closer to each other", 1.0 - (1.0 - PLACING_SHARE) * (1.0 - len(better) / len(chains))
+            )
         best = int(np.argmin([round(seconds, EQUAL) for _, seconds in better]))
         runs, poses = chains[best][0], better[best][0]
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))

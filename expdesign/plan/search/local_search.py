@@ -23,6 +23,7 @@ MANY_RUNS, SPARSE_DISCS = 50, 8  # of more runs than this, every so manieth disc
 SHIFT_HULLS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # steps of the local search, and with each a turn
 TURN_DEG = (90.0, 60.0, 40.0, 25.0, 15.0, 8.0, 4.0, 2.0)  # steps of the local search, and with each a turn
 BLOCKS_AT_ONCE = 4  # moves of a block looked at together at first, four times as many then
+MOST_POSES = 10_000  # in the blocks of a sweep: all blocks of up to 37 runs, and of more runs the shorter ones
 SWEEPS = 20  # over all blocks of runs at most
 SAME = 1e-3  # hull lengths and radians by which a leg may differ from a transition that was tried
 EQUAL = 6  # decimals to which times [s] are compared, so that rounding does not choose between mirror images
@@ -151,7 +152,8 @@ def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Ar
     """
     legs = _Legs(space=space, ends=ends)
     chain = legs.measured(np.asarray(runs), poses)
-    blocks = [(i, j) for i in range(len(runs)) for j in range(i, len(runs))]
+    most = _longest_block(len(runs))
+    blocks = [(i, j) for i in range(len(runs)) for j in range(i, min(i + most, len(runs)))]
     in_vain: dict[tuple[int, int], tuple[bytes, ...]] = {}
     for _ in range(SWEEPS):
         before = chain
@@ -166,6 +168,12 @@ def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Ar
             break
         chain = legs.measured(chain.runs, chain.poses)
     return chain.poses, measured_s(space, runs, chain.poses, ends)
+
+
+def _longest_block(runs: int) -> int:
+    """Runs in the longest blocks that are moved: the work of a sweep would grow with the cube of the runs."""
+    lengths = np.arange(1, runs + 1)
+    return max(1, int(np.searchsorted(np.cumsum(lengths * (runs + 1 - lengths)), MOST_POSES, side="right")))
 
 
 def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> float:

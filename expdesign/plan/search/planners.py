@@ -14,6 +14,7 @@ from expdesign.plan.search.beam import place_runs
 from expdesign.plan.search.lattice import search_lattice
 from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice
 from expdesign.plan.values import LatticeProof, Placement, Placements, PlannerName, PlanSettings
+from expdesign.progress import Progress, silent
 from expdesign.values import Array
 
 LATTICE_RADII = 1.1  # default distance between cells of the lattice, in turning radii
@@ -39,7 +40,14 @@ class LatticeSearch:
         return False
 
     def place(
-        self, space: SearchSpace, repeats: Sequence[int], *, start: Array, exit_mps: float = 0.0, last: str = ""
+        self,
+        space: SearchSpace,
+        repeats: Sequence[int],
+        *,
+        start: Array,
+        exit_mps: float = 0.0,
+        last: str = "",
+        progress: Progress = silent,
     ) -> Placements:
         """The cheapest plan on the lattice, finer ones being tried where the default one holds none.
 
@@ -51,7 +59,7 @@ class LatticeSearch:
         spacings = self._spacings(space)
         for spacing_m in spacings:
             try:
-                return _placed(Lattice(space=space, spacing_m=spacing_m), repeats, departure)
+                return _placed(Lattice(space=space, spacing_m=spacing_m), repeats, departure, progress)
             except NoPlan as error:
                 refusal = error
         finer = "smaller" if self.spacing_m or len(spacings) == 1 else f"smaller than {spacings[-1]:.4g}"
@@ -69,14 +77,16 @@ class LatticeSearch:
         return tuple(sorted({max(factor * base_m, least_m) for factor in LATTICE_FINER}, reverse=True))
 
 
-def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure) -> Placements:
+def _placed(lattice: Lattice, repeats: Sequence[int], departure: Departure, progress: Progress) -> Placements:
     problem = build_lattice(lattice, repeats, departure)
     where = f"on a lattice of {lattice.spacing_m:.4g} m"
     for item, edges, count in zip(lattice.space.footprints, problem.runs, problem.counts, strict=True):
         if count and not edges.nnz:
             raise NoPlan(f"no room for {item.name!r} {where}")
     try:
-        found = search_lattice(problem, suboptimality=LATTICE_SUBOPTIMALITY, most_states=LATTICE_STATES)
+        found = search_lattice(
+            problem, suboptimality=LATTICE_SUBOPTIMALITY, most_states=LATTICE_STATES, progress=progress
+        )
     except NoPlan as error:
         raise NoPlan(f"{error}, {where}") from None
     proof = LatticeProof(
@@ -108,7 +118,14 @@ class PlacementSearch(Protocol):
         """Whether it makes use of transitions between runs that were tried before."""
 
     def place(
-        self, space: SearchSpace, repeats: Sequence[int], *, start: Array, exit_mps: float = 0.0, last: str = ""
+        self,
+        space: SearchSpace,
+        repeats: Sequence[int],
+        *,
+        start: Array,
+        exit_mps: float = 0.0,
+        last: str = "",
+        progress: Progress = silent,
     ) -> Placements:
         """Start poses of all runs in the order in which they are to be done.
 
@@ -118,6 +135,7 @@ class PlacementSearch(Protocol):
             start: (3,) pose where the search begins.
             exit_mps: surge speed there.
             last: name of the run that ends there, if any.
+            progress: of the search.
 
         Raises:
             NoPlan: some run does not fit anywhere the search can reach, or no path leads to the goal.
@@ -134,10 +152,18 @@ class BeamSearch:
         return True
 
     def place(
-        self, space: SearchSpace, repeats: Sequence[int], *, start: Array, exit_mps: float = 0.0, last: str = ""
+        self,
+        space: SearchSpace,
+        repeats: Sequence[int],
+        *,
+        start: Array,
+        exit_mps: float = 0.0,
+        last: str = "",
+        progress: Progress = silent,
     ) -> Placements:
         """The best plan that the beam keeps."""
-        return Placements(runs=place_runs(space, repeats, start=start, exit_mps=exit_mps, last=last))
+        runs = place_runs(space, repeats, start=start, exit_mps=exit_mps, last=last, progress=progress)
+        return Placements(runs=runs)
 
 
 def placement_search(settings: PlanSettings) -> PlacementSearch:

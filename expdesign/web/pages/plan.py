@@ -110,7 +110,7 @@ class _Plan:
         query = urlencode({"area": self.area, "draught_m": ends.get("draught_m", 0.0)})
         content = json.loads(self.site.folder.path(self.shown).read_text(encoding="utf-8")) if self.shown else {}
         refusal = content if content.get("refused") else None
-        track = "" if refusal or content.get("draft") or not content else f"/track?{urlencode({'plan': self.shown})}"
+        track = "" if refusal or not content else f"/track?{urlencode({'plan': self.shown})}"
         ui.run_javascript(
             f"expd.chart({self.map.id}, '/chart?{query}', {json.dumps(ends)}, false)"
             f".then(() => expd.trial({self.map.id}, {json.dumps(track)}, {json.dumps(_place_of(refusal))}))"
@@ -139,7 +139,7 @@ class _Plan:
         ui.label(f"Least clearance {words.distance(content['clearance_min_m'])}.")
         beside = Path(self.shown).parent
         if draft:
-            ui.label("A draft has no track to be played or sailed; its report shows it.").classes("quiet")
+            ui.label("A draft is drawn on the chart; nobody sails or plays it.").classes("quiet")
         for name, text in (("report.html", "Report"), ("cards.html", "Run cards")):
             if folder.path(beside / name).is_file():
                 ui.link(text, f"/folder/{quote(str(beside / name))}", new_tab=True)

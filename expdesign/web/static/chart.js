@@ -103,8 +103,8 @@
 
   async function trial(id, url, place) {
     const mine = charts[id];
-    if (mine.player) mine.player.remove();
-    mine.player = null;
+    for (const shown of [mine.player, mine.sketch]) if (shown) shown.remove();
+    mine.player = mine.sketch = null;
     if (mine.ring) mine.ring.remove();
     if (place) {
       mine.ring = L.circleMarker([place.lat_deg, place.lon_deg], { radius: 18, color: "#c81e1e", weight: 4, fill: false, renderer: L.svg() }).addTo(mapOf(id));
@@ -113,7 +113,21 @@
     if (!url) return;
     const answer = await (await fetch(url)).json();
     if (answer.problem) document.getElementById(`now${id}`).textContent = answer.problem;
+    else if (answer.sketch) mine.sketch = sketched(id, answer.sketch);
     else mine.player = new Player(id, answer);
+  }
+
+  function wayOf(points, leg) {
+    const run = leg && leg.kind === "primitive";
+    const line = L.polyline(points, { color: run ? COLOURS.run : COLOURS.track, weight: run ? 4 : 2, smoothFactor: 0.3 });
+    return leg ? line.bindTooltip(leg.name, { sticky: true }) : line;
+  }
+
+  function sketched(id, legs) {
+    const group = L.layerGroup(legs.map((leg) => wayOf(leg.places, leg))).addTo(mapOf(id));
+    mapOf(id).fitBounds(L.latLngBounds(legs.flatMap((leg) => leg.places)), { padding: [30, 30] });
+    mapOf(id).getContainer().dataset.sketched = legs.length;
+    return group;
   }
 
   class Player {
@@ -130,12 +144,9 @@
       let from = 0;
       for (let k = 1; k <= leg.length; k++) {
         if (k < leg.length && leg[k] === leg[from]) continue;
-        const kind = plan.legs[leg[from]] && plan.legs[leg[from]].kind;
         const points = [];
         for (let i = from; i <= Math.min(k, leg.length - 1); i++) points.push([lat[i], lon[i]]);
-        const line = L.polyline(points, { color: kind === "primitive" ? COLOURS.run : COLOURS.track, weight: kind === "primitive" ? 4 : 2, smoothFactor: 0.3 });
-        if (plan.legs[leg[from]]) line.bindTooltip(plan.legs[leg[from]].name, { sticky: true });
-        line.addTo(this.group);
+        wayOf(points, plan.legs[leg[from]]).addTo(this.group);
         from = k;
       }
       this.body = L.polygon([], { color: "#111", weight: 1, fillColor: "#f5c400", fillOpacity: 0.95, interactive: false, renderer: L.svg() }).addTo(this.group);

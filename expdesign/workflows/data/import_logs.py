@@ -121,10 +121,11 @@ def import_logs(
     given = None if map_file is None else load_mapping(map_file)
     track = None if plan is None else read_plan(plan)
     rates = {} if given is None else {clock.file: clock.sample_time_s for clock in given.files}
-    read = []
+    read: list[Log] = []
     for k, path in enumerate(logs):
         progress(f"reading {path.name}", 0.6 * k / len(logs))
-        read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0)))
+        beside = sum(log.size for log in read)
+        read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0), beside=beside))
     read = joined(read, apart=rates)
     mapping = guess(read, () if ship is None else ship.actuators) if given is None else _checked(given, read, map_file)
     mapping = replace(
@@ -202,7 +203,7 @@ def _checked(mapping: Decisions, logs: Sequence[Log], path: Path | None) -> Deci
     there = {log.source: [channel.name for channel in log.channels] for log in logs}
     for number, clock in enumerate(mapping.files, start=1):
         if clock.file not in there:
-            raise FileError(path, f"file[{number}].file", f"is {clock.file!r}, expected one of {', '.join(there)}")
+            raise FileError(path, f"file[{number}].name", f"is {clock.file!r}, expected one of {', '.join(there)}")
     for number, use in enumerate(mapping.uses, start=1):
         if use.file not in there:
             raise FileError(path, f"channel[{number}].file", f"is {use.file!r}, expected one of {', '.join(there)}")
