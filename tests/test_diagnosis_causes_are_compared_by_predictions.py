@@ -65,14 +65,14 @@ def test_where_nothing_is_hidden_nothing_is_certain():
 
 
 def test_a_current_that_wanders_gains_and_is_no_certain_cause():
-    """Nothing is hidden but weather: a steady current predicts these runs better, by five points not for certain."""
+    """Nothing is hidden but weather: a steady current predicts these runs better for certain, by five points not."""
     record = hidden_record("tug", seed=103, batches=3, samples=240)
     ship = extended_model(vessel_of("tug", relative_std=0.1), record)
     found = compare_predictions(ship, cut_windows(ship.model, record, longest_s=AHEAD_S), 0, silent)
     assert found is not None
     first = found.causes[0]
     assert first.cause == "current"
-    assert first.gain > 5.0
+    assert first.gain_interval[0] > 0.0
     assert first.gain_interval[0] < TUNING.much_better_points
     assert not first.is_certain
     much = TUNING.much_better_points + np.array([0.1, 20.0])

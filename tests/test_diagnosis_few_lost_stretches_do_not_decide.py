@@ -13,6 +13,7 @@ from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit import CrossValidation
 from expdesign.diagnosis.fit.cross_validation import error_of_constants
+from expdesign.diagnosis.fit.held_out import HeldOut, certain_reductions, held_out_gain
 from expdesign.diagnosis.fit.tuning import TUNING
 from expdesign.diagnosis.judgement import losses_without
 from expdesign.diagnosis.motion import simulate_from_measured
@@ -50,6 +51,68 @@ def test_a_model_that_runs_away_loses_stretches_and_no_more():
     assert (lost <= most * (1 + 1e-9)).all()
     assert (lost[:, 2] == most[:, 2]).mean() > 0.5
     assert (bad.squared_error[:, 2] > error_of_constants(windows.measured[..., columns], windows.batch)[:, 2]).all()
+
+
+def in_stretches(error: np.ndarray, runs: int = 4) -> HeldOut:
+    """Relative errors (b, n) of the stretches of so many runs."""
+    run = np.repeat(np.arange(float(runs)), len(error) // runs)
+    return HeldOut(squared_error=error**2, squared_deviation=np.ones_like(error), run=run)
+
+
+def test_stretches_count_alike_however_large_their_errors_are():
+    """A cause halves all errors but those of one stretch, lost with it, whose squares are nine tenths of all."""
+    rng = np.random.default_rng(0)
+    before = 0.2 * np.exp(0.3 * rng.standard_normal((40, 3)))
+    after = 0.5 * before * np.exp(0.1 * rng.standard_normal((40, 3)))
+    after[17] = 3.0
+    assert (after**2).sum() > 3.0 * (before**2).sum()
+    gain, (low, high) = held_out_gain(in_stretches(before), in_stretches(after), 0)
+    assert 0.0 < low < gain < high
+    share, least, most = certain_reductions(in_stretches(before), in_stretches(after), 0)
+    assert ((least > 0.0) & (least < share) & (share < most)).all()
+    whole = [replace(in_stretches(one), run=None) for one in (before, after)]
+    assert held_out_gain(*whole, 0)[0] < 0.0
+
+
+def test_gains_in_stretches_have_closed_forms():
+    """Errors that halve, double or stay, each the same in all stretches; the scale of an output changes nothing."""
+    before = 0.2 * np.exp(np.random.default_rng(0).standard_normal((40, 3)))
+    fit = 100.0 * (1.0 - np.exp(np.log(before).mean()))
+    for factors, ratio in (((0.5, 0.5, 0.5), 0.5), ((0.5, 2.0, 1.0), 1.0), ((0.125, 1.0, 1.0), 0.5)):
+        pair = in_stretches(before), in_stretches(before * np.array(factors))
+        assert pair[0].mean_fit == pytest.approx(fit)
+        gain, interval = held_out_gain(*pair, 0)
+        np.testing.assert_allclose([gain, *interval], (100.0 - fit) * (1.0 - ratio), atol=1e-9)
+        assert gain == pytest.approx(pair[1].mean_fit - fit, abs=1e-9)
+        np.testing.assert_allclose(certain_reductions(*pair, 0), np.tile(1.0 - np.array(factors), (3, 1)), atol=1e-9)
+    empty = np.array([0.0, 1.0, 1.0])  # an output that is not measured in some stretches
+    seen = [replace(one, **{name: getattr(one, name) * np.where(np.arange(40)[:, None] % 2, 1.0, empty)
+                            for name in ("squared_error", "squared_deviation")}) for one in pair]  # fmt: skip
+    np.testing.assert_allclose(certain_reductions(*seen, 0)[0], 1.0 - np.array(factors), atol=1e-9)
+
+
+@pytest.mark.parametrize("cause", ["change_point", "current"])
+def test_a_change_of_the_ship_never_shows_in_predictions_alone(monkeypatch, cause):
+    """Simulations of runs leave it open; what is not chosen by its time shows in predictions."""
+    monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_: (0.5, (0.4, 0.6)))
+    found = steps_of("first", "later")
+    for step in found.steps:
+        chosen = SimpleNamespace(**vars(step.chosen) | {"candidate": replace(step.chosen.candidate, cause=cause)})
+        chosen.fit = SimpleNamespace(noise=None)
+        step.chosen = chosen
+    held = [errors(70.0), errors(70.0 + OPEN), errors(74.0 + 2.0 * OPEN)]
+    assert improves_held_out(found, held, 0, object()) == [cause == "current"] * 2  # type: ignore[arg-type]
+
+
+def test_one_output_that_gains_for_certain_is_no_finding_where_all_together_may_not():
+    """Surge gains 5 points in every run, sway and yaw lose or gain in turn."""
+    turn = OPEN - OPEN.mean()
+    held = [errors(70.0), errors(70.0 + np.hstack([np.full((6, 1), 5.0), turn, turn]))]
+    assert certain_reductions(*held, 0)[1][0] > 0.0
+    assert improves_held_out(steps_of("first"), held, 0) == [False]
+    assert improves_held_out(
+        steps_of("first"), [held[0], errors(70.0 + np.array([5.0, 0.5, 0.5]) * np.ones((6, 1)))], 0
+    ) == [True]
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ import pytest
 
 from expdesign.diagnosis import judgement
 from expdesign.diagnosis.causes import Candidate
-from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain
+from expdesign.diagnosis.fit.held_out import HeldOut, certain_reductions, held_out_gain
 from expdesign.diagnosis.judgement import _where_more_is_certain, errors_as_judged
 from expdesign.diagnosis.select import Step
-from expdesign.diagnosis.select.backward_elimination import certain_reductions, improves_held_out
+from expdesign.diagnosis.select.backward_elimination import improves_held_out
 from expdesign.progress import silent
 from held_out_cases import POSSIBLE, errors, steps_of
 
@@ -82,13 +82,12 @@ def test_intervals_by_stretches_hold_the_truth_of_one_run_sailed_on_and_of_other
     """
     rng, count = np.random.default_rng(runs), 200
     before, after = of_stretches(rng, 5_000, correlation, between)
-    gain = (after.fit - before.fit).mean()
-    held = [low < gain < high for _ in range(count) for low, high in [interval(rng, runs, correlation, between)]]
+    ratio, held = (100.0 - after.mean_fit) / (100.0 - before.mean_fit), []
+    for _ in range(count):
+        pair = of_stretches(rng, runs, correlation, between)
+        low, high = np.array(held_out_gain(*pair, 0)[1]) / (100.0 - pair[0].mean_fit)
+        held.append(low < 1.0 - ratio < high)
     assert np.mean(held) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / count)
-
-
-def interval(rng: np.random.Generator, *of: float) -> tuple[float, float]:
-    return held_out_gain(*of_stretches(rng, *of), 0)[1]
 
 
 def test_a_later_cause_is_certain_in_stretches_where_whole_runs_leave_its_gain_open():

@@ -31,7 +31,7 @@ class ErrorReduction:
 
     output: str  # u, v or r
     share: float  # 1 for no error left, 0 for no change, negative for a larger error
-    # low, high: 95 % interval, bootstrap over batches
+    # low, high: 95 % interval
     low: float
     high: float
 
@@ -52,7 +52,7 @@ class Finding:
     fit_before: Array
     fit_after: Array
     error_reductions: tuple[ErrorReduction, ...]  # per output
-    gain: float  # mean over outputs of the difference; gain_interval: 95 %, bootstrap over batches
+    gain: float  # mean over outputs [points of fit]; gain_interval: 95 %
     gain_interval: tuple[float, float]
     not_distinguishable_from: tuple[str, ...]  # causes that explain the data as well; alternatives: in words
     would_tell_apart: str | None  # the manoeuvre that distinguishes them best, per minute, or None
@@ -70,7 +70,7 @@ class Lead:
     """A candidate that is not certain."""
 
     cause: str  # name in the catalogue
-    gain: float  # on held-out batches, mean over outputs [points of fit]; gain_interval: 95 %, bootstrap over batches
+    gain: float  # on held-out batches, mean over outputs [points of fit]; gain_interval: 95 %
     gain_interval: tuple[float, float]
     parameters: tuple[str, ...] = ()  # those that it changes, by most standard errors first
 

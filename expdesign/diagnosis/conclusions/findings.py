@@ -10,13 +10,20 @@ from expdesign.diagnosis.accuracy import Accuracy
 from expdesign.diagnosis.causes import CAUSES, UNLISTED_TERM, Cause, Values, rounded, wind_can_be_told
 from expdesign.diagnosis.conclusions.verdict import effect_in_words, has_diverged, missing_effect
 from expdesign.diagnosis.data import Noise, Windows, missing_wind_share
-from expdesign.diagnosis.fit import AHEAD_S, FEWEST_RUNS, Fit, HeldOut, held_out_gain, prediction_gain
+from expdesign.diagnosis.fit import (
+    AHEAD_S,
+    FEWEST_RUNS,
+    Fit,
+    HeldOut,
+    certain_reductions,
+    held_out_gain,
+    prediction_gain,
+)
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select import (
     SELECTION_TUNING,
     Selection,
     Step,
-    certain_reductions,
     p_value_between_runs,
     same_effects_as_any,
 )
@@ -115,7 +122,7 @@ def _estimates(values: Values, ship: ExtendedModel) -> tuple[Estimate, ...]:
 def error_reductions_of(
     outputs: Sequence[str], before: HeldOut, after: HeldOut, seed: int
 ) -> tuple[ErrorReduction, ...]:
-    """Reductions of the simulated error of held-out units, with 95 % intervals by the bootstrap."""
+    """Reductions of the simulated error of held-out units, with 95 % intervals."""
     rows = zip(outputs, *(item.tolist() for item in certain_reductions(before, after, seed)), strict=True)
     return tuple(ErrorReduction(output=name, share=share, low=low, high=high) for name, share, low, high in rows)
 
@@ -301,7 +308,8 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
     return (
         "Fitted to the other runs, a model leads away from the ship in a whole run. So models are fitted, and gains "
         f"are measured, in stretches of {AHEAD_S:g} s, each simulated from its first measured state, a fifth of every "
-        "run held out at a time. In a stretch an error counts as no larger than that of the run's mean.",
+        "run held out at a time. In a stretch an error counts as no larger than that of the run's mean. Stretches and "
+        "outputs count by the geometric mean of their errors.",
     )
 
 

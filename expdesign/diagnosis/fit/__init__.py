@@ -40,9 +40,8 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import (
     FEWEST_RUNS,
     HeldOut,
-    bootstrap_sums,
+    certain_reductions,
     held_out_gain,
-    interval_of,
     judged,
     leads_away,
     on_common_units,

@@ -1,10 +1,12 @@
 """Errors of models on data that they were not fitted to, one sample ahead and over whole runs, and their comparison.
 
-Errors of models on data that they were not fitted to, and their comparison, with intervals by the bootstrap.
+Whole runs are few and count by their squared errors; intervals are by the bootstrap. Short stretches are many and
+differ by orders of magnitude, so that the largest would decide alone. They count by logarithms: a fit is one minus the
+geometric mean of relative errors, over all outputs together, and models are compared by the geometric mean of the
+ratios of their errors, with an interval by Student's distribution.
 
-Source: B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap (1993).
-
-How well models predict held-out data from one sample to the next, given all before: held-out likelihoods.
+Sources: B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap (1993); J. S. Armstrong and F. Collopy,
+International Journal of Forecasting 8 (1992), 69-80, for geometric means of relative errors.
 
 Simulations of whole runs add up slow errors, of the model's structure or of weather, and hide small effects that act at
 once, such as a dead time. The whitened error, less what initial velocities and the random current explain, does not:
@@ -19,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
@@ -44,10 +46,8 @@ from expdesign.values import Array
 
 LEAST_FIT = 0.0  # of simulations of whole held-out units [%]; where one is worse, the stretches count
 BOOTSTRAP_DRAWS = 1000  # of units, for intervals
+LEAST_ERROR = 1e-3  # of a stretch, over the deviation of an average one
 FEWEST_RUNS = 3  # that count as units; fewer are judged by their parts
-
-
-# Errors of models on data that they were not fitted to, and their comparison, with intervals by the bootstrap.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,8 +67,22 @@ class HeldOut:
 
     @property
     def fit(self) -> Array:
-        """(n,) [%] over all units that could be fitted."""
+        """(n,) [%] over all units that could be fitted; of stretches by the geometric mean of relative errors."""
+        if self.run is not None:
+            return 100.0 * (1.0 - np.exp(_known_mean(self.log_errors, axis=0)))
         return _fit_percent(np.nansum(self.squared_error, axis=0), np.nansum(self.squared_deviation, axis=0))
+
+    @cached_property
+    def log_errors(self) -> Array:
+        """(b, n) logarithm of every unit's error over the deviation of an average one; nan where nothing is known.
+
+        No error counts as less than `LEAST_ERROR`: what is exact in all it shows decides nothing.
+        """
+        known = np.isfinite(self.squared_error) & ((self.squared_error > 0) | (self.squared_deviation > 0))
+        total = np.where(known, self.squared_deviation, 0.0).sum(axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = self.squared_error / (total / known.sum(axis=0))
+            return np.asarray(np.where(known & (total > 0), np.log(np.maximum(relative, LEAST_ERROR**2)) / 2, np.nan))
 
     def like(self, other: HeldOut) -> HeldOut:
         """Errors of the same model measured as those of another are: of whole units or of short stretches."""
@@ -76,7 +90,10 @@ class HeldOut:
 
     @property
     def mean_fit(self) -> float:
-        """Over outputs [%]; minus infinity where one has none."""
+        """Over outputs [%]; minus infinity where one has none. Of stretches by the geometric mean over outputs too."""
+        if self.run is not None:
+            typical = _known_mean(_known_mean(self.log_errors, axis=1), axis=0)
+            return float(100.0 * (1.0 - np.nan_to_num(np.exp(typical), nan=np.inf)))
         return float(np.nan_to_num(self.fit, nan=-np.inf).mean())
 
 
@@ -113,19 +130,54 @@ def on_common_units(before: HeldOut, after: HeldOut) -> tuple[HeldOut, HeldOut]:
     return first, second
 
 
-def bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> tuple[HeldOut, HeldOut]:
-    """Sums over units drawn with replacement, (draws, n), the same units for both models.
+def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
+    """Mean gain of fit over outputs [points] and its 95 % interval, up to a perfect fit.
 
-    Of stretches of three runs or more, runs are drawn whole. The same seed draws the same units, for decisions and for
-    reports.
+    All are nan where no unit could be fitted for both.
     """
-    first, second = _independent(before), _independent(after)
-    times = _times_drawn(len(first.squared_error), seed)
-    drawn = (
-        HeldOut(squared_error=times @ item.squared_error, squared_deviation=times @ item.squared_deviation)
-        for item in (first, second)
-    )
-    return next(drawn), next(drawn)
+    before, after = on_common_units(before, after)
+    if not len(before.squared_error):
+        return np.nan, (np.nan, np.nan)
+    if before.run is not None:
+        ratio, least, most = (float(one[0]) for one in _ratios(before, after, together=True))
+        left = 100.0 - before.mean_fit
+        return left * (1.0 - ratio), (left * (1.0 - most), left * (1.0 - least))
+    fits = [_fit_percent(*sums) for sums in _bootstrap_sums(before, after, seed)]
+    gain = np.nanmean(after.fit - before.fit)
+    low, high = _interval_of(gain, np.nanmean(fits[1] - fits[0], axis=1), len(before.squared_error))
+    return float(gain), (float(low), min(float(high), 100.0 - before.mean_fit))
+
+
+def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
+    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %.
+
+    All are nan where no unit could be fitted for both.
+    """
+    before, after = on_common_units(before, after)
+    if not len(before.squared_error):
+        share, low, high = np.full((3, before.squared_error.shape[1]), np.nan)
+        return share, low, high
+    if before.run is not None:
+        ratio, least, most = _ratios(before, after)
+        return 1.0 - ratio, 1.0 - most, 1.0 - least
+    drawn = [error for error, _ in _bootstrap_sums(before, after, seed)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_ratio = np.log(after.squared_error.sum(axis=0) / before.squared_error.sum(axis=0)) / 2
+        ends = _interval_of(log_ratio, np.log(drawn[1] / drawn[0]) / 2, len(before.squared_error))
+    share, high, low = 1.0 - np.exp([log_ratio, *ends])
+    return share, low, high
+
+
+# Whole runs.
+
+
+def _bootstrap_sums(before: HeldOut, after: HeldOut, seed: int) -> list[tuple[Array, Array]]:
+    """Sums of squared errors and deviations over units drawn with replacement, (draws, n), the same for both models.
+
+    The same seed draws the same units, for decisions and for reports.
+    """
+    times = _times_drawn(len(before.squared_error), seed)
+    return [(times @ item.squared_error, times @ item.squared_deviation) for item in (before, after)]
 
 
 @lru_cache(maxsize=16)
@@ -135,63 +187,111 @@ def _times_drawn(count: int, seed: int) -> Array:
     return rng.multinomial(count, np.full(count, 1.0 / count), size=BOOTSTRAP_DRAWS).astype(float)
 
 
-def _independent(held: HeldOut) -> HeldOut:
-    """Errors of runs, where there are three or more; else of units as they are."""
-    if held.run is None or len(np.unique(held.run)) < FEWEST_RUNS:
-        return held
-    error, deviation = (sum_by_run(item, held.run) for item in (held.squared_error, held.squared_deviation))
-    return HeldOut(squared_error=error, squared_deviation=deviation)
-
-
-def held_out_gain(before: HeldOut, after: HeldOut, seed: int) -> tuple[float, tuple[float, float]]:
-    """Mean gain of fit over outputs [points] and its 95 % interval, up to a perfect fit.
-
-    All are nan where no unit could be fitted for both.
-    """
-    before, after = on_common_units(before, after)
-    if not len(before.squared_error):
-        return np.nan, (np.nan, np.nan)
-    fits = [_fit_percent(item.squared_error, item.squared_deviation) for item in bootstrap_sums(before, after, seed)]
-    gain = np.nanmean(after.fit - before.fit)
-    low, high = interval_of(gain, np.nanmean(fits[1] - fits[0], axis=1), before, after)
-    return float(gain), (float(low), min(float(high), 100.0 - before.mean_fit))
-
-
-def interval_of(found: Array | np.floating, drawn: Array, before: HeldOut, after: HeldOut) -> Array:
-    """(2, ...) 95 % interval of what was found, given the same of draws (draws, ...) of the units of such errors.
+def _interval_of(found: Array | np.floating, drawn: Array, count: int) -> Array:
+    """(2, ...) 95 % interval of what was found, given the same of draws (draws, ...) of so many units.
 
     Quantiles of draws of n units are too near: draws vary by sqrt((n - 1) / n) of what they should, and of few units
-    nobody knows how they vary, which Student's distribution counts. Three runs or more are such units. One run or two
-    are told by their stretches, as many as are independent: the interval is of these runs sailed on, and tells nothing
-    of how others differ.
+    nobody knows how they vary, which Student's distribution counts.
 
     Source: T. Hesterberg, The American Statistician 69 (2015), 371-386, 3.2.
     """
-    first, second = _independent(before), _independent(after)
-    count = max(2, len(first.squared_error))
-    free = count if first.run is None else max(2.0, _independent_stretches(first, second))
-    wider = count / np.sqrt((count - 1) * free) * scipy.special.stdtrit(free - 1, 0.975) / NORMAL_95
+    count = max(2, count)
+    wider = np.sqrt(count / (count - 1)) * scipy.special.stdtrit(count - 1, 0.975) / NORMAL_95
     quantile = np.nanquantile if np.isnan(drawn).any() else np.quantile  # which is quicker
     return np.asarray(found + wider * (quantile(drawn, [0.025, 0.975], axis=0) - found))
 
 
-def _independent_stretches(before: HeldOut, after: HeldOut) -> float:
+# Short stretches.
+
+
+def _known_mean(values: Array, *, axis: int) -> Array:
+    """Mean of what is known; nan where nothing is."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(known, values, 0.0).sum(axis=axis) / known.sum(axis=axis))
+
+
+def _ratios(before: HeldOut, after: HeldOut, *, together: bool = False) -> tuple[Array, Array, Array]:
+    """(n,) geometric mean of the ratios of two models' errors in stretches, and the ends of its interval of 95 %.
+
+    One run or two are told by their stretches, as many as are independent: the interval is of these runs sailed on, and
+    tells nothing of how others differ. Three runs or more show that, too.
+
+    Args:
+        before: errors of one model.
+        after: of another, in the same stretches.
+        together: (1,) of all outputs, each with the same weight.
+    """
+    run = np.zeros(len(before.squared_error)) if before.run is None else before.run
+    change = after.log_errors - before.log_errors
+    if len(np.unique(run)) >= FEWEST_RUNS:
+        wider, free = _beyond_stretches(change, run)
+    else:
+        run, count = np.zeros_like(run), _independent_stretches(change, run)
+        wider, free = len(run) / count, count - 1.0
+    change = _known_mean(change, axis=1)[:, None] if together else change
+    middle = _known_mean(change, axis=0)
+    error = scipy.special.stdtrit(free, 0.975) * np.sqrt(wider * _by_stretches(change, run)[1])
+    ratio, least, most = np.exp([middle, middle - error, middle + error])
+    return ratio, least, most
+
+
+def _by_stretches(change: Array, run: Array) -> tuple[Array, Array]:
+    """(b, n) changes less the mean of their run, and (n,) the variance of the mean of all that stretches alone tell."""
+    known, (names, place) = np.isfinite(change), np.unique(run, return_inverse=True)
+    sums, counts = sum_by_run(np.where(known, change, 0.0), run), sum_by_run(known.astype(float), run)
+    off = np.where(known, change - (sums / np.maximum(counts, 1.0))[place], 0.0)
+    count = np.maximum(known.sum(axis=0), 1.0)
+    return off, np.maximum((off**2).sum(axis=0) / np.maximum(count - len(names), 1.0) / count, 1e-30)
+
+
+def _beyond_stretches(change: Array, run: Array) -> tuple[float, float]:
+    """By how much more the mean of runs varies than their stretches alone tell, and the degrees of freedom of that.
+
+    Stretches of one run share its weather and all that its model lacks. All outputs together show how runs differ,
+    those that change alike as fewer: of their correlations C, as (tr C)^2 / tr C^2.
+
+    Args:
+        change: (b, n) of every stretch and output, nan where nothing is known.
+        run: (b,) that each stretch is of.
+
+    Sources: K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986), 13-22, for the variance of a mean of runs; F. E.
+    Satterthwaite, Biometrics Bulletin 2 (1946), 110-114, for the degrees of freedom.
+    """
+    runs, known = len(np.unique(run)), np.isfinite(change)
+    off, by_stretches = _by_stretches(change, run)
+    of_runs = sum_by_run(np.where(known, change - _known_mean(change, axis=0), 0.0), run)
+    by_runs = ((of_runs / np.maximum(known.sum(axis=0), 1.0)) ** 2).sum(axis=0) * runs / (runs - 1.0)
+    ratio = float((by_runs / by_stretches)[known.any(axis=0)].mean())
+    if not ratio > 1.0:
+        return 1.0, max(1.0, float(len(run) - runs))
+    off = off / np.maximum(np.sqrt((off**2).sum(axis=0)), 1e-300)
+    alike = off.T @ off
+    outputs = max(1.0, float(np.trace(alike) ** 2 / max((alike**2).sum(), 1e-300)))
+    return ratio, outputs * (runs - 1.0)
+
+
+def _independent_stretches(change: Array, run: Array) -> float:
     """How many independent stretches tell as much of a mean as those of a run, each of which is like the one before.
 
-    Of n stretches with a correlation c from one to the next, n (1 - c) / (1 + c). The correlation is that of what they
-    add to the change of error, by all outputs, less its bias, and by its standard error more, because few stretches
-    hide it.
+    Of n stretches with a correlation c from one to the next, n (1 - c) / (1 + c), and never less than two. The
+    correlation is that of the change of error, by all outputs, less its bias, and by its standard error more, because
+    few stretches hide it.
+
+    Args:
+        change: (b, n) of every stretch and output, nan where nothing is known.
+        run: (b,) that each stretch is of.
 
     Source: G. V. Bayley and J. M. Hammersley, Supplement to the Journal of the Royal Statistical Society 8 (1946),
     184-197; M. G. Kendall, Biometrika 41 (1954), 403-404, for the bias.
     """
-    shares = [item.squared_error / np.maximum(item.squared_error.sum(axis=0), 1e-300) for item in (before, after)]
-    change, count = shares[1] - shares[0], len(shares[0])
+    count = len(change)
+    change = np.where(np.isfinite(change), change - _known_mean(change, axis=0), 0.0)
     change = change / np.maximum(change.std(axis=0), 1e-300)
-    pairs = before.run[1:] == before.run[:-1] if before.run is not None else np.zeros(0)
+    pairs = run[1:] == run[:-1]
     found = float((change[1:] * change[:-1])[pairs].mean()) if pairs.any() else 0.0
     correlation = min(max(0.0, found + (1.0 + 3.0 * found) / count + 1.0 / np.sqrt(count)), 1.0)
-    return float(count * (1.0 - correlation) / (1.0 + correlation))
+    return max(2.0, float(count * (1.0 - correlation) / (1.0 + correlation)))
 
 
 def _fit_percent(squared_error: Array, squared_deviation: Array) -> Array:

@@ -1,7 +1,6 @@
 """Which causes explain the data: score tests, forward selection, backward elimination, profile likelihood."""
 
 from expdesign.diagnosis.select.backward_elimination import (
-    certain_reductions,
     compared_with,
     eliminate_backward,
     improves_held_out,

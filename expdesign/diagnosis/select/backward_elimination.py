@@ -12,9 +12,8 @@ from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import (
     HeldOut,
-    bootstrap_sums,
+    certain_reductions,
     held_out_gain,
-    interval_of,
     on_common_units,
     prediction_gain,
 )
@@ -27,7 +26,6 @@ from expdesign.diagnosis.select.selection import (
 )
 from expdesign.diagnosis.select.selection_round import open_candidates
 from expdesign.diagnosis.select.tuning import TUNING
-from expdesign.values import Array
 
 
 def eliminate_backward(
@@ -116,12 +114,13 @@ def improves_held_out(
     parameters of the file, as tests are beside the likeliest ones. What takes less than `Tuning.least_reduction` off
     every error is a remark, whatever its p-value, and so is what is impossible (`Candidate.bounds`).
 
-    What is stated of a finding has to be certain: the error of some output falls by an interval that excludes zero. Of
-    a first cause, that may be compared with the model that is fitted as it is but for the cause: parameters of a file
-    that were fitted to the same data have seen what is held out, those fitted with a cause have not. Or it shows in
-    predictions from one sample to the next, where simulations say too little. A cause that imitates none may show in
-    these alone, if it makes simulations no worse for certain; one that imitates others, or a later one, beside
-    simulations that gain on average. Several parameters at once, which imitate any cause, never do.
+    What is stated of a finding has to be certain: errors fall on average, and that of some output by enough to be worth
+    a word, both by intervals that exclude zero. Of a first cause, that may be compared with the model that is fitted as
+    it is but for the cause: parameters of a file that were fitted to the same data have seen what is held out, those
+    fitted with a cause have not. Or it shows in predictions from one sample to the next, where simulations say too
+    little. A cause that imitates none may show in these alone, if it makes simulations no worse for certain; one that
+    imitates others, or a later one, beside simulations that gain on average. Several parameters at once, which imitate
+    any cause, never do, nor does a change of the ship, whose time is chosen where predictions are worst.
 
     Args:
         found: the selection.
@@ -154,10 +153,14 @@ def improves_held_out(
     if not shows_for_certain(held[0], held[1], seed):
         improves[0] = _shows_otherwise(found, held, (better[0], gains[0][1]), (windows, re_estimated), seed)
     for index, step in enumerate(found.steps[1:], 1):
-        if better[index] and not shown[index] and not step.chosen.is_block:
+        if better[index] and not shown[index] and _may_show_in_predictions(step):
             share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
             improves[index] = least > 0.0 and share >= TUNING.least_predicted
     return improves
+
+
+def _may_show_in_predictions(step: Step) -> bool:
+    return not step.chosen.is_block and step.chosen.candidate.cause != "change_point"
 
 
 def _shows_otherwise(
@@ -179,7 +182,7 @@ def _shows_otherwise(
     share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
     alone = share >= TUNING.least_predicted and not first.candidate.imitates
-    if least > 0.0 and not first.is_block and (alone or (better and worth_a_word)):
+    if least > 0.0 and _may_show_in_predictions(found.steps[0]) and (alone or (better and worth_a_word)):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
     return beside is not None and shows_for_certain(beside, held[1], seed)
@@ -206,27 +209,14 @@ def compared_with(
     return beside, True
 
 
-def certain_reductions(before: HeldOut, after: HeldOut, seed: int) -> tuple[Array, Array, Array]:
-    """(n,) share by which the error of every output falls, and the ends of its interval of 95 %, by the bootstrap.
-
-    All are nan where no unit could be fitted for both.
-    """
-    one, other = on_common_units(before, after)
-    if not len(one.squared_error):
-        share, low, high = np.full((3, one.squared_error.shape[1]), np.nan)
-        return share, low, high
-    drawn = [item.squared_error for item in bootstrap_sums(one, other, seed)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.log(other.squared_error.sum(axis=0) / one.squared_error.sum(axis=0)) / 2
-        ends = interval_of(ratio, np.log(drawn[1] / drawn[0]) / 2, one, other)
-    share, high, low = 1.0 - np.exp([ratio, *ends])
-    return share, low, high
-
-
 def shows_for_certain(before: HeldOut, after: HeldOut, seed: int) -> bool:
-    """Whether the error of some output falls by enough to be worth a word, by an interval that excludes zero."""
+    """Whether errors fall on average, and that of some output by enough to be worth a word, for certain.
+
+    Certain is what an interval that excludes zero says.
+    """
     share, low, _ = certain_reductions(before, after, seed)
-    return bool(((share >= TUNING.least_reduction) & (low > 0.0)).any())
+    _, (least, _) = held_out_gain(before, after, seed)
+    return least > 0.0 and bool(((share >= TUNING.least_reduction) & (low > 0.0)).any())
 
 
 def _is_certain_ahead(held: Sequence[HeldOut], index: int, seed: int, low: float) -> bool:
@@ -261,8 +251,7 @@ def simulates_better(
 def _matters(before: HeldOut, after: HeldOut) -> bool:
     """Whether the error of some output falls by enough to be worth a word."""
     before, after = on_common_units(before, after)
-    lost, left = before.squared_error.sum(axis=0), after.squared_error.sum(axis=0)
-    return bool((left <= (1.0 - TUNING.least_reduction) ** 2 * lost).any())
+    return bool((100.0 - after.fit <= (1.0 - TUNING.least_reduction) * (100.0 - before.fit)).any())
 
 
 def _least_change(before: HeldOut, after: HeldOut) -> float:

@@ -293,7 +293,9 @@ def answer(
         before = 0.0 if effect.startswith("late") and EARLY_POSITIONS in " ".join(found.record.faults) else own[effect]
         true = fault.record[1] * (1.0 + before) if fault.record[1] == SCALE else fault.record[1] + before
         return "record", abs(value - true) / std
-    right = {*fault.causes} | {f"missing_{key}" for key, _ in effects if key.startswith("term:")}
+    terms = {key for key, _ in effects if key.startswith("term:")}
+    right = {*fault.causes} | {f"missing_{key}" for key in terms}
+    right |= {item.cause for item in found.findings if terms & {*item.keys}}  # one of the wind is named "wind"
     causes = [item.cause for item in found.findings]
     item = next((item for item in found.findings if item.cause in right), None)
     if item is None:
