@@ -23,9 +23,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from expdesign.conventions import OUTPUTS
+from expdesign.conventions import OUTPUTS, plus_minus
 from expdesign.estimation.regression import inputs_of
-from expdesign.kinematics.instruments import Finding, integral, stretches, with_std
+from expdesign.kinematics.instruments import Finding, integral, stretches
 from expdesign.kinematics.relation import CERTAIN, relation
 from expdesign.signals import Batch
 from expdesign.values import Array
@@ -89,7 +89,7 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
             if answer < -CERTAIN * std and low < -answer < high:
                 yield Finding(
                     name=f"answer_to_{kind}", value=answer, std=std, rest=found.rest,
-                    text=f"{seen}: the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel "
+                    text=f"{seen}: the change of {OUTPUTS[axis]} is {plus_minus(answer, std)} times what the vessel "
                     f"file's model gives. {question}",
                 )  # fmt: skip
             if abs(answer) > high and kind in UNITS:
@@ -99,8 +99,8 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
                 if then is not None and 1.0 / ALIKE < then.ratio.real < ALIKE:
                     yield Finding(
                         name=f"unit_of_{kind}", value=answer, std=std, rest=found.rest,
-                        text=f"the change of {OUTPUTS[axis]} is {with_std(answer, std)} times what the vessel file's "
-                        f"model gives, and {with_std(then.ratio.real, then.std[0])} times with {names} {times:.3g} "
+                        text=f"the change of {OUTPUTS[axis]} is {plus_minus(answer, std)} times what the vessel file's "
+                        f"model gives, and {plus_minus(then.ratio.real, then.std[0])} times with {names} {times:.3g} "
                         f"times as large: {mistake}?",
                     )  # fmt: skip
         elif found is None and OUTPUTS[axis] == "r":
