@@ -104,7 +104,8 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
         yield Finding(
             name="heading_bias_rad", value=angle, std=std, rest=found.ahead.rest,
             text=f"the heading is {plus_minus(angle / DEGREE, std / DEGREE)} degrees more than positions and "
-            f"velocities say: add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
+            "velocities say: "
+            f"add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
         )  # fmt: skip
     drift, spread = found.of("drift")
     if abs(drift) > max(CERTAIN * float(np.hypot(*spread)), WAY_MATTERS * speed):
