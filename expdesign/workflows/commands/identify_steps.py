@@ -11,7 +11,8 @@ from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.export import Content, vessel_toml, write_files
 from expdesign.export.pages import document_html
-from expdesign.export.step_trial_page import StepTrialContent, Validated, step_model_json, step_trial_document
+from expdesign.export.step_trial_content import StepTrialContent, Validated, step_model_json
+from expdesign.export.step_trial_page import step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
 from expdesign.requests import command_text

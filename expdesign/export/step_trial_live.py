@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from expdesign.export.files.text import csv_text, strict_json
-from expdesign.export.step_trial_page.content import unit_of
+from expdesign.export.step_trial_content import unit_of
 from expdesign.step_trials.live import Event, Inputs, Listed, State, StepList, in_sequence
 from expdesign.vessel import column_name
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from expdesign.export.document import Document, Figure, Table, filled, section
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, svg
-from expdesign.export.step_trial_page.content import (
+from expdesign.export.step_trial_content import (
     REPEAT_HEADER,
     STEP_HEADER,
     StepTrialContent,
