@@ -55,6 +55,7 @@ from expdesign.diagnosis.judgement import (
     LITTLE_FIT,
     errors_as_judged,
     found_by_predictions,
+    harmless_beside_the_file,
     harms,
     losses_without,
     parameters_alone,
@@ -150,10 +151,12 @@ def select_causes(
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     kept = with_parameters_as_rival(kept, held, validation, windows, seed)
+    kept, held = harmless_beside_the_file(kept, ship, as_stated, validation, data, seed) or (kept, held)
     rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
     searched, compared = kept, None
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
-    if explains_little(reached, windows) or _imitates(kept):
+    dropped = bool(found.steps) and not kept.steps  # what runs differ in may hide a cause from likelihoods
+    if dropped or explains_little(reached, windows) or _imitates(kept):
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
