@@ -9,7 +9,7 @@ import shapely
 
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegWater
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM

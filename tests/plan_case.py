@@ -12,7 +12,7 @@ from expdesign.dictionary import Primitive, PrimitiveSpec, build_primitive, comp
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_distance
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.local_planner import SearchSpace, local_planner
 from expdesign.plan.runs import footprint

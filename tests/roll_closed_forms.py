@@ -21,7 +21,7 @@ import scipy
 
 from expdesign.roll import named
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import G_MPS2, Body, Load, axis_inertia, first_moment
+from expdesign.vessel.roll import G_MPS2, Body, Load, axis_inertia, first_moment
 
 System = tuple[Array, Array, Array, Array]
 

@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 from shapely.geometry import shape
 
-from expdesign.export.formats.mission import NAV_WAYPOINT
+from expdesign.export.formats.missions import NAV_WAYPOINT
 
 PLAN_SCHEMA = {
     "type": "object",

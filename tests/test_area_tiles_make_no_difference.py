@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
 
 from expdesign import sea_area
-from expdesign.plan.chart import simplified, visibility_graph
-from expdesign.plan.chart.tuning import CHART
+from expdesign.plan.chart import CORNERS, simplified, visibility_graph
 from expdesign.sea_area import moved
 
 HALF_M = 500.0
@@ -31,7 +28,7 @@ def islands(seed: int, *, corners: int, radius_m: float = 40.0, count: int = 60)
 @pytest.fixture
 def small_tiles(monkeypatch):
     monkeypatch.setattr(sea_area, "TILE_CORNERS", 60)
-    monkeypatch.setattr(visibility_graph, "CHART", replace(CHART, dense=60))
+    monkeypatch.setattr(visibility_graph, "DENSE", 60)
 
 
 def at_once(water: shapely.Geometry, distance_m: float, **options) -> shapely.Geometry:
@@ -68,7 +65,7 @@ def test_a_water_narrower_than_the_distance_vanishes_in_tiles(small_tiles):
 @pytest.mark.parametrize("tolerance_m", [0.5, 3.0])
 def test_simplified_water_adds_and_lacks_nothing_whatever_corner_its_shores_begin_at(small_tiles, seed, tolerance_m):
     water = shapely.MultiPolygon([*shapely.get_parts(islands(seed, corners=40, count=25))])
-    corners = ((1.0, 150), *CHART.corners[1:])
+    corners = ((1.0, 150), *CORNERS[1:])
     less, more = (simplified(water, grow=grow, tolerance_m=tolerance_m, corners=corners) for grow in (False, True))
     assert less.difference(water).area < 1e-9
     assert water.difference(more).area < 1e-9

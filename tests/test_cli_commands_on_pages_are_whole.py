@@ -1,27 +1,88 @@
-"""The command that a page gives to reproduce it has every option that results depend on."""
+"""A command is stated once: its workflow takes the same values; the line that repeats it is read back as they are."""
 
+import ast
 import inspect
+from dataclasses import MISSING
+from pathlib import Path
+from typing import get_args, get_origin
 
 import pytest
 from typer.main import get_command
 
 from expdesign import workflows
-from expdesign.cli.app import WORKFLOWS
-from expdesign.cli.commands import app
-from expdesign.workflows.planning import run
+from expdesign.cli.commands import app, given
+from expdesign.cli.entry import LISTS, repeat_option
+from expdesign.requests import COMMANDS, Command, command_text
+from expdesign.requests.options import Argument
+from expdesign.workflows.commands import run
 from short_examples import SCENARIOS
 
-WITHOUT_EFFECT = {"--out", "--quiet", "--json", "--jobs", "--scheduler", "--no-cache", "--help"}
+WITHOUT_EFFECT = {"out", "jobs", "scheduler", "no_cache"}
 """On results."""
-COMMANDS = get_command(app).commands
+EXAMPLES = {Path: Path("one.toml"), str: "word", int: 3, float: 1.5, bool: True}
+each_command = pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
 
 
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name in WORKFLOWS])
-def test_a_workflow_that_gives_its_command_names_all_options(name: str) -> None:
-    text = inspect.getsource(inspect.getmodule(getattr(workflows, WORKFLOWS[name][0])))
-    options = {option for given in COMMANDS[name].params for option in given.opts if option.startswith("--")}
-    if "command_text(" in text:
-        assert {option for option in options - WITHOUT_EFFECT if f'"{option}"' not in text} == set()
+def unusual(command: Command) -> dict[str, object]:
+    """Values that differ from all defaults."""
+
+    def value(kind: object) -> object:
+        if get_origin(kind) is tuple:
+            return (EXAMPLES[get_args(kind)[0]],) * 2
+        return EXAMPLES[kind if isinstance(kind, type) else get_args(kind)[0]]
+
+    return {one.name: value(one.kind) for one in command.asked}
+
+
+def read_back(command: Command, words: list[str]) -> dict[str, object]:
+    """What the command line makes of words."""
+    for option, files in LISTS.items():
+        words = repeat_option(words, option, files=files)
+    with get_command(app).commands[command.name].make_context(command.name, words) as context:
+        found = {name: value for name, value in context.params.items() if name not in ("quiet", "json")}
+    return given({name: () if value is None else value for name, value in found.items()})
+
+
+def test_every_command_is_there() -> None:
+    assert len(COMMANDS) == 25
+    assert {one.name for one in COMMANDS} | {"explain", "web"} == set(get_command(app).commands)
+
+
+@each_command
+def test_the_line_that_repeats_a_command_is_read_back_as_its_request(command: Command) -> None:
+    values = unusual(command)
+    _, name, *words = command_text(command.request(**values)).split()
+    assert name == command.name
+    assert read_back(command, words) == given(values)
+    arguments = [one for one in command.asked if one.default is MISSING or isinstance(one.typed, Argument)]
+    least = {one.name: values[one.name] for one in arguments}
+    _, _, *words = command_text(command.request(**least)).split()
+    usual = {one.name: one.default for one in command.asked if one.name not in least}
+    assert read_back(command, words) == given({name: () if v is None else v for name, v in (least | usual).items()})
+
+
+@each_command
+def test_a_workflow_takes_what_its_command_asks_with_the_same_defaults(command: Command) -> None:
+    taken = dict(inspect.signature(getattr(workflows, command.workflow)).parameters)
+    assert taken.pop("progress").default is not inspect.Parameter.empty
+    assert (taken.pop("tell", None) is not None) == command.tells
+    stated = {one.name: one.default for one in command.asked}
+    assert set(taken) == set(given(stated))
+    for name in stated.keys() - WITHOUT_EFFECT:
+        default = inspect.Parameter.empty if stated[name] is MISSING else stated[name]
+        assert taken[name].default == default or stated[name] == (), name
+
+
+@each_command
+def test_a_workflow_that_gives_its_command_states_all_that_results_depend_on(command: Command) -> None:
+    text = inspect.getsource(inspect.getmodule(getattr(workflows, command.workflow)))
+    calls = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == f"requests.{command.request.__name__}"
+    ]
+    stated = {keyword.arg for call in calls for keyword in call.keywords}
+    assert not calls or {one.name for one in command.asked} - WITHOUT_EFFECT <= stated
 
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:

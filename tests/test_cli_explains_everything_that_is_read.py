@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from expdesign import cli
+from expdesign import cli, requests
 from expdesign.cli import main
 from expdesign.cli.commands import app
 from expdesign.diagnosis.causes import CAUSES
@@ -27,8 +27,7 @@ from expdesign.scenario import load_scenario, load_vessel
 from expdesign.scenario.tables import Table
 from expdesign.vessel import STRUCTURES
 from expdesign.workflows import explain
-from expdesign.workflows.explanations.explain import TOPICS
-from expdesign.workflows.explanations.values import Explained
+from expdesign.workflows.commands.explain import TOPICS, Explained
 from scenario_files import spoil, write_scenario
 
 
@@ -73,8 +72,9 @@ def test_every_key_of_a_file_is_required_optional_or_has_a_default() -> None:
 
 
 def written_helps() -> Iterator[str]:
-    """Every text that is written as help in the source of the command line, constants in parts."""
-    for path in Path(inspect.getfile(cli)).parent.glob("*.py"):
+    """Every text that is written as help in the source of the command line and of requests, constants in parts."""
+    folders = (Path(inspect.getfile(module)).parent for module in (cli, requests))
+    for path in (path for folder in folders for path in folder.glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.keyword) and node.arg == "help":
                 parts = node.value.values if isinstance(node.value, ast.JoinedStr) else [node.value]

@@ -13,8 +13,7 @@ import pytest
 import expdesign
 from expdesign import workflows as real_workflows
 from expdesign.cli import main
-from expdesign.cli.app import WORKFLOWS
-from expdesign.cli.options import repeat_option
+from expdesign.cli.entry import repeat_option
 from expdesign.export.document import fact_rows
 from expdesign.workflows.outcome import Outcome, document_of
 from short_examples import copied
@@ -232,14 +231,6 @@ def test_what_was_typed_reaches_the_workflow(
     assert (called, positional) == (name, ())
     expected = inspect.signature(getattr(real_workflows, name)).bind(*arguments, **options).arguments
     assert given == expected
-
-
-def test_every_parameter_of_a_command_is_one_of_its_workflow() -> None:
-    assert len(WORKFLOWS) > 20
-    for name, (workflow, parameters) in WORKFLOWS.items():
-        known = inspect.signature(getattr(real_workflows, workflow)).parameters
-        assert {*parameters} - {"no_cache"} <= {*known}, name
-        assert "no_cache" not in parameters or "cache" in known, name
 
 
 @pytest.mark.parametrize(

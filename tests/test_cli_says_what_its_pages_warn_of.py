@@ -81,7 +81,7 @@ def test_what_a_page_says_first_is_on_the_terminal(
         printed.append(outcome)
         print_summary(outcome)
 
-    monkeypatch.setattr("expdesign.cli.app.print_summary", both)
+    monkeypatch.setattr("expdesign.cli.commands.print_summary", both)
     words = [*map(str, asked(tmp_path)), "--out", str(tmp_path / "out")]
     assert main(words) == 0
     told = " ".join(capsys.readouterr().out.split())

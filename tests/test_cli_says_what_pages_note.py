@@ -80,7 +80,7 @@ def test_the_terminal_says_all_that_the_page_notes(
         printed.append(outcome)
         print_summary(outcome)
 
-    monkeypatch.setattr("expdesign.cli.app.print_summary", both)
+    monkeypatch.setattr("expdesign.cli.commands.print_summary", both)
     assert main([*COMMANDS[command].format(folder).split(), "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert DOUBT.get(command, "the headings are read every 4 s") in told

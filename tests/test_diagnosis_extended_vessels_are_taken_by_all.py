@@ -23,7 +23,8 @@ from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.tables import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.export import vessel_toml
-from expdesign.export.diagnosis_page import diagnosis_html, extended_vessel
+from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_results import extended_vessel
 from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record

@@ -11,9 +11,10 @@ from expdesign.diagnosis import Estimate, Finding, diagnose
 from expdesign.diagnosis.accuracy import Residuals, _slopes, dependence, mean_residual, one_step_residuals
 from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
-from expdesign.export.diagnosis_page import diagnosis_html, diagnosis_json
-from expdesign.export.diagnosis_page import figures as diagnosis_figures
-from expdesign.export.diagnosis_page.figures import has_sign, is_force, suspected, suspected_force
+from expdesign.export import diagnosis_figures as diagnosis_figures
+from expdesign.export.diagnosis_figures import has_sign, is_force, suspected, suspected_force
+from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_results import diagnosis_json
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
 

@@ -19,7 +19,7 @@ from expdesign.diagnosis.discriminating_manoeuvre import (
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import InputError
 from expdesign.signals import Commands
-from expdesign.workflows.data.diagnose import as_inputs
+from expdesign.workflows.commands.diagnose import as_inputs
 
 STD = np.array([0.02, 0.02, 0.003, np.inf])
 

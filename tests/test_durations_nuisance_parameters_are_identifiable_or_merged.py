@@ -9,8 +9,7 @@ import pytest
 from design_case import duration_problem, one_line, random_matrices
 from expdesign.durations import Aim, DurationProblem, optimal_shares, solve_durations, with_repeats
 from expdesign.durations.concave import Collected, merged_nuisance, unidentifiable
-from expdesign.durations.criteria import LogDet, LogSmallest, LogTrace
-from expdesign.durations.criteria.models import stacked_values
+from expdesign.durations.criteria import LogDet, LogSmallest, LogTrace, stacked_values
 from expdesign.errors import NotInformative
 
 OF_INTEREST = Aim(criterion="D_s", interest=("parameter 0",))

@@ -16,13 +16,12 @@ from expdesign.durations import (
     Constraints,
     DurationProblem,
     InformationFloor,
+    maximise,
     optimal_shares,
     solve_durations,
 )
-from expdesign.durations.maximise import Optimum, maximise, maximised
-from expdesign.durations.maximise.maximise import CVXPY, NEWTON, TARGET_GAP, WORKING_SET
+from expdesign.durations.maximise import CVXPY, LARGEST_GAP, NEWTON, TARGET_GAP, WORKING_SET, Optimum, maximised
 from expdesign.durations.solve import concave_problem
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import NoAnswer
 
 P, MEANS, ROUNDING = 5, 2, 1e-9
@@ -84,7 +83,7 @@ def check_agreement(one: Optimum, other: Optimum) -> None:
     """Neither is better than the other's bound: the gaps alone say how far they may differ."""
     for here, there in ((one, other), (other, one)):
         degree = here.certificate.degree
-        assert here.gap < TUNING.largest_gap
+        assert here.gap < LARGEST_GAP
         assert here.certificate.value <= there.certificate.value + degree * max(there.gap, 0.0) + ROUNDING
 
 
@@ -105,7 +104,7 @@ def test_cvxpy_and_the_quickest_method_agree(case: str):
 def test_working_sets_agree_with_all_candidates_at_once(case: str, monkeypatch):
     task = concave_problem(MANY[case])
     whole = maximised(task, as_stated=True)
-    monkeypatch.setattr(maximise, "TUNING", replace(TUNING, conic_candidates=20))
+    monkeypatch.setattr(maximise, "CONIC_CANDIDATES", 20)
     few = maximised(task, as_stated=True)
     check_agreement(few, whole)
     assert few.method == WORKING_SET

@@ -12,9 +12,8 @@ from lxml import html
 import export_case as case
 from expdesign.conventions import to_n_frame
 from expdesign.errors import NoPlan
-from expdesign.export.cards import cards_html
-from expdesign.export.cards.card import card_groups, run_orders, steady_s
-from expdesign.export.cards.orders import FARTHEST_DANGER_M, MOST_ORDER_ROWS, ORDER_TOLERANCE, condensed, look_out
+from expdesign.export.card_orders import FARTHEST_DANGER_M, MOST_ORDER_ROWS, ORDER_TOLERANCE, condensed, look_out
+from expdesign.export.cards import card_groups, cards_html, run_orders, steady_s
 from expdesign.export.report.content import primitive_runs
 
 

@@ -13,8 +13,8 @@ from lxml import html
 import export_case as case
 from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.export import words
+from expdesign.export.card_orders import heading_rows, order_rows, orders_notes, starboard_helm
 from expdesign.export.cards import cards_html
-from expdesign.export.cards.orders import heading_rows, order_rows, orders_notes, starboard_helm
 from expdesign.export.report.chart import chart_legend, deep_from, safety_contour
 from expdesign.export.report.design import short_of_optimum
 from expdesign.export.report.tables import agenda, setting

@@ -16,7 +16,7 @@ from shapely.geometry import LinearRing, shape
 import export_case as case
 from expdesign.export import FORMATS, Route, build_route, find_format
 from expdesign.export.formats.check import check_gpx, check_rtz
-from expdesign.export.formats.mission import DO_CHANGE_SPEED, NAV_WAYPOINT
+from expdesign.export.formats.missions import DO_CHANGE_SPEED, NAV_WAYPOINT
 from route_readers import PLAN_SCHEMA, READERS
 
 DEPARTURE = datetime(2027, 5, 1, 8, 0, tzinfo=UTC)

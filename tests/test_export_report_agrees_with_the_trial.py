@@ -24,11 +24,11 @@ from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.design import chain
 from expdesign.export.report.parameters import parameter_rows
-from expdesign.growing.space import GrowRound, Growth
+from expdesign.growing.search import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM
 from expdesign.vessel import Sensors
-from expdesign.vessel.hull import hull_polygons
+from expdesign.vessel.vessel import hull_polygons
 
 ODD = 'x <script>alert(1)</script> & "$\\alpha$" $ \x07 \N{SNOWMAN}'
 

@@ -11,7 +11,7 @@ from expdesign.errors import NotDrawn
 from expdesign.export import write_files
 from expdesign.export.folder import gaps
 from expdesign.export.pages.figures import page_figure
-from expdesign.workflows.data import estimate as command
+from expdesign.workflows.commands import estimate as command
 from synthetic_ship import sail, trial, vessel_file, write
 
 
@@ -80,9 +80,9 @@ def test_the_command_tells_what_is_missing_and_ends_as_a_defect(
     if place == "page":
         monkeypatch.setattr(command, "document_html", broken)
     else:
-        from expdesign.export.estimate_page import page
+        from expdesign.export import estimate_page
 
-        monkeypatch.setattr(page, "interval_figure", page_figure(broken))
+        monkeypatch.setattr(estimate_page, "interval_figure", page_figure(broken))
     asked = ["estimate", str(data), "--vessel", str(ship), "--method", "ls", "--out", str(tmp_path / "out")]
     assert cli.main(asked) == 1
     assert "could not be drawn (KeyError" in capsys.readouterr().err

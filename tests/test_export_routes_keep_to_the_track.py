@@ -14,7 +14,7 @@ import export_case as case
 from expdesign.errors import InputError, NoPlan
 from expdesign.export import PlannedTrack, Route, build_route
 from expdesign.export.routes import read_plan
-from expdesign.export.routes.fence import build_fence, fence_polygon
+from expdesign.export.routes.route import build_fence, fence_polygon
 from expdesign.plan.values import Leg
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from expdesign.export import words
 from expdesign.export.files import Known
 from expdesign.export.report.parameters import known_sentences
-from expdesign.export.whatif_page import Case, WhatIfContent
-from expdesign.export.whatif_page.content import explanations
+from expdesign.export.whatif_content import Case, WhatIfContent, explanations
 from expdesign.export.words import MINUS, NB
 from expdesign.sea_area import LocalFrame
 from expdesign.simulation import CALM

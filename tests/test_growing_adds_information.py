@@ -12,8 +12,7 @@ from expdesign.dictionary.build import excite_many
 from expdesign.durations import bordered, build_durations, solve_durations
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing.loop import grow_dictionary, motion_limits, optimum, sensitivity
-from expdesign.growing.search import Measure, Worth, pool_of, refined, violation
-from expdesign.growing.space import GrowSettings, Growth, family_spaces
+from expdesign.growing.search import GrowSettings, Growth, Measure, Worth, family_spaces, pool_of, refined, violation
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
 from expdesign.information.many import bordered_runs
 from expdesign.simulation import CALM, Environment

@@ -8,8 +8,8 @@ from lxml import html
 
 from expdesign.errors import InputError
 from expdesign.export import words
-from expdesign.export.indices_form import Held, IndicesContent, indices_html
-from expdesign.export.indices_form.page import condition_rows, form_lines, ship_rows
+from expdesign.export.indices_form import Held, IndicesContent
+from expdesign.export.indices_page import condition_rows, form_lines, indices_html, ship_rows
 from expdesign.indices import Circle, criteria, standard_results
 from expdesign.vessel import Vessel
 from nomoto_ship import nomoto_ship

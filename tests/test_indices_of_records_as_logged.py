@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.export.indices_form import IndicesContent, indices_html
+from expdesign.export.indices_form import IndicesContent
+from expdesign.export.indices_page import indices_html
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag, criteria, judge, measured_trial, standard_results
 from expdesign.indices.criteria import Verdict
 from expdesign.records import load_records

@@ -8,8 +8,8 @@ import pytest
 
 from expdesign.durations import bordered_moments
 from expdesign.information import moments, regressor_rows
+from expdesign.information.disturbed import beside_current, bordered_by_current, current_rows
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.information.unknown_current import beside_current, bordered_by_current, current_rows
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, delivered, simulate

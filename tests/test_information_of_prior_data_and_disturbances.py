@@ -13,7 +13,7 @@ from expdesign.estimation.methods import method_named
 from expdesign.estimation.regression import build_layout, model_for
 from expdesign.indices import outcomes
 from expdesign.information import score_primitives
-from expdesign.information.augmented import score_augmented
+from expdesign.information.disturbed import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.recorded import pooled, recorded_information
 from expdesign.signals import Batch, Record

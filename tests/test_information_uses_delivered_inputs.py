@@ -15,7 +15,7 @@ import pytest
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.durations import bordered
 from expdesign.information import score_primitives
-from expdesign.information.augmented import score_augmented
+from expdesign.information.disturbed import score_augmented
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.information.many import bordered_runs
 from expdesign.information.recorded import recorded_information

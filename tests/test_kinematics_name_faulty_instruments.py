@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from expdesign.errors import FileError
-from expdesign.kinematics.check import _disagreements
+from expdesign.kinematics.check import _disagreements, faster_than_stated
 from expdesign.kinematics.instruments import Finding, log_against_positions
-from expdesign.kinematics.steering import faster_than_stated
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record

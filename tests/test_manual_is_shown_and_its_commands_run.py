@@ -10,7 +10,7 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.workflows import explain
-from expdesign.workflows.explanations.explain import MANUAL, page
+from expdesign.workflows.commands.explain import MANUAL, page
 
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "expdesign" / "manual"

@@ -39,7 +39,7 @@ from expdesign.monitoring.noise import whitened
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
-from expdesign.workflows.data.diagnose import with_alarms
+from expdesign.workflows.commands.diagnose import with_alarms
 from sea_case import CALM, CASES, HOUR, OTHER_SEAS, Sea, Ship, sailed, vessel_file, written
 
 PUSHED = Sea(pushed_s=5.0)

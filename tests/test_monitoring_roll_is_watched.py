@@ -11,7 +11,7 @@ from expdesign.monitoring import RollWatch, restored_roll, roll_learnt, roll_wat
 from expdesign.roll import Run
 from expdesign.vessel import NOMINAL, Load
 from expdesign.workflows import monitor
-from expdesign.workflows.data.watching import DAY
+from expdesign.workflows.steps.watching import DAY
 from rolling_ship import HIGH, ROLL_MODEL, loaded, measured, roll_model, trial, write_csv
 
 SHIP = roll_model()

@@ -12,7 +12,7 @@ from expdesign.cli import main
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
-from expdesign.workflows.planning.new import KINDS
+from expdesign.workflows.commands.new import KINDS
 from expdesign.workflows.steps.first_trial import (
     ABLE,
     DRAWN,
@@ -158,7 +158,7 @@ def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Pat
     """Runs are cut to the time that most ships stay near; other ships, drawn anew, do as well."""
     from expdesign.dictionary import build_primitive
     from expdesign.plan.runs import dispersion_m
-    from expdesign.vessel.hull import covering_discs
+    from expdesign.vessel.vessel import covering_discs
 
     case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
     assert not is_wide(case.vessel.model)

@@ -15,7 +15,7 @@ from expdesign.particulars.hull import derivatives, factors, ittc_57, masses, mo
 from expdesign.particulars.model import parameters, vessel_of
 from expdesign.particulars.trials import Fleet
 from expdesign.vessel import SCALAR
-from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.structures import parse_expression
 
 NONE = np.zeros(len(FACTORS))
 KVLCC2 = Hull(length_m=320.0, beam_m=58.0, draught_m=20.8, mass_kg=312600e3 * 1.025, gravity_forward_m=11.2)

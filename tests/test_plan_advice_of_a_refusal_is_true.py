@@ -15,19 +15,17 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, checked, replanning, solve
+from expdesign.plan import PlanSettings, checked, remedies, remedy_changes, solve
 from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
-from expdesign.plan.legs.escape_check import check_ends
+from expdesign.plan.legs.water import check_ends
 from expdesign.plan.local_planner import local_planner
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.remedies import advice, advised, changes
-from expdesign.plan.remedies.advice import REMEDY_WORK
+from expdesign.plan.remedies import REMEDY_WORK, REPLANS, advised
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
-from expdesign.plan.tuning import PLAN
 from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
@@ -229,17 +227,17 @@ def test_the_forecast_named_where_most_trials_are_aborted_is_one_with_which_the_
 
 def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch, story):
     whole = in_current(story, 1.4)
-    monkeypatch.setattr(advice, "first_sailed", lambda other, budget: ())
+    monkeypatch.setattr(remedies, "first_sailed", lambda other, budget: ())
     refused = {"what": "risk", "which": "deceleration"}
 
-    monkeypatch.setattr(advice, "accepted", lambda other, budget: other.repeats["deceleration"] == 0)
+    monkeypatch.setattr(remedies, "accepted", lambda other, budget: other.repeats["deceleration"] == 0)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == 'too risky; with design.excluded = ["deceleration"] drawn trials accept the plan'
-    monkeypatch.setattr(advice, "accepted", lambda other, budget: other.environment.current_std_mps < 1.0)
+    monkeypatch.setattr(remedies, "accepted", lambda other, budget: other.environment.current_std_mps < 1.0)
     forecast = "environment.current_to.std_mps = 0.7 (a better forecast)"
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f"too risky; with {forecast} drawn trials accept the plan"
-    monkeypatch.setattr(advice, "accepted", lambda other, budget: False)
+    monkeypatch.setattr(remedies, "accepted", lambda other, budget: False)
     text = str(advised(whole, NoPlan("too risky", **refused)))
     assert text == f'too risky; no single change of those tried helps ({forecast}, design.excluded = ["deceleration"])'
     known = in_current(story, 0.0)
@@ -269,16 +267,16 @@ def made(monkeypatch):
         budget.spent_s += PLAN_S
         return (), ()
 
-    monkeypatch.setattr(advice, "first_sailed", first)
-    monkeypatch.setattr(advice, "promising", lambda other, water, sailed, budget: False)
-    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: False)
+    monkeypatch.setattr(remedies, "first_sailed", first)
+    monkeypatch.setattr(remedies, "promising", lambda other, water, sailed, budget: False)
+    monkeypatch.setattr(remedies, "accepted", lambda other, *_, budget: False)
     return planned
 
 
 @pytest.mark.parametrize("helps", [True, False])
 def test_a_lower_confidence_is_named_if_a_plan_made_with_it_is_accepted(monkeypatch, story, made, helps):
     case = in_current(story, 1.4)
-    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: helps and other.settings.confidence == 0.8)
+    monkeypatch.setattr(remedies, "accepted", lambda other, *_, budget: helps and other.settings.confidence == 0.8)
     text = str(advised(case, too_risky(case, 3)))
     assert [other.settings.confidence for other in made] == [0.8]
     assert ("with plan.confidence = 0.8 drawn trials accept the plan" in text) == helps
@@ -293,7 +291,7 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
         judged.append((other.environment.current_std_mps, water.environment is other.environment))
         return False
 
-    monkeypatch.setattr(advice, "promising", likely)
+    monkeypatch.setattr(remedies, "promising", likely)
     text = str(advised(case, too_risky(case, 1)))
     assert judged == [(0.7, True)]
     assert [other.environment.current_std_mps for other in made] == [1.4] * len(made)
@@ -303,12 +301,12 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
 @pytest.mark.parametrize("plans", [1, 2, 3])
 def test_a_refusal_makes_no_more_plans_than_a_trial_may_take_and_says_each_before(monkeypatch, story, plans):
     case, told, said = in_current(story, 1.4), [], []
-    monkeypatch.setattr(advice, "first_sailed", lambda other, budget: said.append(told[-1]) or ((), ()))
-    monkeypatch.setattr(advice, "promising", lambda other, water, sailed, budget: True)
-    monkeypatch.setattr(advice, "accepted", lambda other, *_, budget: False)
+    monkeypatch.setattr(remedies, "first_sailed", lambda other, budget: said.append(told[-1]) or ((), ()))
+    monkeypatch.setattr(remedies, "promising", lambda other, water, sailed, budget: True)
+    monkeypatch.setattr(remedies, "accepted", lambda other, *_, budget: False)
     advised(case, too_risky(case, plans), lambda activity, share: told.append(activity))
     assert "too risky" in told[0]
-    assert 1 <= len(said) <= max(1, PLAN.replans + 1 - plans)
+    assert 1 <= len(said) <= max(1, REPLANS + 1 - plans)
     assert "std_mps = 0.7" in said[0]
     assert len(set(said)) == len(said)
 
@@ -323,7 +321,7 @@ def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(mon
         budget.spent_s += spent * PLAN_S
         return False
 
-    monkeypatch.setattr(advice, "promising", likely)
+    monkeypatch.setattr(remedies, "promising", likely)
     text = str(advised(case, refused))
     fits = 1.0 + spent <= REMEDY_WORK
     assert len(made) == fits
@@ -331,7 +329,7 @@ def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(mon
 
 
 def test_no_design_is_made_without_a_run_where_the_rest_of_the_refused_plan_fails_too(monkeypatch, story, made):
-    monkeypatch.setattr(changes, "solve_durations", lambda task: pytest.fail("a design is made"))
+    monkeypatch.setattr(remedy_changes, "solve_durations", lambda task: pytest.fail("a design is made"))
     case = in_current(story, 0.0)
     refused = too_risky(case, 1, elsewhere=False)
     refused.confidence = None
@@ -366,12 +364,12 @@ def refused(number: int, left: float) -> SimpleNamespace:
 def test_words_mark_and_track_of_a_refusal_are_of_one_plan() -> None:
     made = [refused(1, 0.9), refused(2, 0.7), refused(3, 0.8)]
     problem = SimpleNamespace(settings=SimpleNamespace(confidence=0.95))
-    error = replanning.too_risky(problem, None, made)
+    error = solve.too_risky(problem, None, made)
     assert "plan 2 fails near 2" in error.obstacle
     assert error.place == (2.0, 2.0)
     assert error.which == "run 2"
     assert (error.poses == 2.0).all()
-    again = replanning.not_again(NoPlan("no path"), made[:1])
+    again = solve.not_again(NoPlan("no path"), made[:1])
     assert "plan 1 fails near 1" in again.obstacle
     assert again.place == (1.0, 1.0)
     assert (again.poses == 1.0).all()

@@ -13,7 +13,7 @@ from expdesign.plan import PlanSettings
 from expdesign.plan.bounds.displacement import Displacement, Headway, displacement_of, exit_motion
 from expdesign.plan.bounds.repositioning import _grown, least_losses, reposition_bound_s, time_to_sail_s
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask
 from expdesign.plan.legs.water import leg_speed_mps, through_water
 from expdesign.plan.values import UnderWay

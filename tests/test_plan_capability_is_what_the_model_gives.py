@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from expdesign.errors import NoPlan
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_scenario, load_vessel
 from expdesign.vessel import STRUCTURES
@@ -15,7 +15,7 @@ from expdesign.workflows.steps.planned import leg_remarks
 from plan_case import VESSELS, ship
 
 SCENARIOS = VESSELS.parent
-capability_module = importlib.import_module("expdesign.plan.control.capability")
+capability_module = importlib.import_module("expdesign.plan.control.ships")
 
 
 def test_top_speed_is_the_steady_speed_at_full_thrust():

@@ -9,16 +9,14 @@ import pytest
 import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.monte_carlo.procedure import steady_states
 from expdesign.plan.monte_carlo.return_paths import build_return_paths
-from expdesign.plan.monte_carlo.risk import upper_limit
-from expdesign.plan.monte_carlo.trials import CollisionCheck
-from expdesign.plan.runs.dispersion import draw_truths
-from expdesign.plan.runs.ensemble import FEW_SHIPS, Fleet, Truths
+from expdesign.plan.monte_carlo.risk import CollisionCheck, upper_limit
+from expdesign.plan.runs import FEW_SHIPS, Fleet, Truths, draw_truths
 from expdesign.plan.values import PlanSettings
-from expdesign.plan.verify.checks import hull_clearance
+from expdesign.plan.verify import hull_clearance
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, Variation, simulate
 from expdesign.vessel import IDEAL, Response

@@ -11,9 +11,9 @@ import shapely
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegWater
-from expdesign.plan.legs.escape_check import check_ends, escapes
+from expdesign.plan.legs.water import check_ends, escapes
 from expdesign.plan.local_planner import local_planner
 from expdesign.simulation import CALM
 from helm_case import catamaran

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from expdesign.vessel.hull import covering_discs, disc_points, hull_polygons, swept_area, thinned_poses
+from expdesign.vessel.vessel import covering_discs, disc_points, hull_polygons, swept_area, thinned_poses
 
 HULL = np.array([[15.0, 4.5], [-15.0, 4.5], [-15.0, -4.5], [15.0, -4.5]])
 

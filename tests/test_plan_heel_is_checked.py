@@ -11,7 +11,7 @@ from design_case import SCENARIOS
 from expdesign.errors import NoPlan
 from expdesign.export import vessel_toml
 from expdesign.plan.values import Leg, SailedTrial
-from expdesign.plan.verify.checks import verify_plan
+from expdesign.plan.verify import verify_plan
 from expdesign.scenario import load_vessel
 from expdesign.signals import AUXILIARY
 from expdesign.simulation import CALM, simulate

@@ -6,9 +6,8 @@ import pytest
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control import Helmsman, capability
 from expdesign.plan.control.ships import HELM_RUN_UP_HULLS
-from expdesign.plan.monte_carlo.procedure import YAW_RATE_SHARE
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
-from expdesign.plan.runs.ensemble import Fleet, Truths
+from expdesign.plan.monte_carlo.procedure import HEADING_RAD, YAW_RATE_SHARE
+from expdesign.plan.runs import Fleet, Truths
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
@@ -35,7 +34,7 @@ def test_a_ship_beside_the_track_is_steady_on_it_when_the_run_begins(side):
         desired = np.column_stack([before[:, :1], 0 * before[:, :2], np.full((count, 1), speed), 0 * before[:, :2]])
         fleet.advance(helm.commands(desired, before, fleet.given, unexplained=unexplained))
         unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
-    assert np.abs(wrap_angle(fleet.states[:, 2])).max() < MONTE_CARLO.heading_rad
+    assert np.abs(wrap_angle(fleet.states[:, 2])).max() < HEADING_RAD
     assert np.abs(fleet.states[:, 5]).max() < YAW_RATE_SHARE * water.ship.yaw_rate_radps
 
 
@@ -63,7 +62,7 @@ def test_a_ship_steered_by_azimuths_keeps_her_course_while_they_push_astern(azim
         astern += ship.approach.helm.drives(fleet.given)[0] < -0.1
     assert astern > 5  # it brakes
     assert fleet.states[0, 3] < 0.5 * speed
-    assert abs(wrap_angle(fleet.states[0, 2])) < MONTE_CARLO.heading_rad
+    assert abs(wrap_angle(fleet.states[0, 2])) < HEADING_RAD
 
 
 def test_engine_orders_are_read_from_commands(azimuths: Vessel) -> None:

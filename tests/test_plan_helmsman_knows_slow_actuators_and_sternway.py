@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.control.tracking import Helmsman
-from expdesign.plan.runs.ensemble import Fleet, Truths
+from expdesign.plan.runs import Fleet, Truths
 from expdesign.simulation import CALM
 from expdesign.vessel import Response, Vessel
 from helm_case import coaster, open_water

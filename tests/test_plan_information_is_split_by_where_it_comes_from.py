@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from expdesign.plan import Leg
-from expdesign.plan.verify.efficiency import realised_efficiencies
+from expdesign.plan.verify import realised_efficiencies
 from expdesign.signals import Trajectory
 from expdesign.simulation import CALM
 from export_case import design, plan, tug

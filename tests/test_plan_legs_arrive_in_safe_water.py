@@ -8,14 +8,14 @@ import shapely
 
 from expdesign.plan import PlanSettings
 from expdesign.plan.chart.clearance_grid import clearance_field
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask, LegWater, _ompl, agile, agile_leg, dubins
 from expdesign.plan.legs._ompl import SEARCH_BATCHES, dubins_curve, search_dubins
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.water import nearest_turns
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
-from expdesign.vessel.hull import swept_area
+from expdesign.vessel.vessel import swept_area
 from plan_case import VESSELS, area, at_rest, find_leg, leg_water
 
 OPEN = shapely.box(-1500, -1500, 1500, 1500)

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.legs import LegTask
-from expdesign.plan.verify.tuning import TUNING as VERIFY
+from expdesign.plan.verify import FINE_SUBSTEPS
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, delivered_at_samples, simulate
 from expdesign.vessel import Response
@@ -75,6 +75,6 @@ def test_a_dead_time_of_no_whole_sample_leaves_the_track_as_its_verification_fin
     values = np.vstack([np.zeros((1, 4)), jumps])
     track = water.sail(np.zeros(6), values, values[:1])
     commands = Commands(sample_time_s=1.0, names=water.vessel.model.inputs, values=values)
-    again = simulate(water.vessel, commands, environment=CALM, substeps=VERIFY.fine_substeps)
+    again = simulate(water.vessel, commands, environment=CALM, substeps=FINE_SUBSTEPS)
     off_m = np.hypot(*(again.pose - track.pose)[:, :2].T).max()
     assert off_m < 1e-3

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from expdesign.plan.control import CONTROL
+from expdesign.plan.control import APPROACH_HULLS
 from expdesign.plan.legs import LegTask
 from expdesign.plan.legs.helm import _shortest_first, displaced, recover
 from expdesign.signals import Commands
@@ -129,14 +129,11 @@ def test_a_long_leg_is_steady_ahead_in_between_and_hardly_longer_than_its_path(s
 def test_a_run_begins_after_a_steady_run_up_with_its_own_commands(ship):
     water, task, values = sailed(ship, "after a turn")
     track = water.sail(task.start, values, task.past)
-    count = int(np.ceil(CONTROL.approach_hulls * water.vessel.length_m / task.end[3] / water.vessel.sample_time_s))
+    count = int(np.ceil(APPROACH_HULLS * water.vessel.length_m / task.end[3] / water.vessel.sample_time_s))
     np.testing.assert_allclose(values[-count:], np.tile(task.end_inputs, (count, 1)), atol=1e-6)
     steady = track.velocity[-count - 1 :]
     np.testing.assert_allclose(steady, np.tile(task.end[3:], (count + 1, 1)), atol=2e-3 * task.end[3])
-    assert (
-        np.hypot(*(track.pose[-1] - track.pose[-count - 1])[:2])
-        >= 0.99 * CONTROL.approach_hulls * water.vessel.length_m
-    )
+    assert np.hypot(*(track.pose[-1] - track.pose[-count - 1])[:2]) >= 0.99 * APPROACH_HULLS * water.vessel.length_m
 
 
 @ONE

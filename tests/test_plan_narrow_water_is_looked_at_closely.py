@@ -16,7 +16,7 @@ from expdesign.plan.feasibility import place_of
 from expdesign.plan.problem import PlanProblem
 from expdesign.progress import silent
 from expdesign.simulation import CALM
-from expdesign.vessel.hull import covering_discs
+from expdesign.vessel.vessel import covering_discs
 from plan_case import acceleration, area, ship
 
 CLEARANCE_M = 20.0

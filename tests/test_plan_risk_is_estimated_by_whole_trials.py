@@ -14,15 +14,13 @@ import shapely
 from expdesign import workflows
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.legs import LegTask
-from expdesign.plan.monte_carlo import guidance, trials
+from expdesign.plan.monte_carlo import guidance
+from expdesign.plan.monte_carlo import risk as monte_carlo_risk
 from expdesign.plan.monte_carlo.guidance import ARRIVED_HULLS, GO_AROUNDS, PARALLEL_SHARE, STANDSTILL_SHARE, Guidance
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, tolerances
-from expdesign.plan.monte_carlo.risk import estimate_risk, failed_chance_constraint
-from expdesign.plan.monte_carlo.trials import CollisionCheck, Trials, sail_trials
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
-from expdesign.plan.runs.dispersion import Truths, draw_truths
-from expdesign.plan.runs.ensemble import Fleet
-from expdesign.plan.timeline import Timeline
+from expdesign.plan.monte_carlo.risk import CollisionCheck, Trials, estimate_risk, failed_chance_constraint, sail_trials
+from expdesign.plan.runs import Fleet, Truths, draw_truths
+from expdesign.plan.sailing import Timeline
 from expdesign.plan.values import Leg
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
@@ -89,8 +87,8 @@ def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_o
         at_once.append(draws)
         return draw_truths(vessel, environment, draws, rng)
 
-    monkeypatch.setattr(trials, "MONTE_CARLO", replace(MONTE_CARLO, trials_at_once=10))
-    monkeypatch.setattr(trials, "draw_truths", drawn)
+    monkeypatch.setattr(monte_carlo_risk, "TRIALS_AT_ONCE", 10)
+    monkeypatch.setattr(monte_carlo_risk, "draw_truths", drawn)
     _, parted = sailing(draws=25)
     assert at_once == [10, 10, 5]
     assert parted.used.shape == (len(planned().legs), 25)

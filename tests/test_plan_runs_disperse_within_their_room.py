@@ -7,15 +7,14 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan.control.capability import capability
+from expdesign.plan.control.ships import capability
 from expdesign.plan.control.tracking import Helmsman
 from expdesign.plan.monte_carlo.guidance import open_loop
-from expdesign.plan.monte_carlo.trials import CollisionCheck
-from expdesign.plan.runs.dispersion import dispersion_m, draw_truths
-from expdesign.plan.runs.ensemble import Fleet
+from expdesign.plan.monte_carlo.risk import CollisionCheck
+from expdesign.plan.runs import Fleet, dispersion_m, draw_truths
 from expdesign.plan.values import PlanSettings
 from expdesign.simulation import CALM, Environment, Variation
-from expdesign.vessel.hull import covering_discs
+from expdesign.vessel.vessel import covering_discs
 from plan_case import area, primitive, ship
 
 CENTRES = covering_discs(30.0, 9.0)[0]

@@ -13,8 +13,8 @@ from scipy.optimize import fsolve
 from expdesign.errors import NoPlan
 from expdesign.plan import PlanSettings
 from expdesign.plan.control import AgileShip, HelmShip
-from expdesign.plan.control.capability import capability, needs_helm
 from expdesign.plan.control.helm_capability import LATERAL_MPS2, steady_turns
+from expdesign.plan.control.ships import capability, needs_helm
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Conduct, simulate, steady_ahead, stopping, turning_circle

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.values import Leg, SailedTrial
-from expdesign.plan.verify.checks import hull_clearance, verify_plan
+from expdesign.plan.verify import hull_clearance, verify_plan
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, simulate
 from plan_case import area, primitive, ship

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ import shapely
 from expdesign.plan.chart import visibility_graph
 from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.goal_distance import build_goal_distance, first_bends, shortest_path_tree, taut_bends
-from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import (
     VisibilityGraph,
     build_visibility_graph,
@@ -143,7 +141,7 @@ def test_few_lines_of_sight_are_tested_for_each_cell(monkeypatch):
 def test_corners_tested_in_parts_give_the_graph_of_all_at_once(monkeypatch):
     water = rocks(3)
     whole = build_visibility_graph(water)
-    monkeypatch.setattr(visibility_graph, "CHART", replace(CHART, pairs=len(whole.corners) ** 2 // 7))
+    monkeypatch.setattr(visibility_graph, "PAIRS", len(whole.corners) ** 2 // 7)
     parts = build_visibility_graph(water)
     assert whole.lengths.nnz > len(whole.corners)
     assert (whole.lengths != parts.lengths).nnz == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.processes import as_finished, local_processes, reported_together
-from expdesign.processes.reporting import _elapsed
+from expdesign.processes.sharing import _elapsed
 
 STEPS = 4
 

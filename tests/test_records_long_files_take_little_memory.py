@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tracemalloc
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 from expdesign.errors import FileError
 from expdesign.records.file import cells, read_table
-from expdesign.records.tuning import TUNING
+from expdesign.records.file.cells import BLOCK_ROWS, READ_BYTES
 
 HEADER = "time_s,u_mps,v_mps,r_radps,n1_rps,a1_rad"
 
@@ -32,15 +31,16 @@ def test_memory_is_a_few_times_that_of_the_numbers(tmp_path: Path) -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     numbers = sum(values.nbytes for values in table.columns.values())
-    block = TUNING.block_rows * 6 * 100  # a text of few letters takes less than 100 bytes
-    assert peak < 3 * numbers + 2 * block + 2 * TUNING.read_bytes
+    block = BLOCK_ROWS * 6 * 100  # a text of few letters takes less than 100 bytes
+    assert peak < 3 * numbers + 2 * block + 2 * READ_BYTES
 
 
 @pytest.mark.parametrize("block_rows", [1, 2, 7, 100])
 def test_the_size_of_blocks_changes_no_number(block_rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path / "some.csv", rows(50), end="\n\n\n")
     whole = read_table(path, inputs=None)
-    monkeypatch.setattr(cells, "TUNING", replace(TUNING, block_rows=block_rows, read_bytes=block_rows))
+    monkeypatch.setattr(cells, "BLOCK_ROWS", block_rows)
+    monkeypatch.setattr(cells, "READ_BYTES", block_rows)
     parts = read_table(path, inputs=None)
     assert all(np.array_equal(parts.columns[name], whole.columns[name]) for name in whole.columns)
 
@@ -65,7 +65,7 @@ def test_errors_are_the_same_wherever_blocks_end(
     lines = rows(50)
     for row, line in changed.items():
         lines[row - 2] = line
-    monkeypatch.setattr(cells, "TUNING", replace(TUNING, block_rows=block_rows))
+    monkeypatch.setattr(cells, "BLOCK_ROWS", block_rows)
     with pytest.raises(FileError) as caught:
         read_table(written(tmp_path / "broken.csv", lines), inputs=None)
     assert message in str(caught.value)
@@ -78,6 +78,6 @@ def test_the_first_byte_that_is_no_text_is_found_wherever_it_is_read(
 ) -> None:
     content = written(tmp_path / "bytes.csv", rows(10)).read_bytes()
     (tmp_path / "bytes.csv").write_bytes("\N{EURO SIGN}".encode() + content[:place] + byte + content[place:])
-    monkeypatch.setattr(cells, "TUNING", replace(TUNING, read_bytes=read_bytes))
+    monkeypatch.setattr(cells, "READ_BYTES", read_bytes)
     with pytest.raises(FileError, match=rf"is not UTF-8 text \(byte 0x{byte[0]:02x} at offset {place + 3}\)"):
         read_table(tmp_path / "bytes.csv", inputs=None)

@@ -18,8 +18,8 @@ from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import CALM, Environment, deliver, measure, simulate, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import SCALAR, SENSORS, Mounting, Response, Sensors, Vessel, response_values, std_keys
-from expdesign.vessel.expressions import parse_expression
 from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.structures import parse_expression
 from measured_trials import tug_commands
 
 WIND = Environment(wind_to=np.array([4.0, -3.0]))

@@ -177,7 +177,8 @@ def test_headings_of_any_consecutive_runs_are_spread_evenly():
 
 
 def test_any_number_of_processes_and_any_interruption_give_the_same(monkeypatch):
-    monkeypatch.setattr(validation, "TUNING", replace(validation.TUNING, chunk_trials=3, single_trials=2))
+    monkeypatch.setattr(validation, "CHUNK_TRIALS", 3)
+    monkeypatch.setattr(validation, "SINGLE_TRIALS", 2)
     rehearsal = Rehearsal(
         truth=QUIET,
         nominal=NOMINAL,

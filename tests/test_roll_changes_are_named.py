@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from expdesign.errors import NotInformative
-from expdesign.export.diagnosis_page import RollVerdict, roll_sentences
-from expdesign.export.diagnosis_page.results import with_roll
+from expdesign.export.diagnosis_results import RollVerdict, roll_sentences, with_roll
 from expdesign.roll.record import RollJudgement, judge_roll
 from expdesign.scenario import load_vessel
 from expdesign.vessel import NOMINAL, Load, RollPendulum

@@ -1,6 +1,5 @@
 """Runs that find no place do not end the search for the shortest day: others are tried."""
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -51,7 +50,7 @@ def test_where_no_day_has_a_plan_the_last_refusal_is_told(asked, monkeypatch):
         raise NoPlan("no place for a run")
 
     monkeypatch.setattr(drafting, "draft_trial", refuse)
-    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=2))
+    monkeypatch.setattr(alternate, "ROUNDS", 2)
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(*asked)
 
@@ -87,7 +86,7 @@ def test_a_run_without_any_place_is_not_chosen_again_and_costs_no_day(asked, mon
         raise error
 
     monkeypatch.setattr(drafting, "draft_trial", refuse)
-    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
+    monkeypatch.setattr(alternate, "ROUNDS", rounds)
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)
     assert len(tried) == 2 + rounds
@@ -107,7 +106,7 @@ def test_a_run_that_cannot_be_sailed_is_not_chosen_again(asked, monkeypatch, wha
         raise NoPlan("a run cannot be sailed", what=what, which=min(tried[-1]))
 
     monkeypatch.setattr(drafting, "draft_trial", refuse)
-    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=rounds))
+    monkeypatch.setattr(alternate, "ROUNDS", rounds)
     with pytest.raises(NoPlan, match="no place for a run"):
         shortest_day(problem, accuracy)
     assert len(tried) == 1 + rounds - costs

@@ -17,7 +17,7 @@ from expdesign.shortest_day.bounds.motions import AFFINE, over_boxes
 from expdesign.signals import Commands
 from expdesign.simulation import simulate
 from expdesign.vessel import NUMPY, Limit, Term, VesselModel
-from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.structures import parse_expression
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import plan_problem
 from expdesign.workflows.steps.scored import scored

@@ -1,6 +1,5 @@
 """A day of a given length is kept to, tells as much as prices allow, and is refused where the way alone is longer."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +31,7 @@ def asked():
 
 def test_the_plan_is_no_longer_and_tells_what_it_says(asked, monkeypatch):
     problem, accuracy = asked
-    monkeypatch.setattr(alternate, "TUNING", replace(alternate.TUNING, rounds=1))
+    monkeypatch.setattr(alternate, "ROUNDS", 1)
     found = fullest_day(problem, accuracy, DAY_S)
     assert found.plan.verification.passed
     assert found.plan.commands.duration_s <= DAY_S

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from expdesign.simulation.tape import evaluation
+from expdesign.simulation.program import evaluation
 from expdesign.vessel import NUMPY
-from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.structures import parse_expression
 
 SIGNALS = ("u", "v", "r", "n1", "a1")
 TEXTS = ("u*abs(u)", "v*r - 2*u", "abs(n1)*n1*cos(a1)", "abs(n1)*n1*sin(a1)", "-u*abs(u)*v", "1 - 3", "u", "1*v + 0")

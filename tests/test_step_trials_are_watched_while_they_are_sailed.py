@@ -16,7 +16,7 @@ from expdesign.monitoring import saved
 from expdesign.records import read_levels
 from expdesign.step_trials import controls_of, levels_of
 from expdesign.step_trials.live import Row, State, after_row, beginning, restored_state, step_list
-from expdesign.workflows.data.step_list import listed_steps
+from expdesign.workflows.steps.step_list import listed_steps
 from export_case import plan, plan_files
 from live_case import SHORT, Crew, list_csv, plateau_of, rows_csv, watch_setup
 from step_case import GUESS, INPUTS

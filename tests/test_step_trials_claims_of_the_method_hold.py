@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from expdesign.export.step_trial_page.content import SIGNIFICANT
+from expdesign.export.step_trial_content import SIGNIFICANT
 from expdesign.step_trials.holds import Hold
 from expdesign.step_trials.regression import Sampled, ridge
 from expdesign.step_trials.responses import Transient, first_order, fit_first_order

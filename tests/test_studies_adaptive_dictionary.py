@@ -5,7 +5,7 @@ import pytest
 
 from adaptive import Comparison, compare, comparison_table, growth_table, minutes_for_the_same
 from adaptive_monte_carlo import sample_counts, simulate_trials
-from expdesign.growing.space import GrowSettings
+from expdesign.growing.search import GrowSettings
 
 
 @pytest.fixture(scope="module")

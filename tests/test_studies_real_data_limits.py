@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess, check_run, decomposed, sentence
-from expdesign.assessment.misfit import Limits, RunCheck
-from expdesign.assessment.tuning import TUNING
+from expdesign.assessment.misfit import AHEAD_S, Limits, RunCheck
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration
 from expdesign.signals import Batch, Record
@@ -120,7 +119,7 @@ def test_the_misfit_that_a_wrong_parameter_makes_is_the_one_to_be_expected_of_it
 def test_without_misfit_prediction_ahead_is_exact() -> None:
     limits, _ = judged(driven())
     assert limits.ahead_share == pytest.approx(np.zeros(3), abs=1e-6)
-    assert TUNING.ahead_s > 0
+    assert AHEAD_S > 0
 
 
 @pytest.mark.outside

@@ -14,7 +14,7 @@ from expdesign.errors import Unreachable
 from expdesign.scenario import load_vessel
 from expdesign.vessel import VesselModel, by_force, commands_for, pushed_everywhere, required_push
 from expdesign.vessel.thrusts import required_thrust, thrusts
-from expdesign.workflows.planning.new import KINDS
+from expdesign.workflows.commands.new import KINDS
 
 TEMPLATES = Path(__file__).parents[1] / "expdesign" / "templates"
 SHIPS = {kind: load_vessel(TEMPLATES / kind / "vessel.toml") for kind in KINDS}

@@ -8,7 +8,7 @@ import pytest
 from design_case import one_line
 from expdesign.errors import InputError
 from expdesign.vessel import NUMPY, SCALAR
-from expdesign.vessel.expressions import parse_expression
+from expdesign.vessel.structures import parse_expression
 
 SIGNALS = ("u", "v", "r", "n1", "rudder1")
 VALUES = {"u": 1.5, "v": -0.25, "r": 0.125, "n1": -3.0, "rudder1": 0.3}

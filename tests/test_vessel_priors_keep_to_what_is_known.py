@@ -11,7 +11,7 @@ import scipy
 from design_case import spec
 from expdesign.dictionary import build_primitive
 from expdesign.errors import InputError
-from expdesign.plan.runs.dispersion import dispersion_m
+from expdesign.plan.runs import dispersion_m
 from expdesign.scenario import load_vessel
 from expdesign.simulation import CALM
 from expdesign.vessel import VesselModel

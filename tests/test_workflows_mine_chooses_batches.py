@@ -16,7 +16,7 @@ from expdesign.information.recorded import BatchInformation, recorded_informatio
 from expdesign.records import load_records
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, simulate_ensemble
-from expdesign.workflows.data.mine import in_pieces, mine
+from expdesign.workflows.commands.mine import in_pieces, mine
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -71,7 +71,7 @@ def watched(voyages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture
 def no_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that look at no page: drawing it takes longer than an hour's watch."""
-    monkeypatch.setattr("expdesign.workflows.data.monitor.document_html", lambda document: "")
+    monkeypatch.setattr("expdesign.workflows.commands.monitor.document_html", lambda document: "")
 
 
 def told_in(folder: Path) -> dict[str, object]:
@@ -207,7 +207,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("expdesign.processes.sharing.ALONE_S", 0.0)
-    monkeypatch.setattr("expdesign.workflows.data.monitor.MOST_ROWS", 1200)
+    monkeypatch.setattr("expdesign.workflows.commands.monitor.MOST_ROWS", 1200)
     words = [voyages["changed"], "--reference", voyages["reference"]]
     table = [monitored(tmp_path / f"{jobs}", *words, "--jobs", jobs) for jobs in (1, 2)]
     assert table[0] == table[1]

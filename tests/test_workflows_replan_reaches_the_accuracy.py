@@ -10,11 +10,11 @@ import pytest
 
 from expdesign.errors import InputError
 from expdesign.shortest_day import AccuracySettings, stated_accuracy
+from expdesign.workflows.commands.replan import _stated_before
 from expdesign.workflows.steps import day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.present import PresentState, _left, present_state, rest_of
 from expdesign.workflows.steps.scored import scored
-from expdesign.workflows.trials.replan import _stated_before
 from replan_case import SAMPLES, STORY, measured
 
 

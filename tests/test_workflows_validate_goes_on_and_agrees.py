@@ -13,7 +13,7 @@ from expdesign.estimation.methods import method_named
 from expdesign.export import words
 from expdesign.rehearsal.validation import Rehearsal
 from expdesign.scenario import load_scenario
-from expdesign.workflows.trials.validate import _identity, _method
+from expdesign.workflows.commands.validate import _identity, _method
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 MODEL_SHIP, TRUE = SCENARIOS / "model-ship.toml", SCENARIOS / "vessels" / "model-ship-true.toml"

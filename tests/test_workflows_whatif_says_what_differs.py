@@ -9,7 +9,8 @@ from expdesign import workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
 from expdesign.export.pages import document_html
-from expdesign.export.whatif_page import Case, WhatIfContent, whatif_document
+from expdesign.export.whatif_content import Case, WhatIfContent
+from expdesign.export.whatif_page import whatif_document
 from expdesign.scenario import load_scenario, load_variant
 from scenario_files import write_scenario
 
@@ -118,8 +119,8 @@ def test_what_is_wrong_with_a_variant_is_said_before_anything_is_planned(tmp_pat
     def planned(*_, **__):
         raise AssertionError("a trial is planned")
 
-    monkeypatch.setattr("expdesign.workflows.planning.whatif.planned_day", planned)
-    monkeypatch.setattr("expdesign.workflows.planning.whatif.search_additions", planned)
+    monkeypatch.setattr("expdesign.workflows.commands.whatif.planned_day", planned)
+    monkeypatch.setattr("expdesign.workflows.commands.whatif.search_additions", planned)
     command = ["whatif", str(MODEL_SHIP), str(path), "--plan", "--jobs", "1", "--no-cache"]
     assert main([*command, "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]

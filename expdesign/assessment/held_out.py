@@ -2,7 +2,7 @@
 
 Runs are left out in turn, and every method estimates from the rest. They are left out whole: with half of a run in the
 estimate, its other half asks for no motion that the estimate has not seen. Only a run that is most of the data is cut.
-The model then predicts what was left out, over `Tuning.ahead_s` at a time, from measured velocities: free first states
+The model then predicts what was left out, over `AHEAD_S` at a time, from measured velocities: free first states
 would hide a useless model, and one simulation of a whole run tells more of the ship's stability than of the model. An
 error is over the standard deviation of the measured output; 1 is no better than a constant, and more counts as 1. Runs
 and outputs are joined by geometric means, in which no single one decides. Errors that differ by less than `SAME_ERROR`
@@ -10,7 +10,7 @@ of themselves count as equal. Of such methods the one goes first that noise in t
 instrumental variables, then output error, then least squares.
 
 Few runs tell methods apart badly: what is left of them is half of the data or less, and they differ among themselves.
-So output error over `Tuning.ahead_s`, which makes the very error least that decides, goes first unless another one is
+So output error over `AHEAD_S`, which makes the very error least that decides, goes first unless another one is
 better for certain: by an interval of 95 % over the runs, or by a factor of `FAR_WORSE`.
 
 Predictions of what was recorded do not show what a model does beyond it. A hull dissipates: driven no harder than in
@@ -31,8 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from expdesign.assessment.misfit import whole
-from expdesign.assessment.tuning import TUNING
+from expdesign.assessment.misfit import AHEAD_S, whole
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged, InputError, NoAnswer
 from expdesign.estimation.methods import Method
@@ -41,6 +40,8 @@ from expdesign.estimation.replay import Compiled, Integration, Stretches, build_
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
 from expdesign.vessel import Limit, Vessel, VesselModel
+
+LARGEST_ERROR = 1.0  # over the standard deviation of an output, that count
 
 SAME_ERROR = 0.02  # share of an error below which a difference of two does not count
 FAR_WORSE = 2.0  # times the least error, from which on one is worse for certain however few runs there are
@@ -110,7 +111,7 @@ def ranked(found: Sequence[HeldOut]) -> list[int]:
 
 
 def _minimises_what_decides(item: HeldOut) -> bool:
-    return item.unseen and item.method.solver == "oe" and item.horizon_s == TUNING.ahead_s
+    return item.unseen and item.method.solver == "oe" and item.horizon_s == AHEAD_S
 
 
 def _equal(item: HeldOut, best: HeldOut) -> bool:
@@ -143,7 +144,7 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
         return ""
     least, others = min(order, key=lambda item: item.share), [item for item in order if item is not own]
     data = "unseen runs" if own.unseen else "the runs it is from"
-    text = f"predicts {data} {TUNING.ahead_s:g} s ahead with an error of {_bounded(own.share)}"
+    text = f"predicts {data} {AHEAD_S:g} s ahead with an error of {_bounded(own.share)}"
     if own is least:
         text += f", {others[0].label} with {_bounded(others[0].share)}" if others else ""
     elif own is order[0] and least.bounded and _minimises_what_decides(own) and not _equal(own, least):
@@ -161,8 +162,8 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
 
 
 def _bounded(share: float) -> str:
-    """An error in per cent; beyond `Tuning.largest_error` it is not told."""
-    return f"{100 * share:.3g} %" if share < TUNING.largest_error else f"{100 * TUNING.largest_error:g} % or more"
+    """An error in per cent; beyond `LARGEST_ERROR` it is not told."""
+    return f"{100 * share:.3g} %" if share < LARGEST_ERROR else f"{100 * LARGEST_ERROR:g} % or more"
 
 
 def folds(record: Record) -> Iterator[tuple[Record, Record]]:
@@ -183,7 +184,7 @@ def folds(record: Record) -> Iterator[tuple[Record, Record]]:
 
 def _cut(batch: Batch, most: int) -> list[Batch]:
     """Pieces of equal length; two at least where more than one is asked for."""
-    lasts = int(len(batch) * batch.sample_time_s / TUNING.ahead_s)
+    lasts = int(len(batch) * batch.sample_time_s / AHEAD_S)
     count = max(min(most, lasts), min(most, 2))
     ends = [round(len(batch) * number / count) for number in range(count + 1)]
     return [batch.cut(slice(first, end)) for first, end in itertools.pairwise(ends)]
@@ -331,7 +332,7 @@ def _fastest(velocity: Array, length_m: float) -> float:
 
 
 class Ahead:
-    """Windows of `Tuning.ahead_s` of some runs, ready to be predicted by models of one structure.
+    """Windows of `AHEAD_S` of some runs, ready to be predicted by models of one structure.
 
     Args:
         model: the structure.
@@ -353,7 +354,7 @@ class Ahead:
             )
             if windy and batch.wind is not None:
                 drive = np.concatenate([drive, whole(batch.velocity[:, :2] - batch.wind)], axis=1)
-            length = min(len(batch), round(TUNING.ahead_s / batch.sample_time_s) + 1)
+            length = min(len(batch), round(AHEAD_S / batch.sample_time_s) + 1)
             for first in range(0, len(batch) - length + 1, max(1, length - 1)):
                 measured.append(states[first : first + length])
                 drives.append(drive[first : first + length])
@@ -383,7 +384,7 @@ class Ahead:
         return np.asarray(np.concatenate(pieces).std(axis=0))
 
     def shares(self, models: Sequence[VesselModel | None]) -> Array:
-        """(runs, n) errors over standard deviations, each run by a model of its own; at most `Tuning.largest_error`."""
+        """(runs, n) errors over standard deviations, each run by a model of its own; at most `LARGEST_ERROR`."""
         n, q = len(self._places), self._compiled.stretches.values
         values = np.zeros((len(models), q + n))
         for row, model in zip(values, models, strict=True):
@@ -396,8 +397,8 @@ class Ahead:
         np.add.at(total, self.owners, np.where(seen, squares, 0.0).sum(axis=0))
         np.add.at(number, self.owners, seen.sum(axis=0))
         errors = np.sqrt(total / number) / np.where(self._spread > 0, self._spread, np.nan)
-        bounded = np.clip(errors, SMALLEST_ERROR, TUNING.largest_error)
-        return np.where(np.isfinite(bounded) | (self._spread == 0), bounded, TUNING.largest_error)
+        bounded = np.clip(errors, SMALLEST_ERROR, LARGEST_ERROR)
+        return np.where(np.isfinite(bounded) | (self._spread == 0), bounded, LARGEST_ERROR)
 
 
 def _stacked(rows: Sequence[Array], length: int, fill: float | None) -> Array:

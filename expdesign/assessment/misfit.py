@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from expdesign.assessment.tuning import TUNING
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import Diverged
 from expdesign.estimation.methods import as_read, method_named
@@ -31,6 +30,8 @@ from expdesign.estimation.values import Estimate, fit_percent
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
+
+AHEAD_S = 30.0  # prediction horizon from measured states [s]
 
 LAGS = 60  # longest lag of the autocorrelation, in samples
 SLOW_S = 20.0  # periods longer than this [s], or than 40 samples, count as slow
@@ -111,7 +112,7 @@ class Limits:
     # (n,) lower bound on the fit with measurement noise alone: the noise is estimated by third differences, which also
     # contain motion that is fast at the sample time
     ceiling_percent: Array
-    ahead_rms: Array  # (n,) of predictions `Tuning.ahead_s` ahead from measured velocities [m/s, rad/s]
+    ahead_rms: Array  # (n,) of predictions `AHEAD_S` ahead from measured velocities [m/s, rad/s]
     ahead_share: Array  # (n,) the same over the standard deviation of the measured output
     growth: float  # how many times an error of the first velocity is larger at the end of the run, at worst
     duration_s: float  # of the run
@@ -226,7 +227,7 @@ def _slow_part(values: Array, sample_time_s: float) -> Array:
 
 def _ahead(stretches: Stretches, values: Array, measured: Array, sample_time_s: float) -> Array:
     """(n,) RMS of predictions from measured states, over windows that lie end to end; the run when it is shorter."""
-    length = min(len(measured), round(TUNING.ahead_s / sample_time_s) + 1)
+    length = min(len(measured), round(AHEAD_S / sample_time_s) + 1)
     firsts = np.arange(0, len(measured) - length + 1, max(1, length - 1))
     rows = firsts + np.arange(length)[:, None]
     windows = compiled(replace(stretches, drive=stretches.drive[:, 0][rows]))
@@ -248,12 +249,9 @@ def whole(values: Array) -> Array:
 def sentence(limits: Limits, run: RunCheck) -> str:
     """The causes of misfit of a run in words and numbers."""
     ahead = _listed(limits, 100 * limits.ahead_share)
-    tail = (
-        f"The {TUNING.ahead_s:g} s prediction from measured velocities has an error of {ahead} of the standard "
-        "deviation."
-    )
+    tail = f"The {AHEAD_S:g} s prediction from measured velocities has an error of {ahead} of the standard deviation."
     if not np.isfinite(limits.ahead_rms).all():
-        tail = f"Even the {TUNING.ahead_s:g} s prediction from measured velocities diverges."
+        tail = f"Even the {AHEAD_S:g} s prediction from measured velocities diverges."
     if run.problem:
         return f"The simulation diverges. {tail}"
     if limits.unstable:

@@ -8,8 +8,16 @@ from functools import cached_property
 
 from expdesign.assessment.actuator_times import considered, known_times
 from expdesign.assessment.held_out import Candidate, HeldOut, held_out
-from expdesign.assessment.tuning import TUNING
-from expdesign.assessment.values import AUTO, CONTINUOUS, HELD_OUT, NONE, PARAMETER_STD, EstimateOptions, with_prior
+from expdesign.assessment.misfit import AHEAD_S
+from expdesign.assessment.values import (
+    AUTO,
+    CONTINUOUS,
+    HELD_OUT,
+    NONE,
+    PARAMETER_STD,
+    EstimateOptions,
+    with_prior,
+)
 from expdesign.errors import Diverged, InputError, NoAnswer, NotInformative
 from expdesign.estimation.excitation import worst_case
 from expdesign.estimation.instrumental import STARTS, Settings
@@ -96,9 +104,9 @@ def horizons_of(work: Work) -> tuple[float | None, ...]:
     """
     options = work.options
     longest_s = max(len(batch) * batch.sample_time_s for batch in work.record.batches)
-    if options.horizon_s is not None or options.choice != HELD_OUT or longest_s < WORTH_WHOLE * TUNING.ahead_s:
+    if options.horizon_s is not None or options.choice != HELD_OUT or longest_s < WORTH_WHOLE * AHEAD_S:
         return (options.horizon_s,)
-    return (TUNING.ahead_s / 3, TUNING.ahead_s, None)
+    return (AHEAD_S / 3, AHEAD_S, None)
 
 
 def _begun(trial: Trial) -> Begun:

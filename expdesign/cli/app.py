@@ -1,20 +1,12 @@
-"""The program and how its commands are carried out.
-
-A command is the signature of a workflow as the command line has it: parameters of the same names, with option, help
-and default. `command` registers it, adds the options that all commands share, loads the workflow only when the command
-runs, hands it the parameters, shows progress, and prints the summary.
-"""
+"""The program: its options, its progress, and what it says of pages that could not be drawn."""
 
 from __future__ import annotations
 
-import inspect
 import math
 import time
-import warnings
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import wraps
 from pathlib import Path
 from typing import Annotated
 
@@ -24,9 +16,6 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 from expdesign import __version__
-from expdesign.cli.summary import as_json, print_summary, unverified
-from expdesign.errors import NotDrawn
-from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
 
 BUG = 1
@@ -126,71 +115,6 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress an
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and nothing else, on stdout.")]
 
 
-WORKFLOWS: dict[str, tuple[str, tuple[str, ...]]] = {}
-"""Command -> its workflow, and the names of its parameters."""
-
-
-def arguments(options: Mapping[str, object], parameters: Mapping[str, inspect.Parameter]) -> dict[str, object]:
-    """Arguments of a workflow: lists become tuples, empty where an option is not given; --no-cache is no cache."""
-    found: dict[str, object] = {}
-    for name, value in options.items():
-        if name == "no_cache":
-            found["cache"] = not value
-        elif isinstance(value, list):
-            found[name] = tuple(value)
-        else:
-            found[name] = () if value is None and "list[" in str(parameters[name].annotation) else value
-    return found
-
-
-def command(
-    name: str, workflow: str = "", *, tells: bool = False
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a function as the command `name`, with its own options, --quiet and --json.
-
-    Args:
-        name: on the command line.
-        workflow: name in `expdesign.workflows`; that of the command by default.
-        tells: whether the workflow also takes `tell`, for lines that are printed while it works.
-    """
-
-    def register(described: Callable[..., None]) -> Callable[..., None]:
-        own = inspect.signature(described, eval_str=True).parameters
-
-        @wraps(described)
-        def carry_out(*, quiet: bool, json: bool, **options: object) -> None:
-            with interruptions_wait():  # some solvers do not stand being interrupted while they load
-                from expdesign import workflows
-
-                work = getattr(workflows, WORKFLOWS[name][0])
-            lines = {"tell": _untold if quiet or json else _tell} if tells else {}
-            with shown_progress(quiet=quiet) as progress, warnings.catch_warnings():
-                warnings.simplefilter("ignore", NotDrawn)  # told below
-                outcome = work(**arguments(options, own), progress=progress, **lines)
-            if json:
-                typer.echo(as_json(name, outcome))
-            elif not quiet:
-                print_summary(outcome)
-            tell_gaps(outcome.files)
-            if doubt := unverified(outcome.summary):
-                typer.echo(f"expdesign: error: {doubt}", err=True)
-                raise typer.Exit(NO_ANSWER)
-
-        kind = inspect.Parameter.KEYWORD_ONLY
-        shared = {"quiet": Quiet, "json": Json}
-        parameters = [part.replace(kind=kind) for part in own.values()]
-        parameters += [
-            inspect.Parameter(option, kind, default=False, annotation=hint) for option, hint in shared.items()
-        ]
-        carry_out.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        carry_out.__annotations__ = {part.name: part.annotation for part in parameters}
-        app.command(name)(carry_out)
-        WORKFLOWS[name] = workflow or name.replace("-", "_"), tuple(own)
-        return described
-
-    return register
-
-
 def tell_gaps(files: Sequence[Path]) -> None:
     """Say which pages or figures could not be drawn, and end with the status of a defect if any."""
     from expdesign.export.folder import gaps
@@ -200,15 +124,6 @@ def tell_gaps(files: Sequence[Path]) -> None:
         typer.echo(f"expdesign: error: {line}", err=True)
     if found:
         raise typer.Exit(BUG)
-
-
-def _tell(line: str) -> None:
-    """Print a line at once, for whoever reads the output as it comes."""
-    typer.echo(line)  # flushes
-
-
-def _untold(line: str) -> None:
-    """Say nothing."""
 
 
 def _show_version(asked: bool) -> None:

@@ -1,11 +1,227 @@
-"""All commands: importing the modules registers them, in the order in which `--help` lists them."""
+"""All commands: each request becomes a command of the same options, which hands them to its workflow.
 
-from expdesign.cli import planning, recorded  # isort: split
+A workflow is loaded only when its command runs. `explain` and `web` have no request: they write no results.
+"""
 
-from expdesign.cli import operation, trials  # isort: split
+from __future__ import annotations
 
-from expdesign.cli import explaining, pages  # isort: split
+import importlib.util
+import inspect
+import json as json_text
+import secrets
+import warnings
+import webbrowser
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict
+from pathlib import Path
+from types import GenericAlias
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
-from expdesign.cli.app import app
+import typer
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.table import Table
 
-__all__ = ["app", "explaining", "operation", "pages", "planning", "recorded", "trials"]
+from expdesign.cli.app import NO_ANSWER, Json, Quiet, app, shown_progress, tell_gaps
+from expdesign.cli.summary import as_json, print_summary, unverified
+from expdesign.errors import InputError, NotDrawn
+from expdesign.interruptions import interruptions_wait
+from expdesign.requests import COMMANDS, Command
+from expdesign.requests.options import Argument, Option
+
+if TYPE_CHECKING:
+    from expdesign.workflows.commands.explain import Explained, Section, Topic
+
+
+NEEDED = ("nicegui", "tomlkit")
+"""Packages of the extra `web`."""
+
+
+def web(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Scenarios and results; nothing else is touched.")
+    ] = Path(),
+    port: Annotated[
+        int, typer.Option("--port", metavar="N", min=0, max=65535, help="Of the address; 0 for any.")
+    ] = 8120,
+    host: Annotated[
+        str,
+        typer.Option(
+            "--host", metavar="ADDRESS", help="Address to be bound to. Other than this machine needs a token."
+        ),
+    ] = "127.0.0.1",
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+) -> None:
+    """Open a page on a folder of scenarios: draw the area, choose manoeuvres, plan, play, import and diagnose.
+
+    The page runs the commands of this program and shows each of them; files stay the truth. It can be opened on this
+    machine only, unless --host says otherwise; then the address that is printed holds a token. Ctrl-C ends it.
+
+    Example: expdesign web mytrial
+    """
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"the page needs {' and '.join(missing)}: pip install 'expdesign[web]'")
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder, expected one with scenarios, or an empty one")
+    from expdesign.web.server import LOOPBACK, serve
+
+    token = None if host in LOOPBACK else secrets.token_urlsafe(24)
+
+    def ready(address: str) -> None:
+        typer.echo(f"Open {address} in a browser. Ctrl-C ends it.")
+        if not no_browser:
+            webbrowser.open(address)
+
+    serve(folder, host=host, port=port, token=token, ready=ready)
+
+
+def explain(
+    subject: Annotated[
+        str, typer.Argument(metavar="TOPIC or NAME", help="A topic, a key such as design.total_s, or a family.")
+    ] = "",
+    json: Json = False,
+) -> None:
+    """Explain the keys of files and all names that can be chosen. Without a topic: list the topics.
+
+    Example: expdesign explain scenario
+    """
+    with interruptions_wait():
+        from expdesign.workflows import explain as explained
+
+        topic = explained(subject)
+    if json:
+        typer.echo(json_text.dumps(asdict(topic), indent=2, ensure_ascii=False))
+        return
+    console = Console(highlight=False, markup=False)
+    if console.is_terminal:
+        _show(console, topic)
+    else:
+        typer.echo("\n".join(_lines(topic)))
+
+
+def _show(console: Console, topic: Topic) -> None:
+    """Tables as wide as the terminal."""
+    console.print(topic.title, style="bold")
+    if topic.text:
+        console.print(topic.text if topic.sections else Markdown(topic.text))
+    for section in topic.sections:
+        console.print()
+        if section.title:
+            console.print(section.title, style="bold")
+        console.print(_table(section))
+
+
+def _table(section: Section) -> Table:
+    columns = [name for name in ("default", "allowed") if any(getattr(item, name) for item in section.entries)]
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="underline")
+    table.add_column("name", no_wrap=True)
+    for name in ("meaning", *columns):
+        table.add_column(name, overflow="fold")
+    for entry in section.entries:
+        table.add_row(entry.name, entry.meaning, *(getattr(entry, name) for name in columns))
+    return table
+
+
+def _lines(topic: Topic) -> list[str]:
+    """One line for each entry, for pipes."""
+    lines = [topic.title, *([topic.text] if topic.text else [])]
+    for section in topic.sections:
+        lines += ["", *([section.title] if section.title else []), *map(_line, section.entries)]
+    return lines
+
+
+def _line(entry: Explained) -> str:
+    stated = entry.default in ("", "required", "optional")
+    default = entry.default if stated else f"default {entry.default}"
+    notes = "; ".join(note for note in (default, entry.allowed) if note)
+    return f"{entry.name}: {entry.meaning}" + (f" ({notes})" if notes else "")
+
+
+def carry_out(command: Command, options: Mapping[str, object], *, quiet: bool, json: bool) -> None:
+    """Run a command, show its progress, and print what came of it."""
+    with interruptions_wait():  # some solvers do not stand being interrupted while they load
+        from expdesign import workflows
+
+        work = getattr(workflows, command.workflow)
+    lines = {"tell": _untold if quiet or json else _tell} if command.tells else {}
+    with shown_progress(quiet=quiet) as progress, warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotDrawn)  # told below
+        outcome = work(**options, progress=progress, **lines)
+    if json:
+        typer.echo(as_json(command.name, outcome))
+    elif not quiet:
+        print_summary(outcome)
+    tell_gaps(outcome.files)
+    if doubt := unverified(outcome.summary):
+        typer.echo(f"expdesign: error: {doubt}", err=True)
+        raise typer.Exit(NO_ANSWER)
+
+
+def _tell(line: str) -> None:
+    """Print a line at once, for whoever reads the output as it comes."""
+    typer.echo(line)  # flushes
+
+
+def _untold(line: str) -> None:
+    """Say nothing."""
+
+
+def given(options: Mapping[str, object]) -> dict[str, object]:
+    """Options as a workflow takes them: lists as tuples, empty where none is given; --no-cache is no cache."""
+    found = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
+    if "no_cache" in found:
+        found["cache"] = not found.pop("no_cache")
+    return found
+
+
+def register(command: Command) -> None:
+    """Make a command of its request, with --quiet and --json besides."""
+    entries = command.asked
+    lists = {one.name for one in entries if get_origin(one.kind) is tuple}
+
+    def run(*, quiet: bool, json: bool, **options: object) -> None:
+        named = {name: value or () if name in lists else value for name, value in options.items()}
+        carry_out(command, given(named), quiet=quiet, json=json)
+
+    kind = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        inspect.Parameter(
+            one.name,
+            kind,
+            default=inspect.Parameter.empty if one.default is MISSING else one.default if one.default != () else None,
+            annotation=_typed(one.kind, one.flag, one.typed, required=one.default is MISSING),
+        )
+        for one in entries
+    ]
+    parameters += [
+        inspect.Parameter(name, kind, default=False, annotation=hint)
+        for name, hint in (("quiet", Quiet), ("json", Json))
+    ]
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {part.name: part.annotation for part in parameters}
+    run.__doc__ = command.request.__doc__
+    app.command(command.name)(run)
+
+
+def _typed(kind: Any, flag: str, typed: Option | Argument, *, required: bool) -> Any:
+    """The annotation of a parameter as typer reads it."""
+    if get_origin(kind) is tuple:
+        listed = GenericAlias(list, get_args(kind)[:1])
+        kind = listed if required else listed | None
+    if isinstance(typed, Argument):
+        return Annotated[kind, typer.Argument(metavar=typed.metavar, help=typed.help)]
+    flags = (flag, typed.short) if typed.short else (flag,)
+    return Annotated[
+        kind,
+        typer.Option(
+            *flags, metavar=typed.metavar, help=typed.help, min=typed.min, max=typed.max, parser=typed.parser,
+            callback=typed.callback,
+        ),
+    ]  # fmt: skip
+
+
+for each in COMMANDS:
+    register(each)
+app.command("explain")(explain)
+app.command("web")(web)

@@ -11,8 +11,10 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from inspect import cleandoc
+from itertools import takewhile
+from pathlib import Path
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 import typer
 from rich.markup import escape
@@ -20,26 +22,17 @@ from typer.main import get_command
 
 from expdesign.cli.app import BUG, NO_ANSWER
 from expdesign.cli.commands import app
-from expdesign.cli.options import repeat_option
 from expdesign.errors import InputError, NoAnswer
 from expdesign.interruptions import interruptions_wait
+from expdesign.requests import COMMANDS
 
-LISTS = (
-    "--format",
-    "--method",
-    "--fixed",
-    "--test",
-    "--data",
-    "--interest",
-    "--reference",
-    "--throttle",
-    "--rudder",
-    "--mass-kg",
-    "--shift-m",
-)
-"""Options that take several values."""
-FILE_LISTS = ("--test", "--data", "--reference")
-"""Options of `LISTS` whose values are files."""
+LISTS = {
+    one.flag: get_args(one.kind)[0] is Path
+    for command in COMMANDS
+    for one in command.asked
+    if one.flag and get_origin(one.kind) is tuple
+}
+"""Options that take several values, and whether these are files."""
 LINE_END = re.compile(r"(?<!\n)\n(?!\n|Example:)")
 """Within a paragraph."""
 Program = TypeVar("Program")
@@ -57,8 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         a termination signal), 1 a defect of this program or a reader of the output that went away.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    for option in LISTS:
-        arguments = repeat_option(arguments, option, files=option in FILE_LISTS)
+    for option, files in LISTS.items():
+        arguments = repeat_option(arguments, option, files=files)
     try:
         with _termination_interrupts():
             return _invoke(arguments)
@@ -78,6 +71,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error), WRONG_INPUT)
     except Exception as error:
         return _defect(error)
+
+
+def repeat_option(arguments: Sequence[str], option: str, *, files: bool = False) -> list[str]:
+    """Spell out a list of values: `--format rtz gpx` becomes `--format rtz --format gpx`.
+
+    A list ends at the next option and, unless it lists files, at anything that looks like a file, i.e. has a slash or
+    an ending that is no number: rtz-1.0 is a value.
+    """
+    spelled, rest = [], list(arguments)
+    while rest:
+        spelled.append(rest.pop(0))
+        if spelled[-1] == option and rest:
+            first, *more = rest
+            values = [first, *takewhile(_looks_like_file_or_value if files else _looks_like_value, more)]
+            spelled += [values[0], *(part for value in values[1:] for part in (option, value))]
+            rest = rest[len(values) :]
+    return spelled
+
+
+def _looks_like_value(text: str) -> bool:
+    _, dot, ending = text.rpartition(".")
+    return not text.startswith("-") and "/" not in text and (not dot or ending.isdecimal())
+
+
+def _looks_like_file_or_value(text: str) -> bool:
+    return not text.startswith("-")
 
 
 def _invoke(arguments: list[str]) -> int:

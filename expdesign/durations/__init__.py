@@ -12,8 +12,8 @@ from expdesign.durations.certificate import (
 from expdesign.durations.concave import Collected
 from expdesign.durations.criteria import CRITERIA, Aim, Criterion
 from expdesign.durations.efficiency import Efficiencies, Kept, efficiencies, limits_kept, pool_gains
+from expdesign.durations.large_scale import LargeDesign, d_optimal, rows_of
 from expdesign.durations.limits import NO_CONSTRAINTS, Budget, Constraints
-from expdesign.durations.maximise import LargeDesign, d_optimal, rows_of
 from expdesign.durations.mining import Subset, best_subset, build_recorded
 from expdesign.durations.problem import (
     ROBUST,

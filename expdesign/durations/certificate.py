@@ -22,9 +22,8 @@ import numpy as np
 import scipy
 
 from expdesign.durations.concave import ConcaveProblem
-from expdesign.durations.criteria.models import Tangent
+from expdesign.durations.criteria import SINGULAR, Tangent
 from expdesign.durations.problem import DurationProblem
-from expdesign.durations.tuning import TUNING
 from expdesign.values import ASIDE, Array, seal
 
 LP_TOLERANCE = 1e-10  # feasibility and optimality tolerance of linear programmes
@@ -137,10 +136,10 @@ def whitened(matrices: Array) -> tuple[Array, float]:
 def log_det(matrices: Array, fractions: Array) -> float:
     """log det of sum_q w_q B_q, or -inf when it is singular to working precision.
 
-    The matrices should be scaled or whitened: singular means an eigenvalue below `Tuning.singular` times the largest.
+    The matrices should be scaled or whitened: singular means an eigenvalue below `SINGULAR` times the largest.
     """
     eigenvalues = np.linalg.eigvalsh(np.tensordot(fractions, matrices, axes=1))
-    return float(np.log(eigenvalues).sum()) if eigenvalues[0] > TUNING.singular * eigenvalues[-1] else -np.inf
+    return float(np.log(eigenvalues).sum()) if eigenvalues[0] > SINGULAR * eigenvalues[-1] else -np.inf
 
 
 def sensitivities(matrices: Array, fractions: Array) -> Array:

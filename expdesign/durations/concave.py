@@ -11,12 +11,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from expdesign.durations.criteria import LogDet, LogTrace, Measure, criterion
-from expdesign.durations.criteria.measures import SmoothMeasure
-from expdesign.durations.criteria.models import Indices, Objective, Piece, congruent, pieces_of, stacked_values
+from expdesign.durations.criteria import (
+    SINGULAR,
+    Indices,
+    LogDet,
+    LogTrace,
+    Measure,
+    Objective,
+    Piece,
+    congruent,
+    criterion,
+    pieces_of,
+    stacked_values,
+)
 from expdesign.durations.limits import Polytope, feasible_set
+from expdesign.durations.measures import SmoothMeasure
 from expdesign.durations.problem import DurationProblem, InformationFloor
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import FloorOutOfReach, InputError, NotInformative
 from expdesign.values import Array
 
@@ -252,7 +262,7 @@ def informs_about_all(problem: DurationProblem, collected: Collected, shares: Ar
 
 def _regular(collected: Collected, shares: Array) -> bool:
     values = [np.linalg.eigvalsh(total) for total in collected.totals(shares)]
-    return all(item[0] > TUNING.singular * item[-1] for item in values)
+    return all(item[0] > SINGULAR * item[-1] for item in values)
 
 
 def unidentifiable(problem: DurationProblem, shares: Array) -> tuple[str, ...]:

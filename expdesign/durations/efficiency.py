@@ -9,11 +9,9 @@ import numpy as np
 
 from expdesign.durations.certificate import DurationDesign
 from expdesign.durations.concave import Collected, T, with_idle
-from expdesign.durations.criteria import CRITERIA
-from expdesign.durations.criteria.models import stacked_values
+from expdesign.durations.criteria import CRITERIA, SINGULAR, stacked_values
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.solve import floors_of, optimal_shares
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer
 from expdesign.values import Array
 
@@ -136,6 +134,6 @@ def pool_gains(matrices: Array) -> Array:
     scaled = matrices / np.outer(size, size)
     pool = scaled.mean(axis=0)
     values = np.linalg.svd(pool, compute_uv=False)
-    if not values[-1] > TUNING.singular * values[0]:
+    if not values[-1] > SINGULAR * values[0]:
         return np.full(len(matrices), np.nan)
     return np.asarray(np.einsum("ij,qji->q", np.linalg.inv(pool), scaled) - len(pool))

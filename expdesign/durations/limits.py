@@ -16,9 +16,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, UnknownName
 from expdesign.values import Array, seal
+
+LOOSENING = 1e-9  # share by which limits are loosened where they leave no interior
 
 LEAST_FRACTION = 1e-9  # fractions less than this above their bound are set to it
 
@@ -101,7 +102,7 @@ class Polytope:
         bounds = [(None, None)] * len(free) + [(None, 1.0)]
         goal = np.r_[np.zeros(len(free)), -1.0]
         answer = scipy.optimize.linprog(goal, A, b, sum_row, [1.0], bounds, method="highs")
-        if answer.status != 0 or answer.x[-1] <= TUNING.loosening:
+        if answer.status != 0 or answer.x[-1] <= LOOSENING:
             return None
         return np.asarray(answer.x[:-1])
 
@@ -142,8 +143,8 @@ class Polytope:
         return np.asarray(answer.x) if answer.status == 0 else None
 
     def loosened(self) -> Polytope:
-        """The polytope with limits of rows moved by `Tuning.loosening`."""
-        return replace(self, limits=self.limits + TUNING.loosening)
+        """The polytope with limits of rows moved by `LOOSENING`."""
+        return replace(self, limits=self.limits + LOOSENING)
 
 
 def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array, total_s: float) -> Polytope:
@@ -171,7 +172,7 @@ def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array
     for name in constraints.excluded:
         most[_index(names, name, "design.excluded")] = 0.0
     rows, limits = _rows(constraints.budgets, names, total_s)
-    too_costly = rows * TUNING.loosening > limits[:, None]
+    too_costly = rows * LOOSENING > limits[:, None]
     most = np.where(too_costly.any(axis=0) & (least == 0), 0.0, most)
     rows[:, most == 0] = 0.0
     limits = np.where(rows.any(axis=1), limits, 1.0)
@@ -245,7 +246,7 @@ def _check_budgets(polytope: Polytope, budgets: Sequence[Budget]) -> None:
             least=polytope.least, most=polytope.most, rows=np.zeros((0, len(row))), limits=np.zeros(0), labels=()
         )
         needed = -alone.bound(-row, np.zeros(0))
-        if needed > limit * (1 + TUNING.loosening) + TUNING.loosening:
+        if needed > limit * (1 + LOOSENING) + LOOSENING:
             scale = budget.limit / limit if limit else 1.0
             raise NoAnswer(
                 f"budget {budget.name!r} has the limit {budget.limit:g}, but any feasible durations use at least "

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.durations.concave import Collected, informs_about_all, limits_of, merged_nuisance
-from expdesign.durations.limits import Polytope
+from expdesign.durations.limits import LOOSENING, Polytope
 from expdesign.durations.problem import DurationProblem
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import NoAnswer
 from expdesign.values import Array
 
@@ -213,7 +212,7 @@ class _Search:
             shares.sum() <= 1.0 + 1e-9
             and (runs >= self.fewest).all()
             and (runs <= self.most_runs).all()
-            and (self.polytope.rows @ shares <= self.polytope.limits + 2 * TUNING.loosening).all()
+            and (self.polytope.rows @ shares <= self.polytope.limits + 2 * LOOSENING).all()
         )
 
     def informative(self, runs: Array) -> bool:
@@ -229,7 +228,7 @@ class _Search:
         """Indices of the primitives of which one more run fits."""
         used = runs * self.shares
         fits = (self.shares <= 1.0 - used.sum() + 1e-9) & (runs < self.most_runs)
-        left = self.polytope.limits + TUNING.loosening - self.polytope.rows @ used
+        left = self.polytope.limits + LOOSENING - self.polytope.rows @ used
         fits &= (self.polytope.rows * self.shares <= left[:, None]).all(axis=0)
         return np.flatnonzero(fits)
 

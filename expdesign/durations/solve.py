@@ -41,13 +41,11 @@ from expdesign.durations.concave import (
     unit_scaling,
     with_idle,
 )
-from expdesign.durations.criteria import criterion
-from expdesign.durations.criteria.models import Objective
+from expdesign.durations.criteria import Objective, criterion
 from expdesign.durations.limits import Polytope
-from expdesign.durations.maximise import CVXPY, NEWTON, maximised
+from expdesign.durations.maximise import CVXPY, FLOOR_ROUNDING, LARGEST_GAP, NEWTON, maximised
 from expdesign.durations.problem import DurationProblem
 from expdesign.durations.rounding import efficiency_of_shares, note_on_runs, runs_above_floors, whole_runs
-from expdesign.durations.tuning import TUNING
 from expdesign.errors import InputError, NoAnswer, NotInformative
 from expdesign.values import Array
 
@@ -61,7 +59,7 @@ TIGHTENED = (1.05, 1.15, 1.3, 1.6)  # factors on least information with which sh
 
 def definite_start(problem: DurationProblem, polytope: Polytope) -> Array | None:
     """Fractions (q,) that make sym B positive definite, or None where there are none."""
-    from expdesign.durations.maximise._cvxpy import largest_least_eigenvalue
+    from expdesign.durations._cvxpy import largest_least_eigenvalue
 
     matrices, prior = (symmetric_part(item) for item in _unit_scaled(problem))
     w = largest_least_eigenvalue(matrices, prior, polytope)
@@ -174,7 +172,7 @@ def solve_durations(problem: DurationProblem) -> DurationDesign:
     Raises:
         UnknownName, InputError: the aim or the limits are wrong.
         NotInformative: no shares inform about every parameter.
-        NoAnswer: no fractions satisfy the limits, the gap stays above `Tuning.largest_gap`, or whole runs do
+        NoAnswer: no fractions satisfy the limits, the gap stays above `LARGEST_GAP`, or whole runs do
             not fit.
     """
     design = _shares(problem, as_stated=True)
@@ -189,7 +187,7 @@ def _shortfall(problem: DurationProblem) -> Callable[[Array], float]:
 
     def missing(shares: Array) -> float:
         short = np.array([floor.value(shares) for floor in floors])
-        return float(-short[short < -TUNING.floor_rounding].sum())
+        return float(-short[short < -FLOOR_ROUNDING].sum())
 
     return missing
 
@@ -310,10 +308,10 @@ def _certified_shares(problem: DurationProblem, within: Array | None, *, as_stat
     if within is None and not np.isfinite(task.objective.value(task.polytope.middle())):
         raise np.linalg.LinAlgError
     best = maximised(task, THEOREMS.get(problem.aim.criterion, ""), as_stated=as_stated)
-    if not best.gap < TUNING.largest_gap:
+    if not best.gap < LARGEST_GAP:
         raise NoAnswer(
             f"the durations could not be certified: the gap in {problem.aim.criterion}-efficiency is {best.gap:.2g}, "
-            f"at most {TUNING.largest_gap:g} is accepted"
+            f"at most {LARGEST_GAP:g} is accepted"
         )
     gap, count = max(best.gap * best.certificate.degree, 0.0), len(problem.names)
     certificate = replace(best.certificate, bound=best.certificate.value + gap, prices=best.certificate.prices[:count])

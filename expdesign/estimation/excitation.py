@@ -49,7 +49,7 @@ from expdesign.estimation.values import Residuals
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, frozen_set
 from expdesign.vessel import Operators, Sensors, VesselModel
-from expdesign.vessel.expressions import Expression
+from expdesign.vessel.structures import Expression
 
 WORST_CASE_SIGMAS = 3.0  # standard deviations of Gaussian noise in the excitation condition
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
+from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Figure, Listing, Table, filled, section
 from expdesign.export.files import finite, strict_json
 from expdesign.export.pages.figures import GREY, LINES, light_grid, new_figure, page_figure, svg
@@ -105,13 +106,13 @@ def moment(content: ImportContent, time_s: float) -> str:
 def response_rows(content: ImportContent) -> list[tuple[str, ...]]:
     """Signal, slew rate, lag, dead time and what is left, each with its standard error."""
     return [
-        (one.signal, _with_std(one.rate), _with_std(one.lag_s), _with_std(one.delay_s), f"{one.rest:.2g}")
+        (one.signal, _followed(one.rate), _followed(one.lag_s), _followed(one.delay_s), f"{one.rest:.2g}")
         for one in content.followed
     ]
 
 
-def _with_std(value: tuple[float, float] | None) -> str:
-    return "none shows" if value is None else f"{value[0]:.3g} \N{PLUS-MINUS SIGN} {value[1]:.1g}"
+def _followed(value: tuple[float, float] | None) -> str:
+    return "none shows" if value is None else plus_minus(*value)
 
 
 def mapping_toml(mapping: Decisions, logs: Sequence[Log], *, command: str) -> str:

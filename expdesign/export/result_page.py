@@ -15,8 +15,8 @@ from expdesign.assessment.misfit import ESTIMATION
 from expdesign.conventions import OUTPUTS, plus_minus
 from expdesign.export import words
 from expdesign.export.document import Document, Mark, Table, filled, section
-from expdesign.export.files.read_json import Entry
-from expdesign.export.indices_form.form import shown
+from expdesign.export.files.text import Entry
+from expdesign.export.indices_form import shown
 
 FEW = 0.9
 """Share of the time of the planned runs below which the data do not hold all of them."""

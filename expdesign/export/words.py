@@ -14,6 +14,8 @@ from expdesign.conventions import KNOTS_PER_MPS
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
+NOTICED = 0.02  # relative differences below this are not reported
+
 COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 MOST_DECIMALS = 12
 HOUR = 3600.0

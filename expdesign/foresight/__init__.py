@@ -21,7 +21,16 @@ it is drawn: effects are estimated without each fold of the runs, by the informa
 Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
 """
 
-from expdesign.foresight.effects import Direction, HiddenEffect
+from expdesign.foresight.effects import (
+    Direction,
+    HiddenEffect,
+    Size,
+    StandardTrials,
+    default_sizes,
+    sizes_that_matter,
+    standard_trials,
+    with_effect,
+)
 from expdesign.foresight.foresee import foresee
 from expdesign.foresight.operation import (
     Detectability,
@@ -32,14 +41,6 @@ from expdesign.foresight.operation import (
 )
 from expdesign.foresight.power import level_of, needed_noncentrality, power
 from expdesign.foresight.reveal import Wanted, causes_by_runs, told_apart_from, told_apart_with, wanted
-from expdesign.foresight.sizes import (
-    Size,
-    StandardTrials,
-    default_sizes,
-    sizes_that_matter,
-    standard_trials,
-    with_effect,
-)
 from expdesign.foresight.trial import (
     Background,
     TrialRun,
@@ -49,8 +50,4 @@ from expdesign.foresight.trial import (
     simulated_record,
     weather_without_causes,
 )
-from expdesign.foresight.tuning import TUNING
-from expdesign.foresight.values import AddedRuns, Confusion, Foreseen, Foresight
-
-TOLD_APART = TUNING.told_apart
-"""Probability below which two causes count as not told apart."""
+from expdesign.foresight.values import TOLD_APART, AddedRuns, Confusion, Foreseen, Foresight

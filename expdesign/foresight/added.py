@@ -59,7 +59,7 @@ def information_of_runs(
     directions: Sequence[Direction],
     sizes: Sequence[float],
 ) -> Array:
-    """(q, c + m, c + m) information of one run of each manoeuvre, the mean over `Tuning.headings` first headings.
+    """(q, c + m, c + m) information of one run of each manoeuvre, the mean over `HEADINGS` first headings.
 
     Args:
         vessel: the model in use.

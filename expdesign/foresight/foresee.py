@@ -16,7 +16,17 @@ from expdesign.diagnosis.select import (
 )
 from expdesign.dictionary import Primitive
 from expdesign.foresight.added import with_added_runs
-from expdesign.foresight.effects import HiddenEffect, described, disturbance_at, hidden_effects, joined
+from expdesign.foresight.effects import (
+    HiddenEffect,
+    Size,
+    default_sizes,
+    described,
+    disturbance_at,
+    hidden_effects,
+    joined,
+    sizes_that_matter,
+    standard_trials,
+)
 from expdesign.foresight.information import (
     JointInformation,
     SimulatedUnits,
@@ -35,7 +45,6 @@ from expdesign.foresight.power import (
     rivals_of,
     share_shown,
 )
-from expdesign.foresight.sizes import Size, default_sizes, sizes_that_matter, standard_trials
 from expdesign.foresight.trial import Background, TrialRun, background
 from expdesign.foresight.values import WANTED_POWER, Confusion, Foreseen, Foresight
 from expdesign.progress import Progress, in_phases, silent

@@ -22,8 +22,7 @@ from expdesign.diagnosis.fit import (
 )
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion, Motion
 from expdesign.diagnosis.select import candidate_disturbances
-from expdesign.foresight.effects import Direction, HiddenEffect, disturbance_at
-from expdesign.foresight.sizes import Size
+from expdesign.foresight.effects import Direction, HiddenEffect, Size, disturbance_at
 from expdesign.foresight.trial import Background
 from expdesign.values import Array
 

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 from expdesign.foresight.effects import HiddenEffect
-from expdesign.foresight.tuning import TUNING
+
+TOLD_APART = 0.5  # probability below which two causes count as not told apart
 
 WANTED_POWER = 0.9  # of a cause that counts as revealed
 
@@ -69,7 +70,7 @@ class Foreseen:
     @property
     def mistaken_for(self) -> tuple[Confusion, ...]:
         """Causes that it is more often than not mistaken for, or not told apart from, where its test finds it."""
-        return tuple(item for item in self.confusions if item.told_apart < TUNING.told_apart)
+        return tuple(item for item in self.confusions if item.told_apart < TOLD_APART)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,9 +105,7 @@ class Foresight:
     @property
     def not_told_apart(self) -> tuple[tuple[Foreseen, Confusion], ...]:
         """Effects that their own test finds more often than not, with the causes that they are not told apart from."""
-        return tuple(
-            (item, other) for item in self.effects if item.power >= TUNING.told_apart for other in item.mistaken_for
-        )
+        return tuple((item, other) for item in self.effects if item.power >= TOLD_APART for other in item.mistaken_for)
 
 
 def _margin(item: Foreseen) -> float:

@@ -18,8 +18,19 @@ from expdesign.dictionary import FAMILIES, Primitive, PrimitiveSpec, build_primi
 from expdesign.durations import bordered, d_optimal, log_det, rows_of, whitened
 from expdesign.errors import InputError, UnknownName
 from expdesign.growing._casadi import FreeForm, optimise_commands
-from expdesign.growing.search import Measure, Worth, best_of, pool_of, refined, violation
-from expdesign.growing.space import FamilySpace, GrowRound, GrowSettings, Growth, family_spaces
+from expdesign.growing.search import (
+    FamilySpace,
+    GrowRound,
+    GrowSettings,
+    Growth,
+    Measure,
+    Worth,
+    best_of,
+    family_spaces,
+    pool_of,
+    refined,
+    violation,
+)
 from expdesign.information import PrimitiveInformation, check_informative, estimated_parameters, score_primitives
 from expdesign.progress import Progress, silent, within
 from expdesign.simulation import CALM, Environment

@@ -19,9 +19,8 @@ from expdesign.importing.guess import guess
 from expdesign.importing.labels import family, fitted, presumed
 from expdesign.importing.machines import bow_signals, sides
 from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use
-from expdesign.importing.noise import sensor_keys
 from expdesign.importing.readers import READERS, read_log
-from expdesign.importing.responses import Followed, followed
+from expdesign.importing.responses import Followed, followed, sensor_keys
 from expdesign.importing.runs import (
     Run,
     cut,

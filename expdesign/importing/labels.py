@@ -12,7 +12,7 @@ from expdesign.errors import InputError, NoAnswer
 from expdesign.importing.runs import DRIVE_SHARE, inputs_of
 from expdesign.importing.sampling import Stretch
 from expdesign.indices import NotStandard, measured_trial
-from expdesign.indices.values import Circle, Stop, ZigZag
+from expdesign.indices.criteria import Circle, Stop, ZigZag
 from expdesign.signals import Batch
 from expdesign.simulation.helm import Helm
 from expdesign.values import Array

@@ -9,10 +9,14 @@ from expdesign.indices.criteria import (
     DEPTH_BY_DRAUGHT,
     HIGHEST_SEA,
     STRONGEST_WIND,
+    Circle,
     Condition,
     Conditions,
     Criterion,
+    Execute,
+    Stop,
     Verdict,
+    ZigZag,
     admissibility,
     beaufort,
     criteria,
@@ -21,4 +25,3 @@ from expdesign.indices.criteria import (
 from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
 from expdesign.indices.steered_run import SteeredRun, steered_run
-from expdesign.indices.values import Circle, Execute, Stop, ZigZag

@@ -1,9 +1,10 @@
-"""The criteria of IMO MSC.137(76) (2002), 5.3, whether results meet them, and the conditions that a trial has to meet.
+"""Indices of the standard trials, and the criteria of IMO MSC.137(76) (2002), 5.3, with its conditions.
 
-The criteria of IMO MSC.137(76) (2002), 5.3, and whether results meet them.
+A record shows an order to one sample. Tolerances are how far the ship goes or turns in a sample at the order, for what
+is counted from there; 0 in simulations. Remarks are phrases that follow the name of the run.
 
-They apply to ships of 100 m and over, and to chemical tankers and gas carriers of any length; for others they are a
-reference. Limits on overshoots depend on L/V, length over approach speed, of the full-scale ship.
+The criteria apply to ships of 100 m and over, and to chemical tankers and gas carriers of any length; for others they
+are a reference. Limits on overshoots depend on L/V, length over approach speed, of the full-scale ship.
 """
 
 from __future__ import annotations
@@ -13,8 +14,75 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from expdesign.indices.tuning import TUNING
-from expdesign.indices.values import Circle, Stop, ZigZag
+# largest deviation of helm and reversals of a 10/10 or 20/20 zig-zag from the nominal angles [rad]
+ZIGZAG_DEVIATION_RAD = math.radians(2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle:
+    """A turning circle; None where the trial ended too early to show it."""
+
+    name: str  # of the run
+    side: str  # "starboard" or "port", to which the ship turned
+    helm_rad: float  # size of the helm, positive
+    speed_mps: float | None  # approach speed; None where the record begins later
+    advance_m: float | None  # distance along the approach heading from the rudder order to 90 degrees change of heading
+    transfer_m: float | None  # distance across it to 90 degrees
+    tactical_diameter_m: float | None  # distance across it to 180 degrees
+    initial_turning_m: float | None  # distance sailed until the heading has changed by 10 degrees
+    steady_diameter_m: float | None  # of the steady turn
+    # current_north_mps, current_east_mps: uniform current, estimated from the turn and subtracted, or None
+    current_north_mps: float | None = None
+    current_east_mps: float | None = None
+    tolerance_m: float = 0.0  # of advance and initial turning
+    remarks: tuple[str, ...] = ()  # on the approach, the helm, and what is missing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Execute:
+    """A rudder order of a zig-zag."""
+
+    time_s: float  # since the start of the run
+    heading_rad: float  # change of heading from the approach, positive to the side of the first turn
+    tolerance_rad: float = 0.0  # of that heading
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZigZag:
+    """A zig-zag."""
+
+    name: str  # of the run
+    side: str  # of the first turn; "" where the record begins later
+    # heading_rad, helm_rad: mean change of heading at which the helm was reversed, and the helm's size, positive
+    heading_rad: float
+    helm_rad: float
+    speed_mps: float | None  # approach speed; None where the record begins later
+    # rudder orders, the first included; where the record begins later, its reversals, with headings from the middle of
+    # the swings
+    executes: tuple[Execute, ...]
+    # change of heading from the second, third, ... of `executes` to the largest heading, positive.
+    overshoots_rad: tuple[float, ...]
+    # distance sailed from the first execute until the heading has changed by 10 degrees; None where the helm is
+    # reversed well before
+    initial_turning_m: float | None
+    tolerance_m: float = 0.0  # of initial turning
+    remarks: tuple[str, ...] = ()  # on the approach, the helm, and what is missing
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A stopping trial."""
+
+    name: str  # of the run
+    speed_mps: float  # approach speed
+    track_reach_m: float  # distance sailed from the order astern until the ship has no headway
+    head_reach_m: float  # the same along the approach heading
+    lateral_m: float  # deviation to starboard of the approach heading
+    heading_change_rad: float  # at the end, positive to starboard
+    time_s: float  # from the order
+    tolerance_m: float = 0.0  # of track reach and head reach
+    remarks: tuple[str, ...] = ()  # on the approach
+
 
 # The criteria of IMO MSC.137(76) (2002), 5.3, and whether results meet them.
 
@@ -118,7 +186,7 @@ def _nth(trial: ZigZag, number: int) -> tuple[float | None, float]:
 def _reversed_at(trial: ZigZag, number: int, degrees: float) -> bool:
     """Whether a reversal was at a heading and from a helm of so many degrees."""
     angles = [trial.helm_rad, *(abs(order.heading_rad) for order in trial.executes[number : number + 1])]
-    return len(angles) == 2 and all(abs(angle - degrees * DEGREE) < TUNING.zigzag_deviation_rad for angle in angles)
+    return len(angles) == 2 and all(abs(angle - degrees * DEGREE) < ZIGZAG_DEVIATION_RAD for angle in angles)
 
 
 # Conditions of IMO MSC/Circ.1053 (2002), 2.2, for a planned trial.

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 from expdesign.errors import InputError, NoAnswer
+from expdesign.indices.criteria import Circle, Stop, ZigZag
 from expdesign.indices.read import read_circle, read_stop, read_zigzag
 from expdesign.indices.steered_run import steered_run
-from expdesign.indices.values import Circle, Stop, ZigZag
 from expdesign.simulation import Conduct, stopping, turning_circle, zigzag
 from expdesign.simulation.helm import steady_ahead
 from expdesign.values import Array

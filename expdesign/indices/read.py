@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
+from expdesign.indices.criteria import ZIGZAG_DEVIATION_RAD, Circle, Execute, Stop, ZigZag
 from expdesign.indices.steered_run import SteeredRun, crossing
-from expdesign.indices.tuning import TUNING
-from expdesign.indices.values import Circle, Execute, Stop, ZigZag
 from expdesign.values import Array
 
 TEN = math.radians(10.0)
@@ -143,7 +142,7 @@ def read_zigzag(
         executes=executes,
         overshoots_rad=tuple(overshoots),
         initial_turning_m=None
-        if nominal < TEN - TUNING.zigzag_deviation_rad
+        if nominal < TEN - ZIGZAG_DEVIATION_RAD
         else sailed_to(run, order_s=orders_s[0], course_rad=course_rad, change_rad=side * TEN),
         tolerance_m=run.tolerance_m(orders_s[0]),
     )

@@ -28,7 +28,7 @@ from expdesign.information.moments import PrimitiveInformation, signals_of
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Environment
 from expdesign.vessel import NUMPY, Vessel, VesselModel
-from expdesign.vessel.expressions import Expression, Signals
+from expdesign.vessel.structures import Expression, Signals
 
 LEAST_CLEAR = 0.5  # share of a run that meets the excitation condition, at least, where designs require it
 

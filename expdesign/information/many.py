@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expdesign.information.moments import rows_of, signals_of
-from expdesign.information.tuning import TUNING
-from expdesign.information.unknown_current import current_slopes
+from expdesign.information.disturbed import current_slopes
+from expdesign.information.moments import HEADINGS, RUNS_AT_ONCE, rows_of, signals_of
 from expdesign.simulation import Environment, deliver, simulate_many, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
-from expdesign.vessel.expressions import Signals
+from expdesign.vessel.structures import Signals
 
 
 def bordered_runs(
@@ -51,12 +50,12 @@ def bordered_runs(
         away = calm[-1, :, :2] - calm[0, :, :2]
         headings = courses[:, None] - np.arctan2(away[:, 1], away[:, 0])
     else:
-        headings = 2 * np.pi * np.arange(TUNING.headings)[:, None] / TUNING.headings
+        headings = 2 * np.pi * np.arange(HEADINGS)[:, None] / HEADINGS
     beside, pieces = courses is not None and environment.current_std_mps > 0, list[Array]()
     if courses is None and environment.isotropic:
         pieces.append(_matrices(vessel, calm, given, names, environment, mean_subtraction, beside_current=False))
         headings = headings[:0]
-    at_once = max(1, TUNING.runs_at_once // len(commands))
+    at_once = max(1, RUNS_AT_ONCE // len(commands))
     for first in range(0, len(headings), at_once):
         for states in _states(vessel, commands, start, environment, headings[first : first + at_once]):
             pieces.append(_matrices(vessel, states, given, names, environment, mean_subtraction, beside_current=beside))

@@ -20,8 +20,10 @@ from expdesign.simulation import Environment, relative_velocity
 from expdesign.simulation.motion import State
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import NOT_SUPPORTED, NUMPY, Operators, VesselModel
-from expdesign.vessel.expressions import Signals
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, Signals
+
+HEADINGS = 8  # evenly spread headings over which information is averaged in wind or current
+RUNS_AT_ONCE = 2048  # runs simulated together, so that their states stay in the processor's cache
 
 REGRESSOR_ROUNDING = 1e-12  # a regressor below this share of its possible size is rounding
 

@@ -25,7 +25,9 @@ from expdesign.information.excitation import (
     whole_runs,
 )
 from expdesign.information.moments import (
+    HEADINGS,
     MEAN_SUBTRACTIONS,
+    RUNS_AT_ONCE,
     PrimitiveInformation,
     estimated_parameters,
     log_det_or_none,
@@ -33,7 +35,6 @@ from expdesign.information.moments import (
     rows_of,
     signals_of,
 )
-from expdesign.information.tuning import TUNING
 from expdesign.simulation import CALM, Environment, deliver, rk4_step, simulate, step_shares, to_body
 from expdesign.simulation.motion import begun
 from expdesign.simulation.program import STATES, RatesProgram, march
@@ -56,7 +57,7 @@ def score_primitives(
 ) -> tuple[PrimitiveInformation, ...]:
     """Information of every primitive about the parameters to estimate.
 
-    In a mean current or wind, each primitive is simulated on `Tuning.headings` evenly spread headings and its moments
+    In a mean current or wind, each primitive is simulated on `HEADINGS` evenly spread headings and its moments
     are averaged, because its heading is not known before the plan.
 
     Args:
@@ -186,9 +187,7 @@ class _Moments:
 
 
 def _headings(environment: Environment) -> Array:
-    return (
-        np.zeros(1) if environment.isotropic else np.asarray(2 * np.pi * np.arange(TUNING.headings) / TUNING.headings)
-    )
+    return np.zeros(1) if environment.isotropic else np.asarray(2 * np.pi * np.arange(HEADINGS) / HEADINGS)
 
 
 def _groups(primitives: Sequence[Primitive], copies: int) -> Iterator[list[int]]:
@@ -330,7 +329,7 @@ def _simulated(
     first = np.array(begun(vessel.model, start))
     own = np.repeat(parameters, shape[1] * shape[2], axis=0)
     states = np.empty((len(given), STATES, first.shape[1]))
-    size = shape[2] * max(1, TUNING.runs_at_once // shape[2])
+    size = shape[2] * max(1, RUNS_AT_ONCE // shape[2])
     for begin in range(0, first.shape[1], size):
         some = slice(begin, begin + size)
         runs = first[:, some].shape[1]

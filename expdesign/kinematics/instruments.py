@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expdesign.conventions import plus_minus
 from expdesign.kinematics.relation import CERTAIN, SCALE_STD, Relation, relation
 from expdesign.signals import Batch
 from expdesign.values import Array
@@ -71,22 +72,22 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
         scale, std = found.size, found.size_std
         yield Finding(
             name="yaw_rate_scale", value=scale, std=std, rest=found.rest,
-            text=f"r_radps is {with_std(scale, std)} times the rate at which the heading changes: the scale of a gyro? "
-            f"Where the heading is right, multiply sensors.yaw_rate_scale by {scale:.4g}.",
+            text=f"r_radps is {plus_minus(scale, std)} times the rate at which the heading changes: the scale of a "
+            f"gyro? Where the heading is right, multiply sensors.yaw_rate_scale by {scale:.4g}.",
         )  # fmt: skip
     bias, std = float(found.others[0].real), float(found.others_std[0, 0])
     if abs(bias) > max(CERTAIN * std, RATE_MATTERS * rate):
         yield Finding(
             name="yaw_rate_bias_radps", value=bias, std=std, rest=found.rest,
-            text=f"r_radps is {with_std(bias, std)} rad/s more than the rate at which the heading changes: the zero of "
-            f"a gyro? Where the heading is right, add {bias:.4g} to sensors.yaw_rate_bias_radps.",
+            text=f"r_radps is {plus_minus(bias, std)} rad/s more than the rate at which the heading changes: the zero "
+            f"of a gyro? Where the heading is right, add {bias:.4g} to sensors.yaw_rate_bias_radps.",
         )  # fmt: skip
     delay, std = -float(found.others[1].real), float(found.others_std[1, 0])
     if abs(delay) > max(CERTAIN * std, DELAY_MATTERS * own[0].sample_time_s):
         later, sooner = ("r_radps", "the heading")[:: 1 if delay > 0 else -1]
         yield Finding(
             name="yaw_rate_delay_s", value=delay, std=std, rest=found.rest,
-            text=f"{later} comes {with_std(abs(delay), std)} s later than {sooner}.",
+            text=f"{later} comes {plus_minus(abs(delay), std)} s later than {sooner}.",
         )  # fmt: skip
 
 
@@ -102,15 +103,16 @@ def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Itera
     if abs(angle) > max(CERTAIN * std, TURN_MATTERS_RAD):
         yield Finding(
             name="heading_bias_rad", value=angle, std=std, rest=found.ahead.rest,
-            text=f"the heading is {with_std(angle / DEGREE, std / DEGREE)} degrees more than positions and velocities "
-            f"say: add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
+            text=f"the heading is {plus_minus(angle / DEGREE, std / DEGREE)} degrees more than positions and "
+            "velocities say: "
+            f"add {angle:.4g} to sensors.heading_bias_rad, or {-angle:.4g} to sensors.velocity_angle_rad.",
         )  # fmt: skip
     drift, spread = found.of("drift")
     if abs(drift) > max(CERTAIN * float(np.hypot(*spread)), WAY_MATTERS * speed):
         toward = float(np.degrees(np.angle(drift)) % 360.0)
         yield Finding(
             name="current_mps", value=abs(drift), std=float(np.hypot(*spread)), rest=found.ahead.rest,
-            text=f"the positions move at {with_std(abs(drift), float(np.hypot(*spread)))} m/s towards {toward:.0f} "
+            text=f"the positions move at {plus_minus(abs(drift), float(np.hypot(*spread)))} m/s towards {toward:.0f} "
             "degrees beyond u_mps and v_mps: are these through the water, and not over ground?",
         )  # fmt: skip
     yield from _clocks(found)
@@ -208,8 +210,8 @@ def _log_scale(found: _Log) -> Iterator[Finding]:
         if abs(value - 1.0) > max(CERTAIN * error, SCALE_MATTERS):
             yield Finding(
                 name=f"{axis}_scale", value=value, std=error, rest=whole.rest,
-                text=f"{column} is {with_std(value, error)} times the {axis} speed that the positions give: the scale "
-                "of one axis of a log?",
+                text=f"{column} is {plus_minus(value, error)} times the {axis} speed that the positions give: the "
+                "scale of one axis of a log?",
             )  # fmt: skip
 
 
@@ -223,7 +225,7 @@ def _one_scale(found: _Log) -> Iterator[Finding]:
     excluded, nearer = (True, False) if found.apart is None else _sway_is_right(found.apart)
     whole = found.apart.ahead if nearer and found.apart is not None else found.ahead
     scale, std = 1.0 / whole.size, whole.size_std / whole.size**2
-    size = with_std(scale, std)
+    size = plus_minus(scale, std)
     if nearer:
         text = f"u_mps is {size} times the surge speed that the positions give, and perhaps v_mps too (sway is too " \
             "little to tell): the scale of a log?"  # fmt: skip
@@ -250,14 +252,14 @@ def _clocks(found: _Log) -> Iterator[Finding]:
         late = "later" if late_s > 0 else "sooner"
         yield Finding(
             name="velocity_delay_s", value=late_s, std=std, rest=found.ahead.rest,
-            text=f"u_mps and v_mps come {with_std(abs(late_s), std)} s {late} than heading and positions.",
+            text=f"u_mps and v_mps come {plus_minus(abs(late_s), std)} s {late} than heading and positions.",
         )  # fmt: skip
     if "positions" in found.names:
         early_s, std = found.of("positions")[0].real, found.delay_std("positions")
         later, sooner = ("heading, u_mps and v_mps", "the positions")[:: 1 if early_s > 0 else -1]
         yield Finding(
             name="position_delay_s", value=-early_s, std=std, rest=found.ahead.rest,
-            text=f"{later} come {with_std(abs(early_s), std)} s later than {sooner}.",
+            text=f"{later} come {plus_minus(abs(early_s), std)} s later than {sooner}.",
         )  # fmt: skip
 
 
@@ -272,8 +274,8 @@ def _place(found: _Log, sample_time_s: float, speed: float, *, length_m: float) 
         clock = "u_mps and v_mps come" if arm.real > 0 else "the positions come"
         yield Finding(
             name="position_forward_m", value=float(arm.real), std=float(spread[0]), rest=found.ahead.rest,
-            text=f"the positions are those of a place {with_std(abs(arm.real), spread[0])} m {ahead} and "
-            f"{with_std(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
+            text=f"the positions are those of a place {plus_minus(abs(arm.real), spread[0])} m {ahead} and "
+            f"{plus_minus(abs(arm.imag), spread[1])} m to {beside} of where u_mps and v_mps are measured"
             + (f", or {clock} {abs(arm.real) / speed:.2g} s late." if abs(arm.real) > abs(arm.imag) and not late
                else "."),
         )  # fmt: skip
@@ -382,9 +384,3 @@ def integral(values: Array, batch: Batch) -> Array:
 def _rms(values: Array) -> float:
     seen = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(seen**2))) if len(seen) else 0.0
-
-
-def with_std(value: float, std: float) -> str:
-    """A value with its standard error, to as many digits."""
-    digits = max(0, 1 - int(np.floor(np.log10(std)))) if std > 0 else 3
-    return f"{value:.{digits}f} \N{PLUS-MINUS SIGN} {std:.{digits}f}"

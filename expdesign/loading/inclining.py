@@ -27,7 +27,7 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.values import Array
 from expdesign.vessel import RollPendulum
-from expdesign.vessel.masses import G_MPS2
+from expdesign.vessel.roll import G_MPS2
 
 MOST_HEEL_RAD = math.radians(10.0)
 """Beyond which righting moments are not those of the metacentric height; rules ask for 4 degrees at most."""

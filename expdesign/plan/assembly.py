@@ -11,7 +11,7 @@ import shapely
 
 from expdesign.errors import InputError, NoPlan, NoRoom
 from expdesign.plan.chart import (
-    CHART,
+    CORNERS,
     ClearanceField,
     GoalDistance,
     build_goal_distance,
@@ -36,14 +36,15 @@ from expdesign.plan.local_planner import (
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
 from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
-from expdesign.plan.tuning import PLAN
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.vessel.hull import covering_discs
+from expdesign.vessel.vessel import covering_discs
+
+TRANSITION_BEAM = 100  # partial plans kept in the searches that choose the transitions to optimise
 
 # how many times finer the clearance grid is where the usual one is too coarse for a passage or a place
 FINER_GRID = 4.0
@@ -123,7 +124,7 @@ def roomy_water(
         finer = leg_water(problem, ship, finer=FINER_GRID)
     if finer.field.cell_m >= 0.75 * water.field.cell_m:  # the area is too large for it
         finer = replace(finer, field=water.field)
-    if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CHART.corners[1][1]:
+    if finer.field is not water.field or shapely.get_num_coordinates(problem.area.water) > CORNERS[1][1]:
         water = finer
     return water, plan_room(problem, water, progress, like)
 
@@ -173,7 +174,7 @@ def leg_water(problem: PlanProblem, ship: Capability, *, finer: float = 1.0) -> 
         area=problem.area,
         clearance_m=problem.settings.clearance_m,
         field=clearance_field(problem.area, resolution_m=problem.vessel.length_m / 8 / finer),
-        corners=CHART.corners if finer == 1.0 else MORE_CORNERS,
+        corners=CORNERS if finer == 1.0 else MORE_CORNERS,
         start_tolerance=problem.settings.start_tolerance,
         paths=problem.settings.paths,
     )
@@ -244,7 +245,7 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
         part("trying transitions between runs", 0.0)
         try:
             placements = place_runs(
-                space, counts, start=problem.start, exit_mps=begin_mps, width=PLAN.transition_beam, orders=0
+                space, counts, start=problem.start, exit_mps=begin_mps, width=TRANSITION_BEAM, orders=0
             )
         except NoPlan:  # the main search keeps more, and says what is impossible
             break

@@ -19,9 +19,8 @@ from expdesign.plan.monte_carlo import (
     worst_leg,
 )
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.values import RiskEstimate, SailedTrial, Verification
+from expdesign.plan.values import RiskEstimate, SailedTrial, Verification, WorkBudget
 from expdesign.plan.verify import verify_plan
-from expdesign.plan.work_budget import WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
 

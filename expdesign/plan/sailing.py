@@ -1,7 +1,6 @@
-"""Sailing a trial run by run; where a leg or a run fails, the remaining runs are placed again.
+"""Sailing a trial run by run, stretch after stretch; where a leg or a run fails, the remaining runs are placed again.
 
 Legs found before the runs between them are sailed: each from where the run before it ends if it begins as planned.
-
 So the legs of a placement do not wait for each other, and processes share them.
 """
 
@@ -24,11 +23,81 @@ from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_st
 from expdesign.plan.local_planner import LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.search import PlacementSearch, placement_search
-from expdesign.plan.timeline import Timeline
-from expdesign.plan.values import Placement, Placements, SailedTrial
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import Leg, Placement, Placements, SailedTrial, WorkBudget
 from expdesign.progress import Progress, silent
+from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SailedStretch:
+    """A leg with its commands (k, m) and states (k + 1, 6), and what found its path."""
+
+    kind: str
+    name: str
+    commands: Array
+    states: Array
+    path: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Timeline:
+    """The trial so far."""
+
+    begin: Array  # (6,) state before the first stretch
+    begin_inputs: Array  # (m,) commands standing then
+    stretches: list[SailedStretch] = field(default_factory=list)  # in time order; the only part that grows
+
+    @property
+    def state(self) -> Array:
+        """(6,) where the ship is now."""
+        return np.asarray(self.stretches[-1].states[-1] if self.stretches else self.begin)
+
+    @property
+    def inputs(self) -> Array:
+        """(m,) commands standing now."""
+        return np.asarray(self.stretches[-1].commands[-1] if self.stretches else self.begin_inputs)
+
+    @property
+    def given(self) -> Array:
+        """(h, m) all commands so far, what stood before them first."""
+        return np.concatenate([self.begin_inputs[None], *(stretch.commands for stretch in self.stretches)])
+
+    @property
+    def last(self) -> str:
+        """Name of the stretch sailed last, or ""."""
+        return self.stretches[-1].name if self.stretches else ""
+
+    def sail(self, kind: str, name: str, commands: Array, track: Trajectory, path: str = "") -> None:
+        """Add a stretch."""
+        states = np.hstack([track.pose, track.velocity])
+        self.stretches.append(SailedStretch(kind=kind, name=name, commands=commands, states=states, path=path))
+
+    def undo_run(self) -> Placement:
+        """Remove the last run and the leg to it; where the run began."""
+        run = self.stretches.pop()
+        self.stretches.pop()
+        return Placement(primitive=run.name, pose=run.states[0, :3])
+
+    def joined(self, *, sample_time_s: float, names: tuple[str, ...]) -> SailedTrial:
+        """Everything as one command series, one trajectory and the legs in it."""
+        values = np.concatenate([stretch.commands for stretch in self.stretches])
+        states = np.concatenate([self.begin[None], *(stretch.states[1:] for stretch in self.stretches)])
+        ends = np.cumsum([len(stretch.commands) for stretch in self.stretches]).tolist()
+        legs = tuple(
+            Leg(
+                kind=stretch.kind,
+                name=stretch.name,
+                first=end - len(stretch.commands),
+                last=end,
+                path=stretch.path,
+            )
+            for stretch, end in zip(self.stretches, ends, strict=True)
+        )
+        commands = Commands(sample_time_s=sample_time_s, names=names, values=values)
+        track = Trajectory(sample_time_s=sample_time_s, pose=states[:, :3], velocity=states[:, 3:])
+        return SailedTrial(commands=commands, trajectory=track, legs=legs, standing=self.begin_inputs)
+
 
 FAILURE_S = 2.0  # least cost of a failed placement [s]
 CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is stuck ends, whatever its counted work

@@ -1,6 +1,5 @@
 """Independent work, shared among processes of this machine or the workers of a Dask scheduler."""
 
-from expdesign.processes.reporting import reported_together
 from expdesign.processes.sharing import (
     ahead,
     as_finished,
@@ -9,5 +8,6 @@ from expdesign.processes.sharing import (
     local_processes,
     on_cluster,
     processors,
+    reported_together,
     shared_among,
 )

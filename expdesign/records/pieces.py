@@ -21,8 +21,7 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
-from expdesign.records.file import FIRST_ROW, JITTER_SHARE, MISSING, Inputs, Sources, choose_columns
-from expdesign.records.tuning import TUNING
+from expdesign.records.file import FIRST_ROW, GAP_SAMPLE_TIMES, JITTER_SHARE, MISSING, Inputs, Sources, choose_columns
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 from expdesign.vessel import column_name
@@ -132,7 +131,7 @@ def pieces(
         stretch = max(1, round(stretch_s / step_s))
         how = _Cut(
             source=source, header=header, columns=columns, rows=stretch * max(1, most_rows // stretch),
-            stretch=stretch, gap_s=TUNING.gap_sample_times * step_s,
+            stretch=stretch, gap_s=GAP_SAMPLE_TIMES * step_s,
             more_follow=more_follow, begins=(begins := _digest(header, first)), skipped=0,
         )  # fmt: skip
         known = next((t for t in taken if t.continues(Taken(source.name, begins, 0, math.nan))), None)
@@ -206,7 +205,7 @@ class _Cut:
         Steps that are uneven again and again are no corrections, and for the reader to refuse.
         """
         steps = np.diff(self.columns.times(lines))
-        step_s = self.gap_s / TUNING.gap_sample_times
+        step_s = self.gap_s / GAP_SAMPLE_TIMES
         uneven = (steps <= 0) | ((np.abs(steps - step_s) > JITTER_SHARE * step_s) & (steps <= self.gap_s))
         return int(np.argmax(uneven)) + 1 if 0 < uneven.sum() <= CORRECTED_SHARE * len(steps) else 0
 

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from expdesign.reduction.tuning import TUNING
 from expdesign.signals import Batch, Delivered, Record
 from expdesign.values import Array
+
+SHORTEST_BATCH = 4  # samples that a batch must keep
 
 LONGEST_MEAN_S = 1.0  # over which samples are averaged, at most [s]
 # of the time in which the ship sails, or turns through, her length, over which they are, at most. Her own times are a
@@ -29,13 +30,13 @@ MEAN_SHARE = 0.1
 def averaged(record: Record, count: int) -> Record:
     """The record with so many samples averaged to one; the record itself for 1.
 
-    Batches of fewer than `Tuning.shortest_batch` means are left out, unless all are so short.
+    Batches of fewer than `SHORTEST_BATCH` means are left out, unless all are so short.
 
     Args:
         record: reduced, with inputs as delivered.
         count: of `samples_of_a_mean`.
     """
-    long = [batch for batch in record.batches if len(batch) >= count * TUNING.shortest_batch]
+    long = [batch for batch in record.batches if len(batch) >= count * SHORTEST_BATCH]
     return record if count < 2 or not long else replace(record, batches=tuple(_averaged(b, count) for b in long))
 
 

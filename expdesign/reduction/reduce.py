@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
+from expdesign.reduction.averaging import SHORTEST_BATCH
 from expdesign.reduction.sensors import Stated, measured, off_centre, prompt, shrinkage, turned, undone
-from expdesign.reduction.tuning import TUNING
 from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 from expdesign.signals import Batch, Delivered, Record
 from expdesign.simulation import acting_response, deliver, step_shares
@@ -278,7 +278,7 @@ def at_reference_point(record: Record, sensors: Sensors, *, smoothed: bool = Fal
     kept = [cut for item in stated if (cut := _without_ends(item.batch, undone(item))) is not None]
     if not kept:
         raise InputError(
-            f"no batch is longer than the delays of the vessel's sensors by {TUNING.shortest_batch} samples or more, "
+            f"no batch is longer than the delays of the vessel's sensors by {SHORTEST_BATCH} samples or more, "
             "expected such a batch"
         )
     notes = list(dict.fromkeys(remark for item in stated for remark in remarks(item)))
@@ -314,7 +314,7 @@ def _without_ends(before: Batch, after: Batch) -> Batch | None:
     if before.wind is not None and after.wind is not None:
         lost = lost | _lost(before.wind, after.wind)
     known = np.flatnonzero(~lost)
-    if len(known) < TUNING.shortest_batch:
+    if len(known) < SHORTEST_BATCH:
         return None
     part = slice(int(known[0]), int(known[-1]) + 1)
     return after if part == slice(0, len(after)) else after.cut(part)

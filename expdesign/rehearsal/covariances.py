@@ -20,8 +20,7 @@ from expdesign.durations import monte_carlo_covariance
 from expdesign.errors import InputError
 from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
-from expdesign.rehearsal.tuning import TUNING
-from expdesign.rehearsal.validation import Rehearsal, equal_runs, estimates_of
+from expdesign.rehearsal.validation import CHUNK_TRIALS, Rehearsal, equal_runs, estimates_of
 from expdesign.simulation import CALM, Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
@@ -114,7 +113,7 @@ def estimates_alone(
         trials=trials,
         seed=seed,
     )
-    chunks = [(name, number) for name in names for number in range(-(-trials // TUNING.chunk_trials))]
+    chunks = [(name, number) for name in names for number in range(-(-trials // CHUNK_TRIALS))]
     found: dict[tuple[str, int], Array] = {}
     for name, number, rows in as_finished(_chunk, (rehearsal,), chunks):
         found[name, number] = rows
@@ -128,7 +127,7 @@ def estimates_alone(
 
 
 def _chunk(rehearsal: Rehearsal, name: str, number: int) -> tuple[str, int, Array]:
-    trials = min(TUNING.chunk_trials, rehearsal.trials - number * TUNING.chunk_trials)
+    trials = min(CHUNK_TRIALS, rehearsal.trials - number * CHUNK_TRIALS)
     return name, number, estimates_of(rehearsal, name, number, trials)
 
 

@@ -29,16 +29,18 @@ from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.information.excitation import FREE, SIGMAS
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.information.tuning import TUNING as INFORMATION_TUNING
+from expdesign.information.moments import HEADINGS
 from expdesign.processes import as_finished
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point, with_delivered_inputs
-from expdesign.rehearsal.tuning import TUNING
 from expdesign.signals import Batch, Record
 from expdesign.simulation import CALM, Environment, mean_weather, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+SINGLE_TRIALS = 5  # the same of random runs, simulated trial by trial: processes share smaller chunks more evenly
+CHUNK_TRIALS = 20  # trials in one chunk; each chunk has its own random stream
 
 RANDOM = "random"
 GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)
@@ -164,7 +166,7 @@ def validate(
 def _tasks(rehearsal: Rehearsal) -> Iterator[tuple[str, str, int, int]]:
     """(key, design, chunk number, trials in it)."""
     for name, runs in rehearsal.designs.items():
-        most = TUNING.single_trials if runs is None else TUNING.chunk_trials
+        most = SINGLE_TRIALS if runs is None else CHUNK_TRIALS
         for number, first in enumerate(range(0, rehearsal.trials, most)):
             last = min(first + most, rehearsal.trials)
             yield f"{name}/{first}-{last}", name, number, last - first
@@ -311,10 +313,10 @@ def trial_parts(
 ) -> tuple[TrialPart, ...]:
     """The parts of a trial of runs, whole or not, in the dictionary's order.
 
-    In wind or current, information depends on the heading; unknown headings are then replaced by `Tuning.headings`
+    In wind or current, information depends on the heading; unknown headings are then replaced by `HEADINGS`
     evenly spread ones.
     """
-    count = 1 if environment.isotropic else INFORMATION_TUNING.headings
+    count = 1 if environment.isotropic else HEADINGS
     return tuple(
         TrialPart(
             commands=primitive.commands,

@@ -30,12 +30,4 @@ from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, directi
 from expdesign.roll.problem import RollProblem, build_problem
 from expdesign.roll.runs import EFFECTS, Case, LowPass, Run, low_pass, prepared
 from expdesign.roll.tuning import TUNING
-from expdesign.vessel.masses import (
-    G_MPS2,
-    NOMINAL,
-    Body,
-    Load,
-    axis_inertia,
-    first_moment,
-    sensed_inertia,
-)
+from expdesign.vessel.roll import G_MPS2, NOMINAL, Body, Load, axis_inertia, first_moment, sensed_inertia

@@ -40,7 +40,7 @@ from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.vessel.masses import G_MPS2, Load
+from expdesign.vessel.roll import G_MPS2, Load
 
 AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
 MOST_ROUNDS = 12  # of instruments and noise models

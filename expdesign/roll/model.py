@@ -25,7 +25,7 @@ import numpy as np
 
 from expdesign.errors import UnknownName
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import G_MPS2, Body, Load
+from expdesign.vessel.roll import G_MPS2, Body, Load
 from expdesign.waves import froude_factor
 
 UNITS = {

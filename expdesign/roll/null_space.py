@@ -23,7 +23,7 @@ from expdesign.roll.estimate import UNSEEN, RollEstimate
 from expdesign.roll.model import PARAMETERS, UNITS, named, relative_sensitivity
 from expdesign.roll.problem import RollProblem
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import Body, Load
+from expdesign.vessel.roll import Body, Load
 
 OPEN_SIZES = 5.0  # change along an open direction that is counted with, in sizes of the parameter that it moves most
 FAINT_STD = 1.0  # relative standard deviation along a direction from which data are said not to determine it

@@ -12,7 +12,7 @@ from expdesign.roll.instruments import Weighted
 from expdesign.roll.model import PARAMETERS, discrete, parameters
 from expdesign.roll.runs import Case
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, first_moment
+from expdesign.vessel.roll import G_MPS2, NOMINAL, Body, first_moment
 
 FARTHEST = 10.0  # typical sizes from zero, beyond which no parameter is sought
 

@@ -35,7 +35,7 @@ from expdesign.signals import AUXILIARY, Batch
 from expdesign.simulation import acting_response, delivered_at_samples, steering_signals
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, ROLL_PARAMETERS, RollPendulum, Vessel
-from expdesign.vessel.masses import G_MPS2, Body, Load
+from expdesign.vessel.roll import G_MPS2, Body, Load
 
 # Runs of roll from batches of measured data.
 

@@ -19,7 +19,7 @@ import scipy
 from expdesign.errors import InputError, NotInformative
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
-from expdesign.vessel.masses import Load
+from expdesign.vessel.roll import Load
 
 SAMPLES_PER_PERIOD = 80.0  # of roll, at least; fewer bias the bilinear map by a share of about (pi / samples)^2 / 3
 UNWARPED_PERIODS = 3.0  # frequencies, in that of roll, up to which the bilinear map is made exact; none above twice it

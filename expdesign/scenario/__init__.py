@@ -8,12 +8,11 @@ a list count from 1, as in ``actuators[2].speed_max_rps``), the value found and 
 
 from expdesign.scenario.card_file import load_card
 from expdesign.scenario.charts import load_area
+from expdesign.scenario.design_file import load_repeats
 from expdesign.scenario.dictionaries import load_dictionary
-from expdesign.scenario.durations_file import load_repeats
 from expdesign.scenario.instruments_file import INSTRUMENTS, equipped_vessel
 from expdesign.scenario.loads_file import LoadCases, load_cases
 from expdesign.scenario.mapping_file import load_mapping
-from expdesign.scenario.scenario_file import load_scenario
+from expdesign.scenario.scenario_file import Variant, load_scenario, load_variant
 from expdesign.scenario.values import DesignSettings, Scenario
-from expdesign.scenario.variant_file import Variant, load_variant
 from expdesign.scenario.vessels import load_vessel

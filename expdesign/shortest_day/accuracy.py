@@ -25,14 +25,13 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.durations import Collected, DurationDesign
-from expdesign.durations.criteria import LogTrace
-from expdesign.durations.criteria.measures import SmoothMeasure
-from expdesign.durations.criteria.models import congruent
+from expdesign.durations.criteria import LogTrace, congruent
+from expdesign.durations.measures import SmoothMeasure
 from expdesign.errors import InputError, NotInformative
+from expdesign.information.disturbed import beside_current, curved_beside_current, slope_of_whole
 from expdesign.information.expected import expected_covariance
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise
-from expdesign.information.unknown_current import beside_current, curved_beside_current, slope_of_whole
 from expdesign.rehearsal import trial_parts
 from expdesign.shortest_day.values import AccuracySettings
 from expdesign.simulation import CALM, Environment

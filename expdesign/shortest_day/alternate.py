@@ -24,9 +24,10 @@ from expdesign.shortest_day.bounds import day_bound, fastest_mps, way_bound_s
 from expdesign.shortest_day.cheapest import Choice, cheapest_runs, fullest_level, shares_costs_s
 from expdesign.shortest_day.drafting import Drafting
 from expdesign.shortest_day.prices import DraftedDay, Offer, Prices, first_prices, learnt_prices, near_day, offered
-from expdesign.shortest_day.tuning import TUNING
 from expdesign.shortest_day.values import DayBound, DayParts, DayTried, ShortestDay
 from expdesign.values import Array
+
+ROUNDS = 5  # most days that are planned in search of the shortest
 
 NEAREST = 3  # days to the accuracy, from which the next is sought
 # margin that is asked for besides where the cheapest runs were tried already, at most so many times
@@ -155,7 +156,7 @@ class _Search:
             NoPlan: no day was found at all.
         """
         prices, days, choices = first_prices(self.problem), list[DraftedDay](), list[Choice]()
-        count = 1 if self.problem.settings.draft else TUNING.rounds
+        count = 1 if self.problem.settings.draft else ROUNDS
         *told, last = in_phases(never_falling(progress), *np.ones(count + 1))
         rounds = [of_part(one, f"day {number} of at most {count}") for number, one in enumerate(told, start=1)]
         refused = NoPlan("no day was planned")

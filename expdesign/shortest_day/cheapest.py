@@ -39,8 +39,9 @@ from numpy.typing import NDArray
 from expdesign.errors import NoAnswer
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.prices import MOST_RUNS, Offer
-from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array
+
+CHOICE_GAP = 1e-3  # relative gap at which the choice of runs ends
 
 LEAST_LEVEL, LEVEL_HALVINGS = -4.0, 12  # least margin of a day of a given length, and steps in search of the largest
 CUTS = 200  # most linear bounds on an accuracy without second derivatives, in the choice of runs, not whole
@@ -79,7 +80,7 @@ def _cheaper(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Ite
 
     cost_s = after(offer.cost_s) - np.minimum(after(offer.saved_s), offer.way_s)
     tangent = accuracy.margin(M) + after(slope) - runs @ slope
-    kept = np.nonzero((cost_s < offer.total_s(runs) * (1 - TUNING.choice_gap)) & (tangent >= least))
+    kept = np.nonzero((cost_s < offer.total_s(runs) * (1 - CHOICE_GAP)) & (tangent >= least))
     order = np.argsort(np.round(cost_s[kept], EQUAL), kind="stable")
     for left, taken in zip(*(places[order] for places in kept), strict=True):
         other = runs + put[taken] - out[left]
@@ -139,7 +140,7 @@ def cheapest_runs(accuracy: Accuracy, offer: Offer, *, level: float = 0.0) -> Ch
         NoAnswer: no runs within the limits reach it.
     """
     relaxed = cheapest_shares(accuracy, offer, level=level)
-    runs = np.clip(np.ceil(relaxed.runs - TUNING.choice_gap), offer.fewest, offer.most)
+    runs = np.clip(np.ceil(relaxed.runs - CHOICE_GAP), offer.fewest, offer.most)
     if not runs.any() or accuracy.margin(offer.information(runs)) < level:
         runs = np.minimum(runs + 1.0, offer.most)
     runs = exchanged(accuracy, offer, runs, level)
@@ -336,12 +337,12 @@ def _relaxed(task: _Relaxation) -> Relaxed:
             worth_of_saved=min(float(y[told]), 1.0) if task.high[-1] > 0 else 0.0,
         )
         missing = task.level - accuracy.margin(offer.information(x[:-1]))
-        if missing <= TUNING.choice_gap / 10:
+        if missing <= CHOICE_GAP / 10:
             break
         short, enough = x[:-1], inner[:-1]
-        for _ in range(HALVINGS if missing > TUNING.choice_gap else 0):
+        for _ in range(HALVINGS if missing > CHOICE_GAP else 0):
             middle = (short + enough) / 2
             reaches = accuracy.margin(offer.information(middle)) >= task.level
             short, enough = (short, middle) if reaches else (middle, enough)
-        task.add(enough if missing > TUNING.choice_gap else short)
+        task.add(enough if missing > CHOICE_GAP else short)
     return best

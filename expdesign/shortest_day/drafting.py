@@ -21,8 +21,8 @@ from expdesign.plan.verify import expected_errors, track_information
 from expdesign.processes import in_order
 from expdesign.progress import Progress
 from expdesign.shortest_day.accuracy import Accuracy
+from expdesign.shortest_day.cheapest import CHOICE_GAP
 from expdesign.shortest_day.prices import DraftedDay, fewest_runs, lost_s, with_legs
-from expdesign.shortest_day.tuning import TUNING
 from expdesign.values import Array
 
 LEFT_OUT = 4  # runs that are tried to be left out of a day, one at a time, before none is
@@ -122,6 +122,6 @@ def _with_one_fewer(day: DraftedDay, accuracy: Accuracy) -> list[list[Placement]
     spare = day.margin - accuracy.margin(day.whole)
     margins = np.array([accuracy.margin(day.whole - told[place]) + spare for place in runs])
     placed = list(draft.sailed.placements)
-    worth = saved_s / np.maximum(day.margin - margins, TUNING.choice_gap)
+    worth = saved_s / np.maximum(day.margin - margins, CHOICE_GAP)
     order = [row for row in np.argsort(-worth).tolist() if margins[row] > -FORESEEN and saved_s[row] > 0]
     return [placed[:row] + placed[row + 1 :] for row in order[:LEFT_OUT]]

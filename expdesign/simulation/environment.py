@@ -8,7 +8,7 @@ import numpy as np
 
 from expdesign.errors import InputError
 from expdesign.values import Array, seal
-from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
+from expdesign.vessel.vessel import CALM, STEADY, Environment, Variation
 
 __all__ = [
     "CALM",

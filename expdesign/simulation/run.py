@@ -1,9 +1,8 @@
 """Runs: one by compiled steps, many at once with arrays; inputs are held between samples.
 
-Roll in radians beside a simulated motion: as its roll mode gives it, or of a pendulum that the motion drives.
-
-Between two samples the pendulum's drive, the moment of side acceleration, yaw rate and rudder, runs along a straight
-line; the step of the linear system is then exact.
+Roll in radians stands beside a motion, as its roll mode gives it, or of a pendulum that the motion drives. Between two
+samples the pendulum's drive, the moment of side acceleration, yaw rate and rudder, runs along a straight line; the step
+of the linear system is then exact.
 
 Source: K. J. Åström and B. Wittenmark, Computer-Controlled Systems (1997), 2.3 and 2.8, for the step.
 """

@@ -1,15 +1,9 @@
-"""Standard trials: turning circle, zig-zag, pull-out, stop, carried out by a simulated helmsman.
-
-The simulated helmsman and engineer: orders that follow the motion, carried out as fast as the actuators allow.
-
-An order falls where its moment falls, also between samples: the command of that sample is the mean over it of an order
-that moves with the largest rate.
-
-Standard trials in calm water: turning circle, zig-zag, pull-out, initial turn, stop. The helmsman is simulated.
+"""Standard trials in calm water, carried out by a simulated helmsman: turning circle, zig-zag, pull-out, turn, stop.
 
 Every trial starts at the origin, heading north, steady ahead (`steady_ahead`), and gives the commands, which obey all
-limits and rates and can be run again by `simulate`, and the motion. Orders fall between samples as they would at sea,
-so results vary continuously with the model's parameters.
+limits and rates and can be run again by `simulate`, and the motion. Orders follow the motion and fall where their
+moment falls, also between samples: the command of that sample is the mean over it of an order that moves with the
+largest rate. So results vary continuously with the model's parameters.
 
 Source: IMO MSC/Circ.1053 (2002), 2; ITTC Recommended Procedure 7.5-04-02-01 (2017).
 """

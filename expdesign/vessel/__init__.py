@@ -13,8 +13,6 @@ from expdesign.vessel.actuators import (
     response_keys,
     stem,
 )
-from expdesign.vessel.environment import CALM, STEADY, Environment, Variation
-from expdesign.vessel.expressions import NUMPY, SCALAR, Operators
 from expdesign.vessel.inverse import (
     Allocator,
     allocate,
@@ -27,9 +25,17 @@ from expdesign.vessel.inverse import (
     required_push,
     within_limits,
 )
-from expdesign.vessel.masses import NOMINAL, Body, Load
 from expdesign.vessel.model import NOT_SUPPORTED, UNSTATED_SHARE, Inertia, VesselModel
-from expdesign.vessel.roll import NOT_ACTING_BACK, ROLL_PARAMETERS, Roll, RollPendulum
+from expdesign.vessel.roll import NOMINAL, NOT_ACTING_BACK, ROLL_PARAMETERS, Body, Load, Roll, RollPendulum
 from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
-from expdesign.vessel.structures import STRUCTURES, TERMS, Term, structure_terms
-from expdesign.vessel.vessel import Vessel, response_values, std_keys, with_response_values
+from expdesign.vessel.structures import NUMPY, SCALAR, STRUCTURES, TERMS, Operators, Term, structure_terms
+from expdesign.vessel.vessel import (
+    CALM,
+    STEADY,
+    Environment,
+    Variation,
+    Vessel,
+    response_values,
+    std_keys,
+    with_response_values,
+)

@@ -17,9 +17,8 @@ import numpy as np
 
 from expdesign.values import Array
 from expdesign.vessel.actuators import Actuator
-from expdesign.vessel.expressions import Operators
 from expdesign.vessel.model import Inertia, VesselModel
-from expdesign.vessel.structures import Term
+from expdesign.vessel.structures import Operators, Term
 
 CASADI = Operators(ca.fabs, ca.sin, ca.cos)
 SHIPS = tuple(1 << power for power in reversed(range(8)))

@@ -19,7 +19,7 @@ from typing import Any
 
 from expdesign.errors import InputError
 from expdesign.values import frozen_set
-from expdesign.vessel.expressions import Operators, Signals
+from expdesign.vessel.structures import Operators, Signals
 
 KINDS: dict[str, tuple[str, ...]] = {
     "azimuth": ("n", "a"),

@@ -12,9 +12,8 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
-from expdesign.vessel.expressions import NUMPY, Expression
 from expdesign.vessel.model import VesselModel
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, NUMPY, SHOAL, Expression, Term
 from expdesign.vessel.thrusts import LEAST_PUSH, required_thrust, thrusts
 from expdesign.vessel.thrusts import pushed_everywhere as pushed_everywhere_at_rest
 

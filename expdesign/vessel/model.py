@@ -34,9 +34,18 @@ from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator, generalised_force
-from expdesign.vessel.expressions import NUMPY, Expression, Operators, Signals, parse_expression
 from expdesign.vessel.roll import Roll
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, Term
+from expdesign.vessel.structures import (
+    FORCE_SIGNALS,
+    MOTION_SIGNALS,
+    NUMPY,
+    SHOAL,
+    Expression,
+    Operators,
+    Signals,
+    Term,
+    parse_expression,
+)
 
 # Coupled inertia of sway and yaw, as of a ship whose centre of gravity is not at the origin of the b-frame.
 

@@ -15,8 +15,9 @@ and on a straight course roll is zero.
     A1 phi'' = -(k + g S1) phi - d phi' + (K_vd + S1) a_y + K_r r + K_delta delta          a_y = dv/dt + u r
     A1 = A_x + I_m + M (z_g + z_f)^2 + m (z_m + z_f)^2          S1 = M (z_g + z_f) + m (z_m + z_f)
 
-with masses M of the ship and m of a load, at z [m] down from a body origin, and the rotation axis z_f above it. An
-accelerometer reads a_s = z_s phi'' + g phi - a_y to port. K_r and K_delta hold for one speed.
+with masses M of the ship and m of a load, at z [m] down from a body origin, so that -z is a height, and the rotation
+axis z_f above it; a mass at z is z + z_f below the axis. An accelerometer reads a_s = z_s phi'' + g phi - a_y to port.
+K_r and K_delta hold for one speed.
 
 Source: K. Son and K. Nomoto, Journal of the Society of Naval Architects of Japan 150 (1981), 232-244; T. Perez and
 M. Blanke, Mathematical Ship Modelling for Control Applications (2002), for the linear roll mode and its coupling terms;
@@ -31,8 +32,66 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from expdesign.errors import InputError
-from expdesign.vessel.masses import G_MPS2, NOMINAL, Body, Load, axis_inertia, first_moment
+from expdesign.waves import G_MPS2 as G_MPS2
 from expdesign.waves import Waves
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """A mass on board beside the ship's own."""
+
+    mass_kg: float  # not negative
+    z_m: float  # of its centre, down from the body origin [m]
+    inertia_kgm2: float = 0.0  # about its own centre
+
+    def __post_init__(self) -> None:
+        for name in ("mass_kg", "inertia_kgm2"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(f"load.{name} is {getattr(self, name):g}, expected 0 or more")
+        if not math.isfinite(self.z_m):
+            raise InputError(f"load.z_m is {self.z_m:g}, expected a finite place")
+
+
+NOMINAL = Load(mass_kg=0.0, z_m=0.0)
+"""No load besides the ship."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """What is known of the ship without load: from scales, a tilting test and a ruler."""
+
+    mass_kg: float  # M, positive
+    z_g: float  # of its centre of mass, down from the body origin [m]
+    z_s: float  # of the accelerometer, down [m]: from the body origin, or from the rotation axis
+    sensor_from_axis: bool = False  # z_s is counted from the rotation axis, which somebody has located
+    forward_m: float = 0.0  # the sensor before the axis of yaw, whose yaw acceleration it reads
+    tilt_rad: float = 0.0  # of the sensor, its bow end up: its gyros mix roll and yaw
+
+    def __post_init__(self) -> None:
+        if not 0 < self.mass_kg < math.inf:
+            raise InputError(f"body.mass_kg is {self.mass_kg:g}, expected more than 0")
+        for name in ("z_g", "z_s", "forward_m", "tilt_rad"):
+            if not math.isfinite(getattr(self, name)):
+                raise InputError(f"body.{name} is {getattr(self, name):g}, expected a finite place")
+
+    def sensor(self, z_f: float) -> float:
+        """Accelerometer, down from the rotation axis [m]."""
+        return self.z_s if self.sensor_from_axis else self.z_s + z_f
+
+
+def first_moment(body: Body, load: Load, z_f: float = 0.0) -> float:
+    """S1 = M z_g + m z_m about the rotation axis [kg m]; negative for a ship whose masses lie above it."""
+    return body.mass_kg * (body.z_g + z_f) + load.mass_kg * (load.z_m + z_f)
+
+
+def axis_inertia(own: float, body: Body, load: Load, z_f: float = 0.0) -> float:
+    """I1 = I_x + M z_g^2 + I_xm + m z_m^2 about the rotation axis [kg m2]; A1 where `own` has the added inertia."""
+    return own + load.inertia_kgm2 + body.mass_kg * (body.z_g + z_f) ** 2 + load.mass_kg * (load.z_m + z_f) ** 2
+
+
+def sensed_inertia(own: float, body: Body, load: Load, z_f: float = 0.0) -> float:
+    """I2 = I1 - z_s S1, the inertia in the equation that reads the accelerometer [kg m2]."""
+    return axis_inertia(own, body, load, z_f) - body.sensor(z_f) * first_moment(body, load, z_f)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,8 +22,8 @@ import numpy as np
 
 from expdesign.values import Array, readonly
 from expdesign.vessel.actuators import Actuator
-from expdesign.vessel.expressions import NUMPY
 from expdesign.vessel.model import VesselModel
+from expdesign.vessel.structures import NUMPY
 
 if TYPE_CHECKING:
     from expdesign.vessel._casadi import CompiledSteps

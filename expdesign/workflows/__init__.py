@@ -10,35 +10,35 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.workflows.data.diagnose import diagnose
-    from expdesign.workflows.data.estimate import estimate
-    from expdesign.workflows.data.identify_steps import identify_steps
-    from expdesign.workflows.data.import_logs import import_logs
-    from expdesign.workflows.data.indices import indices
-    from expdesign.workflows.data.mine import mine
-    from expdesign.workflows.data.monitor import monitor
-    from expdesign.workflows.data.watch_steps import watch_steps
-    from expdesign.workflows.explanations.explain import explain
+    from expdesign.workflows.commands.diagnose import diagnose
+    from expdesign.workflows.commands.durations import durations
+    from expdesign.workflows.commands.estimate import estimate
+    from expdesign.workflows.commands.explain import explain
+    from expdesign.workflows.commands.export import check_routes, export
+    from expdesign.workflows.commands.foresee import foresee
+    from expdesign.workflows.commands.identify_steps import identify_steps
+    from expdesign.workflows.commands.import_logs import import_logs
+    from expdesign.workflows.commands.incline import incline
+    from expdesign.workflows.commands.indices import indices
+    from expdesign.workflows.commands.mine import mine
+    from expdesign.workflows.commands.monitor import monitor
+    from expdesign.workflows.commands.new import new
+    from expdesign.workflows.commands.nominal import nominal
+    from expdesign.workflows.commands.plan import plan
+    from expdesign.workflows.commands.replan import replan
+    from expdesign.workflows.commands.result import trial_result
+    from expdesign.workflows.commands.roll import roll
+    from expdesign.workflows.commands.roll_plan import roll_plan
+    from expdesign.workflows.commands.run import run
+    from expdesign.workflows.commands.score import score
+    from expdesign.workflows.commands.simulate import simulate
+    from expdesign.workflows.commands.validate import validate_design
+    from expdesign.workflows.commands.watch_steps import watch_steps
+    from expdesign.workflows.commands.whatif import whatif
     from expdesign.workflows.outcome import Outcome
-    from expdesign.workflows.planning.durations import durations
-    from expdesign.workflows.planning.export import check_routes, export
-    from expdesign.workflows.planning.new import new
-    from expdesign.workflows.planning.nominal import nominal
-    from expdesign.workflows.planning.plan import plan
-    from expdesign.workflows.planning.roll_plan import roll_plan
-    from expdesign.workflows.planning.run import run
-    from expdesign.workflows.planning.score import score
-    from expdesign.workflows.planning.whatif import whatif
     from expdesign.workflows.steps.design_problem import designed, duration_problem
     from expdesign.workflows.steps.measured import measured
     from expdesign.workflows.steps.planned import plan_problem, planned
     from expdesign.workflows.steps.scored import scored
-    from expdesign.workflows.trials.foresee import foresee
-    from expdesign.workflows.trials.incline import incline
-    from expdesign.workflows.trials.replan import replan
-    from expdesign.workflows.trials.result import trial_result
-    from expdesign.workflows.trials.roll import roll
-    from expdesign.workflows.trials.simulate import simulate
-    from expdesign.workflows.trials.validate import validate_design
 else:
     __getattr__, __all__ = load_on_use(__name__, __file__)

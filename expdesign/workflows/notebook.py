@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 
+from expdesign import requests
 from expdesign.durations import DurationDesign, efficiencies
 from expdesign.export import STANDARD, Route, route_files, write_files
 from expdesign.export.cards import cards_html
@@ -14,8 +15,8 @@ from expdesign.export.report import ReportContent, report_html
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
+from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import command_text
 from expdesign.workflows.steps.day import planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, report_content
@@ -87,7 +88,7 @@ def plan_for(scenario: Scenario | Path | str, *, seed: int = 0, progress: Progre
     day = planned_day(case, information, design, seed=seed, progress=within(progress, 0.15, 1.0))
     route = built_route(case, day.plan)
     content = report_content(
-        case, day.information, day.design, day.plan, command_text("run", [case.path], {"--seed": seed})
+        case, day.information, day.design, day.plan, command_text(requests.Run(scenario=case.path, seed=seed))
     )
     content = replace(content, compared=efficiencies(design), route=route, growth=growth, day=day.shortest)
     return Trial(content=content, route=route)

@@ -1,17 +1,13 @@
-"""Results of commands, and the command line that repeats a call."""
+"""Results of commands."""
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 from expdesign.export.document import Document, Section, Table, fact_text
 from expdesign.vessel import NOT_ACTING_BACK, Vessel
-
-# Results of commands.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,28 +72,3 @@ SENTENCES = ("remarks",)
 def note_on_roll(vessel: Vessel) -> dict[str, object]:
     """An entry of a summary, where the vessel file has roll that the command leaves out."""
     return {} if vessel.pendulum is None else {"note_on_roll": NOT_ACTING_BACK}
-
-
-# The command line that repeats a call, for reports and files.
-
-NOTHING: Mapping[str, object] = MappingProxyType({})
-
-
-def command_text(
-    command: str, words: Iterable[object], options: Mapping[str, object], *, usual: Mapping[str, object] = NOTHING
-) -> str:
-    """`expdesign COMMAND WORDS OPTIONS`, ready to be typed.
-
-    Args:
-        command: name of the command.
-        words: its arguments.
-        options: option -> value; a list gives several words, True none. What is None, False or empty is left out.
-        usual: defaults by option; values that equal them are left out, too.
-    """
-    spelled = ["expdesign", command, *map(str, words)]
-    for option, value in options.items():
-        if value is None or value is False or value == () or (option in usual and value == usual[option]):
-            continue
-        values = value if isinstance(value, tuple) else () if value is True else (value,)
-        spelled += [option, *(f"{item:g}" if isinstance(item, float) else str(item) for item in values)]
-    return shlex.join(spelled)

@@ -29,7 +29,7 @@ LINES = (
     "simulate runs/story/plan.json --truth scenarios/vessels/tender-20m-true.toml --until 600 --seed 2",
     f"diagnose runs/story/measured.csv {TENDER} --out runs/found",
     f"estimate runs/story/measured.csv {TENDER} --method ls iv oe --out runs/estimate",
-    f"mine runs/story/measured.csv {TENDER} --out runs/mine",
+    f"mine runs/story/measured.csv {TENDER} --piece 60 --keep 3 --out runs/mine",
     f"indices runs/story/measured.csv {TENDER} --out runs/indices",
     "replan scenarios/story.toml --data runs/story/measured.csv --vessel runs/found/vessel-extended.toml --seed 3"
     " --out runs/replan",
@@ -42,7 +42,15 @@ LINES = (
     "run scenarios/fast-boat.toml --seed 1 --jobs 1",
     "simulate runs/fast-boat/plan.json --truth scenarios/vessels/fast-8m-true.toml --seed 2",
     f"identify-steps runs/fast-boat/measured.csv {FAST} --out runs/steps",
-    "roll-plan scenarios/loads/roll-trial.toml --out runs/roll-plan",
+    "trial-result runs/story/plan.json --estimate runs/estimate/estimate.json --indices runs/indices/indices.json"
+    " --out runs/result",
+    "export runs/story/plan.json --format rtz rtz-1.0 rtz-1.1 gpx kml geojson qgc ardupilot csv --fine"
+    " --out runs/routes",
+    "validate scenarios/story.toml --trials 10 --out runs/validate",
+    "roll-plan scenarios/roll-trial.toml --loads scenarios/loads/roll-trial.toml --out runs/roll-plan",
+    "incline --vessel scenarios/vessels/roll-model.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1 --out runs/incline",
+    "nominal scenarios/cards/coaster-80m.toml --out runs/nominal",
+    "import scenarios/logs/bridge.csv --out runs/imported",
     "explain causes",
     "explain scenario",
     "explain vessel",

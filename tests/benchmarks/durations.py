@@ -40,8 +40,7 @@ from expdesign.durations import (
     sensitivities,
     solve_durations,
 )
-from expdesign.durations.maximise import maximised
-from expdesign.durations.maximise.maximise import _by_cvxpy
+from expdesign.durations.maximise import _by_cvxpy, maximised
 from expdesign.durations.solve import concave_problem
 from expdesign.information import score_primitives
 from expdesign.progress import silent

@@ -34,10 +34,9 @@ FILES = {
     "plan/bounds/repositioning": ("plan_bound_holds",),
     "plan/bounds/displacement": ("plan_bound_holds",),
     "plan/bounds/branch_and_bound": ("plan_bound_branches_on_obstacle_corners",),
-    "plan/verify/checks": ("plan_verification_catches_what_is_wrong", "plan_heel_is_checked"),
-    "plan/verify/efficiency": (
-        "plan_verification_catches_what_is_wrong", "plan_information_is_split_by_where_it_comes_from",
-        "plan_whole_days_are_as_accurate_as_stated",
+    "plan/verify": (
+        "plan_verification_catches_what_is_wrong", "plan_heel_is_checked",
+        "plan_information_is_split_by_where_it_comes_from", "plan_whole_days_are_as_accurate_as_stated",
     ),
     "estimation/solve/sandwich": ("estimation_agrees_with_econometrics", "estimation_noise_has_parts"),
     "reduction/sensors": ("reduction_undoes_what_the_vessel_file_states",),

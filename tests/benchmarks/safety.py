@@ -26,7 +26,7 @@ from expdesign import workflows
 from expdesign.plan import Plan
 from expdesign.plan.assembly import leg_water, ship_on_legs
 from expdesign.plan.legs.water import LegWater
-from expdesign.plan.monte_carlo import guidance, trials
+from expdesign.plan.monte_carlo import guidance, risk
 from expdesign.plan.monte_carlo.procedure import Tolerances
 from expdesign.plan.monte_carlo.risk import estimate_risk, upper_limit
 from expdesign.plan.values import RiskEstimate
@@ -57,25 +57,25 @@ def wandering(forecast: Environment) -> Environment:
 @contextmanager
 def as_planned() -> Iterator[None]:
     """No ship sails parallel to a leg."""
-    kept = guidance.MONTE_CARLO
-    guidance.MONTE_CARLO = replace(kept, parallel_share=0.0)
+    kept = guidance.PARALLEL_SHARE
+    guidance.PARALLEL_SHARE = 0.0
     try:
         yield
     finally:
-        guidance.MONTE_CARLO = kept
+        guidance.PARALLEL_SHARE = kept
 
 
 @contextmanager
 def unbroken() -> Iterator[None]:
     """Tolerances so wide that no ship ever goes around; legs as planned."""
-    kept = trials.tolerances
+    kept = risk.tolerances
     wide = Tolerances(position_m=AT_ALL, heading_rad=AT_ALL, speed_mps=AT_ALL, yaw_rate_radps=AT_ALL)
-    trials.tolerances = lambda water, spare_m: wide
+    risk.tolerances = lambda water, spare_m: wide
     try:
         with as_planned():
             yield
     finally:
-        trials.tolerances = kept
+        risk.tolerances = kept
 
 
 def water_of(case: Scenario, plan: Plan) -> LegWater:

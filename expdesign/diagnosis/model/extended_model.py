@@ -26,11 +26,11 @@ from expdesign.diagnosis.model.terms import (
     turns_by_force,
     unit_terms,
 )
-from expdesign.simulation.tape import Evaluation, evaluation
+from expdesign.simulation.program import Evaluation, evaluation
 from expdesign.values import Array
 from expdesign.vessel import Roll, Term, VesselModel
-from expdesign.vessel.expressions import Expression
 from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.structures import Expression
 from expdesign.waves import G_MPS2
 
 ANGLE_STEMS = ("a", "rudder")

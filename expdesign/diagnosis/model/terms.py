@@ -11,11 +11,10 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.estimation.regression import Polynomial, lift, symbol
-from expdesign.simulation.tape import evaluation
+from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, TERMS, Operators, Term, VesselModel, stem
-from expdesign.vessel.expressions import FUNCTIONS, Expression, parse_expression
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, FUNCTIONS, MOTION_SIGNALS, Expression, parse_expression
 
 # The terms of an extended model, with their factors and kinds.
 

@@ -12,7 +12,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.inputs import ExogenousInputs
 from expdesign.simulation.motion import rates_over_ground
-from expdesign.simulation.tape import evaluation
+from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel.structures import SHOAL
 

@@ -24,7 +24,7 @@ from expdesign.diagnosis.model import (
 )
 from expdesign.simulation import deliver, keeps_to, positions
 from expdesign.simulation.motion import to_body
-from expdesign.simulation.tape import evaluation
+from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Response, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from expdesign.diagnosis.model import is_thrust
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Term, VesselModel
-from expdesign.vessel.expressions import parse_expression
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, parse_expression
 
 MOST_TERMS = 3  # of the sum
 LEAST_STATISTIC = 25.0  # of a regressor; one of 300 reaches it by chance in one of 1000 trials

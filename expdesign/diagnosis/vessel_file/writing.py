@@ -40,9 +40,8 @@ from expdesign.diagnosis.model import (
 from expdesign.diagnosis.vessel_file.reading import found_std, with_std
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel, std_keys
-from expdesign.vessel.expressions import Expression
 from expdesign.vessel.sensors import GAINS_AND_OFFSETS
-from expdesign.vessel.structures import SHOAL
+from expdesign.vessel.structures import SHOAL, Expression
 
 # Dependence on depth as factors of a model's terms.
 

@@ -1,9 +1,8 @@
 """Families that state a motion; commands follow from the inverse model.
 
-Multisine: surge, sway and yaw rate each swing with several frequencies at once.
-
-Phases follow Schroeder's rule, so that the sum of equal sines stays low; each of the three velocities has its own
-frequencies, so that they are uncorrelated over a whole period.
+In a multisine, surge, sway and yaw rate each swing with several frequencies at once. Phases follow Schroeder's rule, so
+that the sum of equal sines stays low; each velocity has its own frequencies, so that they are uncorrelated over a
+period.
 
 Source: M. R. Schroeder, Synthesis of low-peak-factor signals, IEEE Trans. Inf. Theory 16 (1970), 85-89.
 """

@@ -1,21 +1,8 @@
-"""Families that state helm and engine orders.
+"""Families that state helm and engine orders: spiral, pull-out, turning circle, zig-zag, crash stop, recorded runs.
 
-Dieudonne (direct) spiral: the helm goes through steps from one side to the other and back.
-
-Source: ITTC Recommended Procedure 7.5-04-02-01 (2017); J. Dieudonne, Collected French papers on the stability of route
-of ships at sea, 1949-1950, DTMB Translation 246 (1953).
-
-Pull-out: a turn, then helm amidships; the decay of the yaw rate shows whether the ship is stable on course.
-
-Source: ITTC Recommended Procedure 7.5-04-02-01 (2017).
-
-Turning circle of the standard trials: a given helm, held.
-
-Source: IMO MSC.137(76), 6.1 (35 degrees of rudder, or as much as there is).
-
-Zig-zag switched by heading, e.g. 10/10 and 20/20.
-
-Source: IMO MSC.137(76), 6.2; ITTC Recommended Procedure 7.5-04-02-01 (2017).
+Source: ITTC Recommended Procedure 7.5-04-02-01 (2017); IMO MSC.137(76), 6.1 and 6.2, for turning circle and zig-zag;
+J. Dieudonne, Collected French papers on the stability of route of ships at sea, 1949-1950, DTMB Translation 246 (1953),
+for the spiral.
 """
 
 from __future__ import annotations

@@ -1,29 +1,12 @@
 """Families of step trials: steps of throttle and rudder up and down, and waves of both to validate with.
 
-Waves of helm and engine order about the approach's: inputs unlike steps, to validate with what steps gave.
+Rudder steps hold the approach's engine order, throttle steps a helm. Levels are those of equally spaced steady yaw
+rates and speeds by the nominal model: equal steps of an order would crowd the speeds where an engine does little, and
+leave a gap where it does most. Waves of both orders about the approach's are unlike steps.
 
-Source: B.-O. H. Eriksen and M. Breivik, Modeling, identification and control of high-speed ASVs: theory and
-experiments, in Sensing and Control for Autonomous Vehicles (2017).
-
-How long a level must be held: until drawn vessels are steady, and then for a circle.
-
-A full circle at steady state averages the current out of mean speed and yaw rate. Where one takes too long, half of one
-is turned, and where that takes too long as well, or the course is straight, the level is held for a given time.
-
-Source: B.-O. H. Eriksen and M. Breivik, Modeling, identification and control of high-speed ASVs: theory and
-experiments, in Sensing and Control for Autonomous Vehicles (2017).
-
-Rudder steps: the helm goes over in steps and back again, each held, at the approach's engine order.
-
-The angles are those of equally spaced steady yaw rates by the nominal model.
-
-Source: B.-O. H. Eriksen and M. Breivik, Modeling, identification and control of high-speed ASVs: theory and
-experiments, in Sensing and Control for Autonomous Vehicles (2017).
-
-Throttle steps: the engine order goes up in steps and down again, each held, at a helm that is held.
-
-The orders are those of equally spaced steady speeds by the nominal model. Equal steps of the order would crowd the
-speeds where an engine does little, and leave a gap where it does most.
+A level is held until drawn vessels are steady, and then for a circle, which averages the current out of mean speed and
+yaw rate. Where one takes too long, half of one is turned, and where that takes too long as well, or the course is
+straight, the level is held for a given time.
 
 Source: B.-O. H. Eriksen and M. Breivik, Modeling, identification and control of high-speed ASVs: theory and
 experiments, in Sensing and Control for Autonomous Vehicles (2017).

@@ -60,7 +60,7 @@ from expdesign.signals import Record
 from expdesign.simulation.motion import rates_over_ground, to_body
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, VesselModel
-from expdesign.vessel.expressions import Expression
+from expdesign.vessel.structures import Expression
 
 # Nuisance regressors for an unknown mean current and wind, derived from the terms.
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.export.files.accuracy import PlannedAccuracy, planned_accuracy
     from expdesign.export.files.design_files import (
         dictionary_files,
         dictionary_json,
@@ -35,8 +34,16 @@ if TYPE_CHECKING:
         steered_entry,
         unstable_warning,
     )
-    from expdesign.export.files.known import Known, Purchase, replan_json
-    from expdesign.export.files.plan_files import commands_csv, plan_json, track_csv
+    from expdesign.export.files.plan_files import (
+        Known,
+        PlannedAccuracy,
+        Purchase,
+        commands_csv,
+        plan_json,
+        planned_accuracy,
+        replan_json,
+        track_csv,
+    )
     from expdesign.export.files.text import finite, record_csv, strict_json
     from expdesign.export.files.vessel_file import vessel_toml
 else:

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from expdesign.assessment import Assessed, Assessment, Limits, RunCheck, sentence
-from expdesign.assessment.held_out import ranked
-from expdesign.assessment.misfit import ESTIMATION, TEST
-from expdesign.assessment.tuning import TUNING as ASSESSMENT_TUNING
+from expdesign.assessment.held_out import LARGEST_ERROR, ranked
+from expdesign.assessment.misfit import AHEAD_S, ESTIMATION, TEST
 from expdesign.conventions import plus_minus
 from expdesign.estimation.excitation import Breach
 from expdesign.estimation.solve import Direction
@@ -43,7 +42,7 @@ def unstable_warning(found: Assessment) -> tuple[str, ...]:
     worst = max(limits.growth for limits in found.limits if limits.unstable)
     return (
         f"The ship is unstable under the recorded inputs in {', '.join(runs)}: with this estimate an initial error of "
-        f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {ASSESSMENT_TUNING.ahead_s:g} s "
+        f"a simulation grows up to {worst:.2g}-fold. Judge these runs by the {AHEAD_S:g} s "
         "prediction.",
     )
 
@@ -103,14 +102,14 @@ def failure_rows(found: Assessment) -> list[tuple[str, ...]]:
 def prediction_title(found: Assessment) -> str:
     """What that table shows."""
     of = "runs left out of the estimate" if all(item.unseen for item in found.compared) else "the runs used"
-    return f"Errors of predictions {ASSESSMENT_TUNING.ahead_s:g} s ahead of {of}, in per cent of the standard deviation"
+    return f"Errors of predictions {AHEAD_S:g} s ahead of {of}, in per cent of the standard deviation"
 
 
 def _error(share: float) -> str:
     if math.isnan(share):
         return "-"
-    if share >= ASSESSMENT_TUNING.largest_error:
-        return f"over {100 * ASSESSMENT_TUNING.largest_error:g}"
+    if share >= LARGEST_ERROR:
+        return f"over {100 * LARGEST_ERROR:g}"
     return f"{100 * share:.1f}"
 
 

@@ -1,24 +1,107 @@
-"""The plan as plan.json, track.csv and commands.csv.
+"""The plan as plan.json, track.csv and commands.csv, how accurately it is expected to tell parameters, and replan.json.
 
 Numbers in plan.json and commands.csv are written so that reading them back gives the same float. Velocities are over
-ground.
+ground. replan.json says what is known when the rest of a trial is planned, and what the rest adds.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
-from expdesign.export.files.accuracy import PlannedAccuracy, accuracy_entries
+from expdesign.durations import DurationProblem
+from expdesign.errors import NoAnswer
 from expdesign.export.files.text import csv_text, finite, named, sample_seconds, strict_json
 from expdesign.export.routes import build_fence, require_verified
-from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate
+from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.plan.values import LatticeProof, Leg, Plan, RiskEstimate, UnderWay
+from expdesign.plan.verify import part_of_track
+from expdesign.shortest_day import AccuracySettings
 from expdesign.simulation.environment import Environment
-from expdesign.values import Array
+from expdesign.values import Array, seal
 from expdesign.vessel import Variation, Vessel, column_name
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedAccuracy:
+    """Standard deviations (p,) in the order and the units of the parameters to be estimated."""
+
+    parameters: tuple[str, ...]
+    nominal: Array  # their values in the vessel file
+    before: Array  # prior, zero where none was stated
+    runs: Array  # of estimates from the informative runs alone; nan where they cannot be estimated
+    track: Array  # of estimates from the whole track
+    asked: Array  # largest that the scenario asks for, nan where it asks for none
+
+    def __post_init__(self) -> None:
+        seal(self, nominal="p", before="p", runs="p", track="p", asked="p")
+
+
+def planned_accuracy(
+    plan: Plan,
+    problem: DurationProblem,
+    *,
+    vessel: Vessel,
+    environment: Environment,
+    asked: AccuracySettings | None = None,
+) -> PlannedAccuracy:
+    """Standard deviations expected of instrumental variables, to first order in the vessel file's sensor noise."""
+    model, sailed, names = vessel.model, plan.sailed, problem.parameters
+
+    def deviations(parts: Sequence[TrialPart]) -> Array:
+        try:
+            covariance = expected_covariance(
+                vessel,
+                parts,
+                names,
+                environment=environment,
+                mean_subtraction=problem.mean_subtraction,
+                unknown_current=environment.current_std_mps > 0,
+            )
+        except NoAnswer:
+            return np.full(len(names), np.nan)
+        return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    place = [model.names.index(name) for name in names]
+    nominal = model.parameters[place]
+    return PlannedAccuracy(
+        parameters=names,
+        nominal=nominal,
+        before=model.parameter_std[place],
+        runs=deviations([part_of_track(sailed, leg.first, leg.last) for leg in sailed.legs if leg.kind == "primitive"]),
+        track=deviations([part_of_track(sailed)]),
+        asked=np.array([_asked(asked, *pair) for pair in zip(names, nominal.tolist(), strict=True)]),
+    )
+
+
+def _asked(settings: AccuracySettings | None, name: str, nominal: float) -> float:
+    """The least of the standard deviations that settings allow a parameter."""
+    if settings is None:
+        return np.nan
+    relative = settings.relative_std.get(name, np.inf) * abs(nominal)
+    least = min(settings.std.get(name, np.inf), relative)
+    return least if np.isfinite(least) else np.nan
+
+
+def accuracy_entries(found: PlannedAccuracy) -> dict[str, dict[str, Any]]:
+    """The entry `parameters` of plan.json; null where a value is not known."""
+    rows = zip(found.parameters, found.nominal, found.before, found.runs, found.track, found.asked, strict=True)
+    return {
+        name: {
+            "nominal": float(nominal),
+            "std_before": float(before) or None,
+            "std_after_runs": finite(float(runs)),
+            "std_after": finite(float(track)),
+            "std_asked": finite(float(asked)),
+        }
+        for name, nominal, before, runs, track, asked in rows
+    }
+
 
 FRAME_SENTENCE = (
     "north_m and east_m are the northing and easting of the projection, in metres from the origin; "
@@ -254,3 +337,91 @@ def _wind_or_current(velocity: Array, std_mps: float, variation: Variation) -> d
     if variation.std_mps:
         entry |= {"variation_std_mps": variation.std_mps, "correlation_s": variation.correlation_s}
     return entry
+
+
+@dataclass(frozen=True, kw_only=True)
+class Purchase:
+    """The manoeuvre whose runs are most informative about a parameter."""
+
+    primitive: str  # its name; "" where no single manoeuvre matters
+    runs: int  # number of its runs in the plan
+    # ratio of the standard deviations of the parameter without and with them; inf where it is not estimable without
+    # them
+    without: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Known:
+    """The state of a trial in progress."""
+
+    data: tuple[str, ...]  # files so far
+    sailed_s: float  # time in them [s]
+    total_s: float  # informative time of the whole trial [s]
+    remaining_s: float  # informative time left [s]; nan where it is as long as the accuracy asked for takes
+    remaining_stated: bool  # whether the user stated it
+    pose: Array  # (3,) of the ship at the end of the data, in the area's frame
+    speed_mps: float  # over ground in the last sample
+    model: str  # origin of the model for the rest
+    environment: Environment  # current and wind of the rest
+    weather: str  # their origin
+    notes: tuple[str, ...]  # further remarks, one sentence each
+    parameters: tuple[str, ...]  # p names
+    before: Array  # (p,) values before the trial, nan for parameters that the model did not have
+    now: Array  # (p,) values now
+    stated: Array  # (p,) standard deviations stated before the trial, 0 where none was
+    so_far: Array  # (p,) of estimates from the data so far, predicted; nan where it is not estimable
+    after: Array  # (p,) likewise from these data and the rest together
+    purchases: tuple[Purchase, ...]  # (p,) most informative runs
+    under_way: UnderWay | None = None  # how the ship moves as the rest begins; None where it is assumed to be stopped
+
+    def __post_init__(self) -> None:
+        seal(self, pose="3", before="p", now="p", stated="p", so_far="p", after="p")
+
+    @property
+    def new(self) -> tuple[str, ...]:
+        """Parameters that the model did not have before the trial."""
+        return tuple(name for name, value in zip(self.parameters, self.before, strict=True) if math.isnan(value))
+
+
+def replan_json(known: Known) -> str:
+    """Content of replan.json; numbers that are not finite are null."""
+    columns = zip(
+        known.parameters,
+        *(column.tolist() for column in (known.before, known.now, known.stated, known.so_far, known.after)),
+        known.purchases,
+        strict=True,
+    )
+    moves = known.under_way
+    current, wind = known.environment.current_to.tolist(), known.environment.wind_to.tolist()
+    return strict_json(
+        {
+            "data": list(known.data),
+            "sailed_s": known.sailed_s,
+            "whole_trial_s": known.total_s,
+            "remaining_s": finite(known.remaining_s),
+            "remaining_stated": known.remaining_stated,
+            "start": dict(zip(POSE_COLUMNS, known.pose.tolist(), strict=True)),
+            "measured_speed_mps": known.speed_mps,
+            "begins_with": None if moves is None else dict(zip(VELOCITY_COLUMNS, moves.velocity.tolist(), strict=True)),
+            "model": known.model,
+            "environment": {
+                "from": known.weather,
+                "current_to": {"north_mps": current[0], "east_mps": current[1]},
+                "wind_to": {"north_mps": wind[0], "east_mps": wind[1]},
+            },
+            "notes": list(known.notes),
+            "parameters": {name: _entry(*row) for name, *row in columns},
+        }
+    )
+
+
+def _entry(before: float, now: float, stated: float, so_far: float, after: float, purchase: Purchase) -> dict[str, Any]:
+    return {
+        "before": finite(before),
+        "now": now,
+        "std_before": stated or None,
+        "std_so_far": finite(so_far),
+        "std_after_rest": finite(after),
+        "bought_by": purchase.primitive or None,
+        "std_ratio_without_it": finite(purchase.without),
+    }

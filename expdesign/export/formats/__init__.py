@@ -1,11 +1,11 @@
-"""Route file formats: one file each, all in one visible tuple."""
+"""Route file formats: all in one visible tuple."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from expdesign.errors import UnknownName
-from expdesign.export.formats import ardupilot, geojson, gpx, kml, qgc, route_csv, rtz
+from expdesign.export.formats import geojson, gpx, kml, missions, route_csv, rtz
 from expdesign.export.formats.format import Format, named_file
 from expdesign.export.routes import Route
 
@@ -16,8 +16,8 @@ FORMATS: tuple[Format, ...] = (
     kml.FORMAT,
     rtz.FORMAT,
     *rtz.OLDER,
-    qgc.FORMAT,
-    ardupilot.FORMAT,
+    missions.PLAN,
+    missions.WAYPOINTS,
 )
 STANDARD = ("rtz", "gpx", "kml", "geojson", "qgc", "ardupilot", "csv")
 """Formats that every plan is written in."""

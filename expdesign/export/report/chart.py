@@ -36,7 +36,7 @@ from expdesign.plan.values import Plan
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon, eroded
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.vessel.hull import covering_discs, hull_polygons
+from expdesign.vessel.vessel import covering_discs, hull_polygons
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

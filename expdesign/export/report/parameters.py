@@ -11,7 +11,7 @@ from expdesign.estimation.methods import steady_current_method
 from expdesign.export import words
 from expdesign.export.files import Known, PlannedAccuracy, Purchase
 from expdesign.export.report.content import ReportContent
-from expdesign.export.tuning import TUNING
+from expdesign.export.words import NOTICED
 from expdesign.sea_area import LocalFrame
 from expdesign.shortest_day import ShortestDay
 
@@ -202,12 +202,12 @@ def _gain(known: Known) -> str:
     first = np.isnan(known.so_far) & np.isfinite(known.after)
     names = [name for name, untold in zip(known.parameters, first, strict=True) if untold]
     more = f" The data so far cannot determine {', '.join(names)}; the rest can." if names else ""
-    grown = known.after > known.so_far * (1.0 + TUNING.noticed)
+    grown = known.after > known.so_far * (1.0 + NOTICED)
     larger = [name for name, is_so in zip(known.parameters, grown, strict=True) if is_so]
     worse = f" Larger {'is that' if len(larger) == 1 else 'are those'} of {', '.join(larger)}." if larger else ""
     factor = max(ratio, 1 / ratio)
     size = f"{words.significant(factor, 3)} times {'smaller' if ratio > 1 else 'larger'} than"
-    change = "as large as" if factor < 1.0 + TUNING.noticed else size
+    change = "as large as" if factor < 1.0 + NOTICED else size
     return (
         f"After the rest, the expected standard deviations are {change} from the data so far (geometric mean)."
         f"{worse * (ratio > 1)}{more}"

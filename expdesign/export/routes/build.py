@@ -23,9 +23,19 @@ from expdesign.export.routes.chords import (
     sides_needed,
     widened,
 )
-from expdesign.export.routes.fence import Fence, build_fence, fence_polygon
 from expdesign.export.routes.read_plan import PlannedTrack
-from expdesign.export.routes.route import DEGREE_DECIMALS, ROUTE_NAME, XTD_STEP_M, Route, RouteFit, Waypoint, fit_route
+from expdesign.export.routes.route import (
+    DEGREE_DECIMALS,
+    ROUTE_NAME,
+    XTD_STEP_M,
+    Fence,
+    Route,
+    RouteFit,
+    Waypoint,
+    build_fence,
+    fence_polygon,
+    fit_route,
+)
 from expdesign.sea_area import as_multipolygon
 from expdesign.values import Array
 

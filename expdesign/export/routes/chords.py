@@ -1,15 +1,10 @@
 """From a curved track to few straight legs: chords, the corridor beside them, and the samples that waypoints stand at.
 
-The corridor of a leg: how far to port and to starboard of a straight line the ship may be.
-
-Port and starboard are as seen when sailing the leg; beyond its ends the corridor is round.
-
-Few waypoints for the bridge: which samples of the track they stand at.
-
-A waypoint stands at one sample, or at a stop: an area that the ship stays in for a while. The legs between them are the
-cheapest path through a graph: each leg costs one, and more the wider its corridor, the shorter the leg, and the more it
-mixes runs with each other or with the way to them. Corridors are held against the water where the path uses them, and
-the path is sought again without those that leave it.
+A corridor says how far to port and to starboard of a leg the ship may be, as seen when sailing it; beyond its ends it
+is round. A waypoint stands at one sample, or at a stop: an area that the ship stays in for a while. The legs between
+them are the cheapest path through a graph: each leg costs one, and more the wider its corridor, the shorter the leg,
+and the more it mixes runs with each other or with the way to them. Corridors are held against the water where the path
+uses them, and the path is sought again without those that leave it.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from pydantic import Field
 
 from expdesign.conventions import POSE_COLUMNS, VELOCITY_COLUMNS
 from expdesign.errors import FileError, NoPlan
-from expdesign.export.files.read_json import Entry, read_json, read_text
-from expdesign.export.routes.fence import Fence
+from expdesign.export.files.text import Entry, read_json, read_text
+from expdesign.export.routes.route import Fence
 from expdesign.plan.values import Leg, Plan
 from expdesign.sea_area import LocalFrame
 from expdesign.signals import Commands, Trajectory

@@ -1,11 +1,11 @@
-"""A route: waypoints, and how far from the straight legs between them the track may be.
+"""A route: waypoints, how far from the straight legs between them the track may be, and the allowed water around.
 
 A route says where the ship goes and when. It cannot say how a zig-zag is steered: that is what the command file is for.
+How well it fits the track is measured for every leg, after rounding to file decimals: a chart system sails a leg as a
+rhumb line or a great circle, the plan's frame is a transverse Mercator projection, and the three differ by less.
 
-How well a route of waypoints fits the track: exact distances after rounding to file decimals.
-
-A chart system sails a leg as a rhumb line or a great circle, the plan's frame is a transverse Mercator projection: the
-three differ by less than the figures below, which are measured for every leg and not estimated.
+The fence is a geofence for autopilots, few polygons that are never larger than the allowed water. It holds for the
+ship's centre: it lies at least half a beam inside.
 """
 
 from __future__ import annotations
@@ -20,9 +20,77 @@ import shapely
 
 from expdesign.conventions import METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError
-from expdesign.export.routes.fence import Fence
-from expdesign.sea_area import LocalFrame
+from expdesign.sea_area import LocalFrame, eroded
 from expdesign.values import Array
+
+FENCE_MARGIN = 0.1  # room around the track, as a share of its extent, that the fence may cover
+FENCE_HALVINGS = 12  # of the slack by which the fence is simplified, until it keeps to the water
+
+
+DECIMALS = 7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fence:
+    """One polygon to stay in and some to stay out of; rings are open, (latitude, longitude) [deg]."""
+
+    inside: tuple[tuple[float, float], ...]  # ring, counter-clockwise as seen on a chart
+    outside: tuple[tuple[tuple[float, float], ...], ...]  # rings of what is forbidden within it, clockwise
+
+
+def build_fence(
+    points: Array, *, water: shapely.Geometry, beam_m: float, clearance_m: float, frame: LocalFrame
+) -> Fence | None:
+    """The fence around a track, or None where the track touches the fence's own margin.
+
+    Args:
+        points: (k, 2) track, north and east [m].
+        water: allowed water in (east, north).
+        beam_m: of the ship.
+        clearance_m: that the plan keeps; it is what the fence may be simplified by.
+        frame: the plan's.
+    """
+    line = shapely.LineString(points[:, ::-1])
+    west, south, east, north = line.bounds
+    margin = FENCE_MARGIN * max(east - west, north - south) + 4 * (clearance_m + beam_m)
+    near = shapely.intersection(water, shapely.box(west - margin, south - margin, east + margin, north + margin))
+    slack = max(clearance_m, 0.1) / 2
+    for _ in range(FENCE_HALVINGS):
+        found = _simplified(near, line, inset_m=beam_m / 2 + slack, slack_m=slack)
+        if found is not None:
+            degrees = _in_degrees(found, frame)
+            if _holds(degrees, near, line, frame):
+                return degrees
+        slack /= 2
+    return None
+
+
+def _simplified(
+    water: shapely.Geometry, line: shapely.LineString, *, inset_m: float, slack_m: float
+) -> shapely.Polygon | None:
+    inner = shapely.simplify(eroded(water, inset_m, join_style="mitre"), slack_m, preserve_topology=True)
+    parts = [part for part in shapely.get_parts(inner) if part.geom_type == "Polygon" and part.covers(line)]
+    return shapely.orient_polygons(parts[0]) if parts else None
+
+
+def _in_degrees(polygon: shapely.Polygon, frame: LocalFrame) -> Fence:
+    def ring(line: shapely.LinearRing) -> tuple[tuple[float, float], ...]:
+        corners = np.array(line.coords)[:-1, ::-1]
+        return tuple((lat, lon) for lat, lon in frame.to_degrees(corners).round(DECIMALS).tolist())
+
+    return Fence(inside=ring(polygon.exterior), outside=tuple(ring(hole) for hole in polygon.interiors))
+
+
+def fence_polygon(fence: Fence, frame: LocalFrame) -> shapely.Polygon:
+    """The fence as written, in (east, north) of a frame."""
+    rings = [frame.to_metres(np.array(ring))[:, ::-1] for ring in (fence.inside, *fence.outside)]
+    return shapely.Polygon(rings[0], rings[1:])
+
+
+def _holds(fence: Fence, water: shapely.Geometry, line: shapely.LineString, frame: LocalFrame) -> bool:
+    polygon = fence_polygon(fence, frame)
+    return bool(polygon.is_valid and water.covers(polygon) and polygon.covers(line))
+
 
 COMPARED_POINTS = 17  # points on each leg where a route is compared with the track
 

@@ -1,20 +1,105 @@
-"""Excel by openpyxl, Parquet by pyarrow."""
+"""Files whose columns of numbers are read whole: Excel by openpyxl, Parquet by pyarrow, MATLAB by scipy and h5py."""
 
 from __future__ import annotations
 
+import os
 import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import datetime, time
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from expdesign.errors import FileError
-from expdesign.importing.channels import Log, check_size
-from expdesign.importing.readers.columns import columns_log
+from expdesign.importing.channels import COMPUTER, GNSS, MOST_NUMBERS, NONE, OWN, Log, channels_of, check_size
+from expdesign.importing.clocks import Clock, clock_of
 from expdesign.importing.readers.text import read_text
+from expdesign.importing.times import TIME_NAME, read_stamps
+from expdesign.importing.units import split_unit, words
+
+MOST_COLUMNS = 64
+"""Columns of one array beyond which it is an image or a map."""
+
+
+def columns_log(source: str, columns: Mapping[str, np.ndarray], sample_time_s: float) -> Log:
+    """A log of columns, which share a clock where they have one length and one part of their names before the last dot.
+
+    Args:
+        source: name of the file.
+        columns: arrays (k,) of numbers, times or texts by name.
+        sample_time_s: between rows without a clock [s]; 0 where it is not known.
+    """
+    channels, notes, unused, clocks = [], [], [], set()
+    for group in _groups(columns):
+        own = {name: columns[name] for name in group}
+        found = _clock(own, columns)
+        name, times, clock, how = found.name, found.times, found.kind, found.how
+        if times is None and sample_time_s > 0:
+            times, clock = np.asarray(np.arange(len(next(iter(own.values())))) * sample_time_s), OWN
+            how = f"{', '.join(own)}: count as {sample_time_s:g} s apart, as the mapping says"
+        elif times is None:
+            times, clock = np.arange(len(next(iter(own.values()))), dtype=float), NONE
+            how = (
+                f"{', '.join(own)}: no clock, expected sample_time_s under [[file]] in the mapping, where rows are "
+                "evenly spaced"
+            )
+        left = {key: values for key, values in own.items() if key not in found.taken}
+        texts = [key for key, values in left.items() if values.dtype.kind not in "biuf"]
+        numbers = {key: np.asarray(values, dtype=float) for key, values in left.items() if key not in texts}
+        units = {key: split_unit(key)[1] for key in numbers}
+        own_channels, more = channels_of(numbers, np.asarray(times), source=source, units=units, what=name)
+        channels += own_channels
+        notes += [how, *more]
+        unused += texts
+        clocks.add(clock)
+    clock = next((kind for kind in (GNSS, COMPUTER, OWN) if kind in clocks), NONE)
+    return Log(source=source, clock=clock, channels=tuple(channels), notes=tuple(dict.fromkeys(notes)),
+               unused=tuple(unused))  # fmt: skip
+
+
+def flat(name: str, value: object) -> Iterator[tuple[str, np.ndarray]]:
+    """(name, (k,)) of an array of one or two dimensions, whose columns are numbered from 1."""
+    array = np.squeeze(np.asarray(value))
+    if array.ndim == 1 and len(array) > 1 and array.dtype.kind in "biufMUSO":
+        yield name, array
+    elif array.ndim == 2 and array.dtype.kind in "biuf":
+        rows = array if array.shape[0] >= array.shape[1] else array.T
+        if rows.shape[1] <= MOST_COLUMNS:
+            yield from ((f"{name}{k}", column) for k, column in enumerate(rows.T, start=1))
+
+
+def _groups(columns: Mapping[str, np.ndarray]) -> list[list[str]]:
+    groups: dict[tuple[str, int], list[str]] = {}
+    for name, values in columns.items():
+        groups.setdefault((name.rpartition(".")[0], len(values)), []).append(name)
+    return list(groups.values())
+
+
+def _clock(own: Mapping[str, np.ndarray], every: Mapping[str, np.ndarray]) -> Clock:
+    """The clock of a group of columns, or else of one of another group that is as long."""
+    rows = len(next(iter(own.values())))
+    beside = {name: values for name, values in every.items() if len(values) == rows and name not in own}
+    for table in (own, beside):
+        for name, values in table.items():
+            if values.dtype.kind == "M":
+                whole = values.astype("datetime64[ns]").astype(np.int64) / 1e9
+                times = np.where(np.isnat(values), np.nan, whole)
+                return Clock(frozenset({name}), times, COMPUTER, f"time is {name}, date and time", name)
+        texts = {name: read_stamps([str(text) for text in v]) for name, v in table.items() if v.dtype.kind in "USO"}
+        numbers = {name: v.astype(float) for name, v in table.items() if v.dtype.kind in "iuf"}
+        last = {name: name.rpartition(".")[2] for name in (*numbers, *texts)}  # a clock is named in its structure
+        found = clock_of(
+            {name: v for name, v in numbers.items() if table is own or TIME_NAME.search(words(last[name]))},
+            {name: stamps for name, stamps in texts.items() if stamps.kind}, {},
+        )  # fmt: skip
+        if found.times is not None:
+            return found
+    return Clock(frozenset(), None, NONE, "")
+
 
 MOST_ROWS = 1 << 20  # of a sheet
 MOST_UNPACKED = 1_000_000_000  # bytes of a spreadsheet; a day at 10 Hz takes about a third
@@ -106,3 +191,101 @@ def read_parquet(path: Path, sample_time_s: float) -> Log:
             unused.append(f"{name} ({kind})")
     log = columns_log(path.name, columns, sample_time_s)
     return replace(log, unused=(*log.unused, *unused))
+
+
+def read_matlab(path: Path, sample_time_s: float) -> Log:
+    """Vectors and matrices, also those in structures."""
+    import scipy.io
+
+    check_size(_unpacked(path) // BYTES)
+    content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
+    objects: list[str] = []
+    columns = {
+        name: values for key, value in content.items() if key[:2] != "__" for name, values in _of(key, value, objects)
+    }
+    return _log(path, columns, objects, sample_time_s)
+
+
+BYTES = 8  # of a number
+COMPRESSED = 15
+BLOCK_BYTES = 1 << 16  # of which zlib makes at most a thousand times as many
+
+
+def _unpacked(path: Path) -> int:
+    """Bytes of a file of version 5 once it is unpacked, counted no further than matters.
+
+    Its elements begin with their kind and their length, each of 32 bits; those of kind 15 are compressed by zlib
+    (MathWorks, MAT-File Format, 2023).
+    """
+    total = 0
+    with path.open("rb") as file:
+        file.seek(126)
+        order: Literal["little", "big"] = "big" if file.read(2) == b"MI" else "little"
+        while len(tag := file.read(8)) == 8 and total <= MOST_NUMBERS * BYTES:
+            kind, length = (int.from_bytes(tag[part : part + 4], order) for part in (0, 4))
+            if kind != COMPRESSED:
+                total += length
+                file.seek(length, os.SEEK_CUR)
+                continue
+            inside = zlib.decompressobj()
+            while length > 0 and total <= MOST_NUMBERS * BYTES and (block := file.read(min(length, BLOCK_BYTES))):
+                length -= len(block)
+                total += len(inside.decompress(block))
+    return total
+
+
+OBJECT = (
+    "is a table, a timetable or another object of MATLAB, which only MATLAB reads, expected vectors or a file of "
+    "writetable(T, 'log.csv'), or of writetimetable(T, 'log.csv')"
+)
+
+
+def _log(path: Path, columns: dict[str, np.ndarray], objects: list[str], sample_time_s: float) -> Log:
+    if objects and not columns:
+        raise FileError(path, objects[0], OBJECT)
+    log = columns_log(path.name, columns, sample_time_s)
+    return replace(log, unused=(*log.unused, *(f"{name} (an object of MATLAB)" for name in objects)))
+
+
+def _of(name: str, value: Any, objects: list[str]) -> Iterator[tuple[str, np.ndarray]]:
+    if type(value).__name__ == "MatlabOpaque":
+        own = value.flat[0]
+        objects.append(next((cell.decode() for cell in own if isinstance(cell, bytes)), name))
+    elif hasattr(value, "_fieldnames"):
+        for field in value._fieldnames:
+            yield from _of(f"{name}.{field}", getattr(value, field), objects)
+    elif isinstance(value, np.ndarray) and value.size and all(hasattr(row, "_fieldnames") for row in value.flat):
+        for field in value.flat[0]._fieldnames:
+            column = [getattr(row, field, np.nan) for row in value.flat]
+            if all(np.ndim(cell) == 0 for cell in column):  # a structure for each row
+                yield from flat(f"{name}.{field}", np.array(column))
+    else:
+        yield from flat(name, value)
+
+
+def read_matlab73(path: Path, sample_time_s: float) -> Log:
+    """Data sets of numbers of one or two dimensions, in groups as deep as they are, and rows of structures."""
+    import h5py
+
+    columns: dict[str, np.ndarray] = {}
+    objects: list[str] = []
+    size = 0
+
+    def take(name: str, item: Any) -> None:
+        nonlocal size
+        if name.startswith("#"):
+            return
+        size += item.size if isinstance(item, h5py.Dataset) else 0
+        check_size(size)
+        if "MATLAB_object_decode" in item.attrs:
+            objects.append(name)
+        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf":
+            columns.update(flat(name.replace("/", "."), item[()]))
+        elif isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference and item.size > 1:
+            cells = [file[reference] for reference in item[()].flat]
+            if all(isinstance(cell, h5py.Dataset) and cell.size == 1 and cell.dtype.kind in "biuf" for cell in cells):
+                columns.update(flat(name.replace("/", "."), np.array([cell[()].flat[0] for cell in cells])))
+
+    with h5py.File(path) as file:
+        file.visititems(take)
+    return _log(path, columns, objects, sample_time_s)

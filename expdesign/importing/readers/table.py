@@ -14,8 +14,7 @@ import numpy as np
 from expdesign.errors import FileError
 from expdesign.importing.channels import GNSS, NONE, OWN, Blocks, spread
 from expdesign.importing.clocks import clock_of
-from expdesign.importing.readers.cells import degrees, kind_of, port_signs, sided, signs
-from expdesign.importing.readers.dialect import Dialect
+from expdesign.importing.readers.dialect import Dialect, degrees, kind_of, port_signs, sided, signs
 from expdesign.importing.times import Stamps, halves_of_days, read_stamps, tells_month_first
 from expdesign.importing.units import counted, words
 from expdesign.records.file import MISSING

@@ -11,12 +11,13 @@ import numpy as np
 import shapely
 
 from expdesign.dictionary import Primitive
-from expdesign.plan.bounds.tuning import BOUNDS
 from expdesign.plan.control import over_ground
 from expdesign.plan.runs import run_at_headings
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+TRACK_SIDES = 24  # of the polygon that contains a track
 
 WIND_HEADINGS = 72  # at which runs are simulated where wind makes a difference
 WIND_MARGIN = 1.02  # factor for what headings in between may give more
@@ -149,7 +150,7 @@ def _deviation_m(track: Array) -> float:
 
 # The track of a run over ground, as branch and bound places it.
 
-SIDES = np.stack([np.cos(angle := np.arange(BOUNDS.sides) * 2 * np.pi / BOUNDS.sides), np.sin(angle)], axis=1)
+SIDES = np.stack([np.cos(angle := np.arange(TRACK_SIDES) * 2 * np.pi / TRACK_SIDES), np.sin(angle)], axis=1)
 """Normals of the sides of a polygon that contains a track."""
 
 

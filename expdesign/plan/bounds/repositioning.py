@@ -42,7 +42,7 @@ from expdesign.plan.bounds.branch_and_bound import QUAD_SEGMENTS, time_saved_s
 from expdesign.plan.bounds.displacement import Displacement, Headway, differs_by_heading, displacement_of, exit_motion
 from expdesign.plan.chart import build_visibility_graph, simplified
 from expdesign.plan.control import LegEnd, least_loss, leg_end
-from expdesign.plan.legs import LEGS, leg_speed_mps, through_water
+from expdesign.plan.legs import BEYOND_ENDS, leg_speed_mps, through_water
 from expdesign.plan.values import UnderWay
 from expdesign.sea_area import SeaArea
 from expdesign.simulation import Environment
@@ -107,7 +107,7 @@ def reposition_bound_s(
     begin, standing = _begin(vessel, environment, under_way, ends[0])
     speed_mps = leg_speed_mps(transit_mps, [begin, *entries, *(np.array([most, 0.0]) for _, most, _ in exits)])
     turns = [*(abs(float(entry[2])) for entry in (begin, *entries)), *(turn for _, _, turn in exits)]
-    yaw_rate_radps = max([yaw_rate_radps, *(LEGS.beyond_ends * turn for turn in turns)])
+    yaw_rate_radps = max([yaw_rate_radps, *(BEYOND_ENDS * turn for turn in turns)])
     headway = Headway(speed_mps=speed_mps, current_to=environment.current_to)
     displacements = {item.name: displacement_of(vessel, item, environment, headway) for item in runs}
     counts = {item.name: repeats[item.name] for item in runs}

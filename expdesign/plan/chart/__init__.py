@@ -16,8 +16,9 @@ from expdesign.plan.chart.goal_distance import (
     shortest_path_tree,
     taut_bends,
 )
-from expdesign.plan.chart.tuning import CHART
 from expdesign.plan.chart.visibility_graph import (
+    CORNERS,
+    KEPT_GRAPHS,
     Corners,
     Roadmap,
     VisibilityGraph,

@@ -17,9 +17,16 @@ import numpy as np
 import scipy
 import shapely
 
-from expdesign.plan.chart.tuning import CHART
 from expdesign.sea_area import as_multipolygon, moved
 from expdesign.values import Array
+
+KEPT_GRAPHS = 12  # visibility graphs, clearance grids and tables of distances that a process keeps
+# of a simplified water at most, by the least tolerance, in those asked for, at which so many are accepted: more make
+# the graph slow, but water that shrinks further loses its passages. A thousand islands have four thousand corners,
+# however straight their shores. Water that grows has the first number at most.
+CORNERS: tuple[tuple[float, int], ...] = ((1.0, 700), (16.0, 2500), (128.0, 5000))
+PAIRS = 1_000_000  # of corners that are tested for sight at a time
+DENSE = 16_000  # corners of a water above which a coarser one is made of a finer one that was tried, not of the water
 
 STRAIGHT = 0.98  # share of the tolerance by which moved shores are straightened; the rest is for moving them
 SLIT_M = 1e-3  # growth of the water before lines of sight are tested, as a path may touch the shore
@@ -139,7 +146,7 @@ class VisibilityGraph(Roadmap):
         return found
 
 
-@lru_cache(maxsize=CHART.kept_graphs)
+@lru_cache(maxsize=KEPT_GRAPHS)
 def visibility_graph_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners) -> VisibilityGraph:
     """The visibility graph of a water, shrunk until its shore is simple; kept, as remedies ask for it again."""
     return build_visibility_graph(simplified(water, grow=False, tolerance_m=tolerance_m, corners=corners))
@@ -149,7 +156,7 @@ def build_visibility_graph(water: shapely.Geometry) -> VisibilityGraph:
     """The visibility graph of a water polygon with at most some thousands of corners."""
     corners, before, after = shore_corners(as_multipolygon(water))
     grown = opened(water)
-    parts = np.array_split(np.arange(len(corners)), len(corners) ** 2 // CHART.pairs + 1)
+    parts = np.array_split(np.arange(len(corners)), len(corners) ** 2 // PAIRS + 1)
     pairs = [_pairs_in_sight(grown, corners, before, after, tails) for tails in parts]
     tail, head = np.concatenate(pairs, axis=1)
     away = np.hypot(*(corners[tail] - corners[head]).T)
@@ -178,7 +185,7 @@ def _pairs_in_sight(
 
 
 def simplified(
-    water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float, corners: Corners = CHART.corners
+    water: shapely.MultiPolygon, *, grow: bool, tolerance_m: float, corners: Corners = CORNERS
 ) -> shapely.MultiPolygon:
     """Water with at most so many corners that contains the given water (`grow`), or lies inside it.
 
@@ -189,7 +196,7 @@ def simplified(
         water: polygons.
         grow: whether the result contains the water; else it lies inside.
         tolerance_m: at first.
-        corners: as `Tuning.corners`.
+        corners: as `CORNERS`.
     """
     least_m = tolerance_m
     source, moved_m, made = water, 0.0, [(water, 0.0)]
@@ -200,7 +207,7 @@ def simplified(
         if len(shore_corners(simple)[0]) <= (corners[0][1] if grow else most):
             return simple
         made.append((simple, tolerance_m))
-        if shapely.get_num_coordinates(source) > CHART.dense:
+        if shapely.get_num_coordinates(source) > DENSE:
             source, moved_m = made[-2]  # moved by a quarter of what comes next
         tolerance_m *= 2.0
 

@@ -1,8 +1,6 @@
-"""What a ship with a helm can do on legs, by simulating it: the turns it sails, full ahead from rest, stopping.
+"""What a ship with a helm can do on legs, by simulating it: steady turns, full ahead from rest, stopping.
 
-Steady turns of a ship that is steered by a helm: what is left when the helm stays over, by simulation.
-
-The engines keep the order of the straight approach, so the ship loses speed in the turn, as in the standard trial.
+In a turn the engines keep the order of the straight approach, so the ship loses speed, as in the standard trial.
 """
 
 from __future__ import annotations

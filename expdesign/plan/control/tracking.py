@@ -14,11 +14,12 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.plan.control.controllers import Controller, Demand
-from expdesign.plan.control.ships import LEAD_SHARE, Capability
-from expdesign.plan.control.tuning import CONTROL
+from expdesign.plan.control.ships import LEAD_SHARE, TRACK_LEAD, Capability
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Allocator, Vessel, VesselModel
+
+CATCH_UP = 0.3  # largest speed towards the reference, in transit speeds
 
 PACE_LEAST, PACE_MOST = 0.2, 3.0  # of a reference that stays abeam of a ship, in samples
 LEARNING = 3.0  # time constant in which an unexplained acceleration is estimated, in those of the velocities
@@ -202,8 +203,8 @@ class Helmsman:
 
     def _velocity_through_water(self, desired: Array, states: Array) -> Array:
         """(n, 2) desired velocity through water to north and east: the reference's, and some towards it."""
-        back = (desired[:, :2] - states[:, :2]) / (CONTROL.track_lead * self.answer_s)
-        most = CONTROL.catch_up * self.ship.transit_speed_mps
+        back = (desired[:, :2] - states[:, :2]) / (TRACK_LEAD * self.answer_s)
+        most = CATCH_UP * self.ship.transit_speed_mps
         back *= np.minimum(1.0, most / np.maximum(lengths(back), 1e-12))[:, None]
         steady = over_ground(desired)
         if self._current:

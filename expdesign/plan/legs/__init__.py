@@ -3,15 +3,16 @@
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.agile import agile_leg, free_leg
 from expdesign.plan.legs.dubins import curved_leg
-from expdesign.plan.legs.escape_check import check_ends, escapes
 from expdesign.plan.legs.helm import displaced, helm_leg, recover
-from expdesign.plan.legs.tuning import LEGS
 from expdesign.plan.legs.water import (
+    BEYOND_ENDS,
     FoundLeg,
     LegPath,
     LegTask,
     LegWater,
     acceptable,
+    check_ends,
+    escapes,
     last_state,
     leg_speed_mps,
     nearest_turns,

@@ -23,7 +23,7 @@ from ompl import geometric as og
 from ompl import util as ou
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.chart import CHART, Corners, Roadmap, opened, shore_corners, simplified
+from expdesign.plan.chart import KEPT_GRAPHS, Corners, Roadmap, opened, shore_corners, simplified
 from expdesign.values import Array
 
 # iterations of the path planner between looks for a solution, and how often at most
@@ -48,7 +48,7 @@ Holds = Callable[[Array], bool]
 """(k, 3) poses -> whether the hull may sweep from each to the next."""
 
 
-@lru_cache(maxsize=CHART.kept_graphs)
+@lru_cache(maxsize=KEPT_GRAPHS)
 def roadmap_of(water: shapely.MultiPolygon, tolerance_m: float, corners: Corners) -> Roadmap:
     """A roadmap by PRM* of the water that `visibility_graph_of` takes.
 

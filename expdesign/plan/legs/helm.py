@@ -1,18 +1,13 @@
 """Legs of ships that are steered by a helm: straight off, arcs that the ship can turn on, straight into the next run.
 
-First the ship recovers from what it was doing. From there the path is a Dubins curve of the ship's own turning radius
-between straights: one to accelerate, one in which the turn decays and, before a goal, the ship stops. Optimisation
-starts from steady turns along it; on long straights the ship is steady. The last part before a run is the run-up of the
-standard trials: steady speed, helm as it holds the course, engines as the run begins with.
+First the ship recovers from what it was doing: counter helm ends the turn, the engines go to transit speed. The search
+for places allows for the lengths that it turns and drifts meanwhile. From there the path is a Dubins curve of the
+ship's own turning radius between straights: one to accelerate, one in which the turn decays and, before a goal, the
+ship stops. Optimisation starts from steady turns along it. The last part before a run is the run-up of the standard
+trials: steady speed, helm as it holds the course, engines as the run begins with.
 
-Recovery of a helm-steered ship from a run: counter helm ends the turn, the engines go to transit speed.
-
-Legs begin with it, and the search for places allows for it: a ship still turns and drifts for some lengths.
-
-The steady part of a long leg of a helm-steered ship: straight ahead at transit speed, with commands that hold it.
-
-There is nothing to optimise about it. The program of a leg of a hundred hull lengths that contains it is large, and
-IPOPT sometimes ends without an answer.
+On long straights the ship is steady at transit speed, with commands that hold it. There is nothing to optimise, and
+IPOPT sometimes ends without an answer for a leg of a hundred hull lengths.
 """
 
 from __future__ import annotations
@@ -24,7 +19,7 @@ import numpy as np
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import CONTROL, Capability, HelmShip
+from expdesign.plan.control import APPROACH_HULLS, SETTLING_HULLS, Capability, HelmShip
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.legs.dubins import find_path
 from expdesign.plan.legs.optimise import solve_leg
@@ -231,7 +226,7 @@ def _speed_mps(water: LegWater, state: Array) -> float:
 def _run_up(task: LegTask, water: LegWater) -> tuple[LegTask, int]:
     """The leg up to the run-up, and the samples of that: none before a goal, or where wind would turn the ship."""
     vessel, speed = water.vessel, _speed_mps(water, task.end)
-    samples = int(np.ceil(CONTROL.approach_hulls * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
+    samples = int(np.ceil(APPROACH_HULLS * vessel.length_m / max(speed, 1e-9) / vessel.sample_time_s))
     if _stops(task, water):
         return task, 0
     states = water.states(task.end, np.tile(task.end_inputs, (samples, 1)))
@@ -277,7 +272,7 @@ def _shortest_first(start: Array, task: LegTask, water: LegWater, ship: HelmShip
             first=first,
             last=last,
             off_m=off * STRAIGHT_OFF_HULLS * length,
-            into_m=stop * ship.stopping_m if stopping else settle * CONTROL.settling_hulls * length,
+            into_m=stop * ship.stopping_m if stopping else settle * SETTLING_HULLS * length,
         )
         for off, settle, stop in STRAIGHTS
     ]

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.legs.water import LegTask, LegWater, leg_speed_mps, room_beside, through_water
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.legs.water import BEYOND_ENDS, LegTask, LegWater, leg_speed_mps, room_beside, through_water
+from expdesign.plan.values import WorkBudget
 from expdesign.simulation import Environment
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
-from expdesign.vessel.hull import covering_discs
+from expdesign.vessel.vessel import covering_discs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,7 +113,7 @@ def leg_problem(
         circle=np.r_[path[0, :2], np.inf],
         hull_arm_m=arm_m,
         top_speed_mps=leg_speed_mps(fastest, ends),
-        yaw_rate_radps=max(turning_rate_radps, *(LEGS.beyond_ends * abs(motion[2]) for motion in ends)),
+        yaw_rate_radps=max(turning_rate_radps, *(BEYOND_ENDS * abs(motion[2]) for motion in ends)),
         lateral_mps2=max(water.ship.lateral_mps2, *(1.05 * abs(motion[0] * motion[2]) for motion in ends)),
         node_s=node_s,
         budget=task.budget,

@@ -1,7 +1,12 @@
-"""What legs are made from: the task, the water all legs share, and whether commands fulfil a task."""
+"""What legs are made from: the task, the water that all legs share, and whether commands fulfil a task.
+
+The escape check says, before anything is placed, whether a ship that sails arcs can leave its start and reach its goal.
+A berth in a basin narrower than the ship's turns has no such path, so the search for legs would be in vain.
+"""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,8 +15,9 @@ import numpy as np
 import shapely
 
 from expdesign.conventions import whole_turns
+from expdesign.errors import NoPlan
 from expdesign.plan.chart import (
-    CHART,
+    CORNERS,
     ClearanceField,
     Corners,
     VisibilityGraph,
@@ -20,16 +26,16 @@ from expdesign.plan.chart import (
 )
 from expdesign.plan.control import Capability
 from expdesign.plan.legs._ompl import PLANE, roadmap_of, shortened
-from expdesign.plan.legs.tuning import LEGS
-from expdesign.plan.values import PathsName, PlanSettings
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import PathsName, PlanSettings, WorkBudget
 from expdesign.sea_area import ARC_SEGMENTS, SeaArea
 from expdesign.signals import Trajectory
 from expdesign.simulation import Environment, deliver, delivered_at_samples, integrate_motion, step_shares, to_body
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import NUMPY, Vessel
-from expdesign.vessel.hull import swept_hulls
+from expdesign.vessel.vessel import swept_hulls
+
+BEYOND_ENDS = 1.02  # largest speed and yaw rate of legs whose ends are faster than legs need be, in those of their ends
 
 CORRIDOR_HULLS = 3.0  # width of corridors to either side at most, in hull lengths
 MEMORY_TIME_CONSTANTS = 20.0  # after which a lagging actuator has forgotten: two parts in a thousand million are left
@@ -99,7 +105,7 @@ class LegWater:
     area: SeaArea  # allowed water
     clearance_m: float  # least distance of the hull from anything forbidden
     field: ClearanceField  # the same water on a grid
-    corners: Corners = CHART.corners  # that paths may bend at, as `Tuning.corners` of charts
+    corners: Corners = CORNERS  # that paths may bend at, as `CORNERS` of charts
     start_tolerance: float = PlanSettings.start_tolerance  # of runs and goal, as `PlanSettings.start_tolerance`
     paths: PathsName = PlanSettings.paths  # what finds paths that bend, as `PlanSettings.paths`
 
@@ -307,10 +313,84 @@ def room_beside(water: LegWater, centre: Array, side: Array, margin_m: float) ->
 
 
 def leg_speed_mps(transit_mps: float, ends: Iterable[Array]) -> float:
-    """Largest speed on a leg: transit speed, or `Tuning.beyond_ends` of its ends' (3,), where they are faster.
+    """Largest speed on a leg: transit speed, or `BEYOND_ENDS` of its ends' (3,), where they are faster.
 
     All through water.
     """
     steady = 1.001 * transit_mps
     fastest = max((float(np.hypot(*velocity[:2])) for velocity in ends), default=0.0)
-    return LEGS.beyond_ends * fastest if fastest > steady else steady
+    return BEYOND_ENDS * fastest if fastest > steady else steady
+
+
+ESCAPED_RADII = 2.5  # turning radii from a place at which a ship has escaped from it
+ESCAPE_ARC_RAD = 0.35  # turn of one arc of the escape check; straights are as long
+ESCAPE_CELL, ESCAPE_COURSES = 0.25, 12  # cells of its search: their size in turning radii, and courses to half a circle
+ESCAPE_ARCS = 6000  # checked at most
+
+
+def escapes(pose: Array, water: LegWater, *, backwards: bool = False) -> bool:
+    """Whether arcs of the ship's turning radius and straights lead from a pose (3,) out of its surroundings.
+
+    Best-first search over arcs, farthest from the pose first, with one arc to each cell of position and course. It ends
+    with "no" after finitely many arcs, which a sampling planner does not; too coarse cells may miss a path.
+
+    Args:
+        pose: where the ship is.
+        water: what the hull keeps to, and who sails.
+        backwards: the path leads to the pose.
+    """
+    radius, start = water.ship.turning_radius_m, np.add(pose, (0.0, 0.0, np.pi * backwards))
+    queue: list[tuple[float, int, Array]] = [(0.0, 0, start)]
+    seen, count = set[tuple[int, ...]](), 0
+    while queue and count < ESCAPE_ARCS:
+        _, _, place = heapq.heappop(queue)
+        for bend in (0.0, 1.0, -1.0):
+            arc = _arc(place, bend / radius, ESCAPE_ARC_RAD * radius, water.vessel.length_m)
+            key = _cell(arc[-1], radius)
+            if key in seen:
+                continue
+            seen.add(key)
+            count += 1
+            if not water.holds(arc):
+                continue
+            away = float(np.hypot(*(arc[-1] - start)[:2]))
+            if away > ESCAPED_RADII * radius:
+                return True
+            heapq.heappush(queue, (-away, count, arc[-1]))
+    return False
+
+
+def _arc(pose: Array, curvature: float, length_m: float, hull_m: float) -> Array:
+    """(k, 3) poses along an arc or a straight from a pose (3,)."""
+    along = np.linspace(0.0, length_m, int(np.ceil(3 * length_m / hull_m)) + 1)
+    half = curvature * along / 2
+    chord = along * np.sinc(half / np.pi)
+    course = pose[2] + half
+    return np.column_stack([pose[0] + chord * np.cos(course), pose[1] + chord * np.sin(course), pose[2] + 2 * half])
+
+
+def _cell(pose: Array, radius: float) -> tuple[int, ...]:
+    share, courses = ESCAPE_CELL, ESCAPE_COURSES
+    course = round(float(pose[2]) / np.pi * courses) % (2 * courses)
+    return round(float(pose[0]) / (share * radius)), round(float(pose[1]) / (share * radius)), course
+
+
+def check_ends(start: Array, goal: Array, water: LegWater) -> None:
+    """Raise NoPlan where a ship that sails arcs cannot depart from its start, or reach its goal.
+
+    Args:
+        start, goal: (3,) poses.
+        water: as of the plan.
+    """
+    for name, pose, backwards, to in (("start", start, False, "from"), ("goal", goal, True, "to")):
+        if not escapes(pose, water, backwards=backwards):
+            lat, lon = water.area.frame.to_degrees(pose[:2])
+            raise NoPlan(
+                f"no path was found {to} the {name}, near {lat:.5f}, {lon:.5f} and heading "
+                f"{np.degrees(pose[2]) % 360.0:.0f} degrees, on turns of {water.ship.turning_radius_m:.3g} m radius, "
+                f"which vessel {water.vessel.name!r} sails at {water.ship.transit_speed_mps:.3g} m/s, with "
+                f"{water.clearance_m:g} m of clearance",
+                what="berth",
+                which=name,
+                place=pose[:2],
+            )

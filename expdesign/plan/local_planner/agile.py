@@ -14,6 +14,7 @@ from expdesign.plan.control import AgileShip, leg_end
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, agile_leg, curved_leg
 from expdesign.plan.local_planner.arcs import PathPoints, all_round, between, moved, on_paths, path_points
 from expdesign.plan.local_planner.protocol import (
+    DRIFT_ROUNDS,
     Alike,
     LegEnds,
     Pair,
@@ -32,7 +33,6 @@ from expdesign.plan.local_planner.transitions import (
     transitions,
     with_transitions,
 )
-from expdesign.plan.local_planner.tuning import LOCAL
 from expdesign.plan.runs import Footprint
 from expdesign.simulation import CALM
 from expdesign.values import Array
@@ -108,7 +108,7 @@ class AgilePlanner:
             found = rule.seconds(through_m, froms[..., 2] - first, tos[..., 2] - last, turn, *speeds) + more_s
             return found + space.going_round_s(ends.before, ends.after, found)
         leg_s = np.zeros(len(away))
-        for _ in range(LOCAL.drift_rounds if space.current_to.any() else 1):
+        for _ in range(DRIFT_ROUNDS if space.current_to.any() else 1):
             step = away - leg_s[:, None] * space.current_to
             course = np.arctan2(step[..., 1], step[..., 0])
             angles = froms[..., 2] - course, tos[..., 2] - course, turn

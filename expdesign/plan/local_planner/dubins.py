@@ -1,6 +1,6 @@
-"""Local planner of force-steered ships that hardly turn at rest: Dubins curves at transit speed.
+"""Local planner of force-steered ships that hardly turn at rest: the shortest curves of bounded curvature.
 
-Lengths of the shortest curves of bounded curvature, many at once: what a search needs of them.
+They are sailed at transit speed, and many lengths are found at once.
 
 Source: L. E. Dubins, On curves of minimal length with a constraint on average curvature, American Journal of
 Mathematics 79 (1957), 497-516; in the normal form of A. M. Shkel and V. Lumelsky, Classification of the Dubins set,

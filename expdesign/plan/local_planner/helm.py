@@ -1,9 +1,8 @@
 """Local planner of helm-steered ships: arcs that the ship can turn on, in the time that changes of speed take.
 
-A rule for the time of legs of helm-steered ships: accelerate, go on, stop, as the ship's own simulation does.
-
-Such a ship needs distance to change its speed: on a leg too short for it, it has to go astern first, which takes long.
-It recovers from the run before, follows a Dubins curve, and goes straight for the last hull length before a run.
+Legs accelerate, go on and stop as the ship's own simulation does. Such a ship needs distance to change its speed: on a
+leg too short for it, it has to go astern first, which takes long. It recovers from the run before, follows a Dubins
+curve, and goes straight for the last hull length before a run.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 from expdesign.dictionary import Primitive
 from expdesign.plan.chart import polyline_length
-from expdesign.plan.control import CONTROL, HelmShip, full_ahead, stopped
+from expdesign.plan.control import APPROACH_HULLS, HelmShip, full_ahead, stopped
 from expdesign.plan.legs import (
     FoundLeg,
     LegTask,
@@ -38,8 +37,15 @@ from expdesign.plan.local_planner.arcs import (
     path_successors,
 )
 from expdesign.plan.local_planner.dubins import PATH_STRETCHES, dubins_m
-from expdesign.plan.local_planner.protocol import LegEnds, Pair, PartialPlans, SearchSpace, Successors, TransitionTrials
-from expdesign.plan.local_planner.tuning import LOCAL
+from expdesign.plan.local_planner.protocol import (
+    DRIFT_ROUNDS,
+    LegEnds,
+    Pair,
+    PartialPlans,
+    SearchSpace,
+    Successors,
+    TransitionTrials,
+)
 from expdesign.simulation import CALM
 from expdesign.values import Array, seal
 
@@ -105,7 +111,7 @@ class HelmTimes:
         along_m, leg_s = float(np.hypot(*recovery[:2])) + straight_m, np.zeros(len(tos))
         # legs are first guessed over ground: no turn all round
         over_ground_m = dubins_m(begins, ends, radius_m=self.radius_m)
-        for _ in range(LOCAL.drift_rounds if current_to.any() else 1):
+        for _ in range(DRIFT_ROUNDS if current_to.any() else 1):
             through = np.column_stack([ends[:, :2] - leg_s[:, None] * current_to, ends[:, 2]])
             length_m = dubins_m(begins, through, radius_m=self.radius_m)
             length_m = np.where(over_ground_m > length_m + np.pi * self.radius_m, over_ground_m, length_m)
@@ -136,7 +142,7 @@ def helm_times(ship: HelmShip) -> HelmTimes:
         speed_mps=ship.transit_speed_mps,
         radius_m=ship.turning_radius_m,
         run_up_m=ship.run_up_m,
-        steady_m=CONTROL.approach_hulls * approach.helm.vessel.length_m,
+        steady_m=APPROACH_HULLS * approach.helm.vessel.length_m,
         at_rest_m=STOP_LEG_HULLS * approach.helm.vessel.length_m,
         spare_m=RUN_LEG_SPARE_HULLS * approach.helm.vessel.length_m,
         answer_s=0.5 / approach.helm.drive_rate,

@@ -18,12 +18,13 @@ from expdesign.plan.chart import ClearanceField, GoalDistance
 from expdesign.plan.control import AgileShip, Capability
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater
 from expdesign.plan.runs import Footprint
-from expdesign.plan.values import Placement
-from expdesign.plan.work_budget import WorkBudget
+from expdesign.plan.values import Placement, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.sea_area import LocalFrame
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+DRIFT_ROUNDS = 3  # rounds in which the time of a leg and the drift in that time are made to agree
 
 GO_AROUND_RUN_UPS = 3.0  # expected time of go-arounds before a run that follows another at once, in run-ups, and
 SETTLED_RUN_UPS = 2.0  # length of leg, in run-ups, on which it falls to 1/e; of drawn trials with legs of 5 to 270 s

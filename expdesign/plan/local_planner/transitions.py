@@ -4,12 +4,10 @@ The least length of a leg on which the ship arrives at a run's entry without slo
 motion and the actuators at the end of the run before, for which there is no rule. Each pair of runs is optimised once,
 in open calm water: the leg may end anywhere, and displacement counts as much as at transit speed.
 
-How long legs of agile vessels take, for the search: a rule that optimised legs follow.
-
-Such a vessel moves as if pushed equally in every direction while it turns, so a leg lasts about as long as the longer
-of two: a point that is accelerated from one velocity to the other over the leg's path, along it and across it, and a
-turn on the spot; a little longer where both last equally long. Before and after, actuators need time to get to work
-while the ship goes on as it did.
+For the time of legs of agile vessels there is a rule that optimised legs follow. Such a vessel moves as if pushed
+equally in every direction while it turns, so a leg lasts about as long as the longer of two, a little longer where both
+last equally long: a point that is accelerated from one velocity to the other over the leg's path, along it and across
+it, and a turn on the spot. Before and after, actuators need time to get to work while the ship goes on as it did.
 """
 
 from __future__ import annotations

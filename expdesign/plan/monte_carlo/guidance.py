@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.conventions import whole_turns
-from expdesign.plan.control import CONTROL, Helmsman, Reference, lengths
+from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
 from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers, ReturnPaths, build_return_paths
@@ -92,7 +92,7 @@ class Guidance:
         self.doing = np.where(sailing, TRACKING, OUT)
         self._shift: Array = np.zeros((n, 2))
         leg_s = planned.arrival * helm.vessel.sample_time_s
-        self._caught_up_m = REJOIN_SHARE * CONTROL.catch_up * helm.ship.transit_speed_mps * leg_s
+        self._caught_up_m = REJOIN_SHARE * CATCH_UP * helm.ship.transit_speed_mps * leg_s
         self._at, self._end, self._most = np.zeros(n), np.full(n, planned.arrival), np.full(n, self._first - 1)
         self.go_arounds, self.samples, self._sample = np.zeros(n, dtype=int), np.zeros(n, dtype=int), 0
         self._abort_cause = np.full(n, ABORT_CAUSES.index("time"))
@@ -267,7 +267,7 @@ class Guidance:
         """
         track, helm, thinned = self._leg + self._shift[ships, None], self._helm, self._thinned
         off = places - track[:, 0]
-        return_s = lengths(off) / (CONTROL.catch_up * helm.ship.transit_speed_mps)
+        return_s = lengths(off) / (CATCH_UP * helm.ship.transit_speed_mps)
         left = np.maximum(0.0, 1.0 - thinned * helm.vessel.sample_time_s / return_s[:, None])  # (k, samples)
         points = track + left[..., None] * off[:, None]
         which, samples = np.nonzero(np.arange(len(thinned)) <= (left > 0.0).sum(axis=1)[:, None])
@@ -371,7 +371,7 @@ class Guidance:
     @property
     def _waiting(self) -> float:
         """Samples that a ship may take beyond what is planned."""
-        time_constants = WAITING_TIME_CONSTANTS * CONTROL.track_lead
+        time_constants = WAITING_TIME_CONSTANTS * TRACK_LEAD
         return time_constants * self._helm.answer_s / self._helm.vessel.sample_time_s
 
     def _allowed(self, samples: Array | float) -> Array | float:

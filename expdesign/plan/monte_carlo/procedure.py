@@ -16,16 +16,18 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians
 
 import numpy as np
 
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary.trim import drift
-from expdesign.plan.control import CONTROL, Helmsman, over_ground
+from expdesign.plan.control import RUN_UP_TIME_CONSTANTS, TRACK_LEAD, Helmsman, over_ground
 from expdesign.plan.legs import LegWater
-from expdesign.plan.monte_carlo.tuning import MONTE_CARLO
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
+
+HEADING_RAD = radians(3.0)  # tolerance of a run's start heading
 
 POSITION_HULLS = 0.2  # least tolerance of a run's start position, in hull lengths
 # share of the room beyond the clearance that the position may use instead, and its limit in hull lengths
@@ -87,7 +89,7 @@ def tolerances(water: LegWater, spare_m: float = 0.0) -> Tolerances:
     least, most = wider * SPEED_SHARE, max(SPEED_MOST_SHARE, wider * SPEED_SHARE)
     return Tolerances(
         position_m=position_m,
-        heading_rad=wider * MONTE_CARLO.heading_rad,
+        heading_rad=wider * HEADING_RAD,
         speed_mps=float(np.clip(moved_mps, least * ship.transit_speed_mps, most * ship.transit_speed_mps)),
         yaw_rate_radps=wider * YAW_RATE_SHARE * ship.turn_rate_radps,
     )
@@ -188,5 +190,5 @@ def _after(helm: Helmsman, state: Array, after_m: float) -> int:
     if not under_way(helm, state):
         return 0
     speed, sample_s = float(np.hypot(*state[3:5])) + 1e-9, helm.vessel.sample_time_s
-    longest_s = CONTROL.run_up_time_constants * CONTROL.track_lead * helm.answer_s
+    longest_s = RUN_UP_TIME_CONSTANTS * TRACK_LEAD * helm.answer_s
     return int(np.ceil(min(after_m / speed, longest_s) / sample_s)) if after_m else 0

@@ -1,12 +1,9 @@
 """Return paths of many ships to one place, the shortest in safe water, and how ships follow them.
 
 They are the visibility-graph paths of planned legs, in the water that centre lines may use. A ship outside that water
-goes straight back into it first.
-
-Go-around paths of ships that sail arcs: from wherever they are to the beginning of a run-up.
-
-The shortest Dubins curve where the water has room for it; else a chain of such curves over a fixed set of poses round
-the run-up, a roadmap that all ships share.
+goes straight back into it first. Ships that sail arcs go around by the shortest Dubins curve to the beginning of the
+run-up where the water has room for it; else by a chain of such curves over a fixed set of poses round it, a roadmap
+that all ships share.
 """
 
 from __future__ import annotations
@@ -21,7 +18,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import VisibilityGraph, first_bends, path_over, polyline_length, shortest_path_tree
-from expdesign.plan.control import CONTROL, Helmsman, lengths
+from expdesign.plan.control import TRACK_LEAD, Helmsman, lengths
 from expdesign.plan.legs import dubins_curve
 from expdesign.values import Array
 
@@ -144,7 +141,7 @@ class PathFollowers:
             lengthways = np.cos(np.arctan2(offset[near, 1], offset[near, 0]) - self.goal[2])
             slow = np.minimum(
                 fastest * np.maximum(lengthways, SIDEWAYS_SPEED),
-                left[near] / (CONTROL.track_lead * helm.answer_s),
+                left[near] / (TRACK_LEAD * helm.answer_s),
             )
             speed[near] = np.minimum(speed[near], slow)
         leg = there - before

@@ -17,8 +17,10 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.input_files import check_ends
-from expdesign.records.tuning import TUNING
 from expdesign.values import Array
+
+BLOCK_ROWS = 4096  # rows held as text at once
+READ_BYTES = 1 << 20  # bytes read at once while a file is checked to be text
 
 SEPARATORS = {";": "';'", "\t": "tabs", "|": "'|'"}
 SPREADSHEET = b"PK\x03\x04"
@@ -54,7 +56,7 @@ class Cells:
         parts: list[Array] = []
         with self.path.open(encoding="utf-8-sig") as file:
             next(file)
-            while lines := list(islice(file, TUNING.block_rows)):
+            while lines := list(islice(file, BLOCK_ROWS)):
                 if any(map(str.isspace, lines)):
                     return None
                 try:
@@ -123,7 +125,7 @@ def _check_text(path: Path) -> None:
     decoder, blank, offset = codecs.getincrementaldecoder("utf-8")(), True, 0
     with path.open("rb") as file:
         while True:
-            piece = file.read(TUNING.read_bytes)
+            piece = file.read(READ_BYTES)
             if not offset and piece.startswith(SPREADSHEET):
                 raise FileError(path, "", "is a spreadsheet or archive, expected CSV text")
             waiting = len(decoder.getstate()[0])
@@ -174,7 +176,7 @@ def _row_blocks(path: Path) -> Iterator[list[list[str]]]:
     empty = 0
     with _readable(path), _rows(path) as rows:
         next(rows)
-        while block := list(islice(rows, TUNING.block_rows)):
+        while block := list(islice(rows, BLOCK_ROWS)):
             before, empty = empty, 0
             while block and not block[-1]:
                 block.pop()

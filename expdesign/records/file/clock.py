@@ -9,8 +9,9 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.records.file.table import Mask, Table
-from expdesign.records.tuning import TUNING
 from expdesign.values import Array
+
+GAP_SAMPLE_TIMES = 1.5  # interval, in sample times, above which a new batch starts
 
 GAP_SHARE = 0.2  # share of intervals that may be gaps before the sampling counts as irregular
 JITTER_SHARE = 0.25  # largest deviation of an interval from the sample time, as a share of it
@@ -51,7 +52,7 @@ def read_clock(table: Table, *, sample_time_s: float | None, whose: str = "the v
     inside = step[~announced]
     if not len(inside):
         raise table.error("batch", "changes at every row, expected batches of two or more samples")
-    gap = ~announced & (step > TUNING.gap_sample_times * np.median(inside))
+    gap = ~announced & (step > GAP_SAMPLE_TIMES * np.median(inside))
     regular = ~announced & ~gap
     found_s = float(f"{step[regular].mean():.6g}")
     _check_sample_time(table, found_s, sample_time_s, whose)

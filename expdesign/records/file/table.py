@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from expdesign.errors import FileError
 from expdesign.records.file.cells import FIRST_ROW, Cells, read_cells, shown
-from expdesign.records.file.choice import Inputs, Sources, choose_columns
-from expdesign.records.file.names import REACHED, Source, is_input
+from expdesign.records.file.names import REACHED, Inputs, Source, Sources, choose_columns, is_input
 from expdesign.signals import AUXILIARY
 from expdesign.values import Array
 

@@ -1,6 +1,5 @@
 """Pose and velocity: positions, derived velocities, and whether they agree."""
 
-from expdesign.records.pose.agreement import check_agreement, check_heading
 from expdesign.records.pose.motion import (
     MEASURED,
     SMOOTHED,
@@ -16,4 +15,13 @@ from expdesign.records.pose.motion import (
     smoothed_velocity,
     velocity_origins,
 )
-from expdesign.records.pose.position import Fix, LocalMetres, check_jumps, last_fix, with_continuous_angles, with_metres
+from expdesign.records.pose.position import (
+    Fix,
+    LocalMetres,
+    check_agreement,
+    check_heading,
+    check_jumps,
+    last_fix,
+    with_continuous_angles,
+    with_metres,
+)

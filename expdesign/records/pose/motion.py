@@ -1,16 +1,14 @@
-"""Velocities in the b-frame from pose, and the origin of each velocity.
+"""Velocities in the b-frame from pose, by differences or smoothed, and the origin of each velocity.
 
-Source: F. Ljungberg, doctoral thesis, Linköping University, (3.66)-(3.74), for the difference and its correction.
+The smoother is that of Rauch, Tung and Striebel for a constant-velocity model: each signal is an integrated random walk
+observed in white noise, x' = w, w' = white noise of intensity q. With a flat prior, the smoothed states are the minimum
+of a quadratic form whose matrix is block tridiagonal, so one banded Cholesky factorisation gives the result of the
+forward and backward recursions, and the likelihood. The ratio of q to the measurement variance is the one that makes
+the data most likely.
 
-Rauch-Tung-Striebel smoother of a constant-velocity model, solved as the banded system that it is.
-
-Each signal is an integrated random walk observed in white noise: x' = w, w' = white noise of intensity q. With a flat
-prior, the smoothed states are the minimum of a quadratic form whose matrix is block tridiagonal, so one banded Cholesky
-factorisation gives the result of the forward and backward recursions, and the likelihood. The ratio of q to the
-measurement variance is the one that makes the data most likely.
-
-Sources: H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445-1450; B. M. Bell, SIAM Journal on
-Optimization 4 (1994) 626-636 (the smoother as a least-squares problem).
+Source: F. Ljungberg, doctoral thesis, Linköping University, (3.66)-(3.74), for the difference and its correction;
+H. E. Rauch, F. Tung, C. T. Striebel, AIAA Journal 3 (1965) 1445-1450; B. M. Bell, SIAM Journal on Optimization 4 (1994)
+626-636 (the smoother as a least-squares problem).
 """
 
 from __future__ import annotations

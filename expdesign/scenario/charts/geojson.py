@@ -1,14 +1,10 @@
 """From GeoJSON files to features and to polygons in degrees, every one checked.
 
-From GeoJSON files to features and the rings of their polygons; geometry is not checked here.
-
-Source of the format: RFC 7946; the caller states which property names the layer of a feature. Other formats of maps are
-recognised, and refused with the way from them to GeoJSON.
-
-Charts: the polygons of GeoJSON layers in degrees, every one checked.
-
 Harmless flaws are repaired and noted: rings that are not closed, repeated points, rings that touch themselves.
-Polygons that leave it ambiguous where land ends and water begins are refused.
+Polygons that leave it ambiguous where land ends and water begins are refused. The caller states which property names
+the layer of a feature. Other formats of maps are recognised, and refused with the way from them to GeoJSON.
+
+Source of the format: RFC 7946.
 """
 
 from __future__ import annotations

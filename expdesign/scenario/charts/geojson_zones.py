@@ -17,15 +17,17 @@ import shapely
 
 from expdesign.errors import FileError, InputError, NoPlan
 from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
-from expdesign.scenario.charts.dangers import ChartedObject, ShipRules, closed_water
 from expdesign.scenario.charts.geojson import UNNAMED, Chart, Feature, positions_in, read_features, read_layers
 from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
 from expdesign.scenario.charts.zones import (
     Box,
+    ChartedObject,
     ChartZones,
     OpenChart,
+    ShipRules,
     around,
     beside,
+    closed_water,
     far_outside,
     in_metres,
     off_km,

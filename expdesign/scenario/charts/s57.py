@@ -1,14 +1,10 @@
-"""S-57 cells (electronic navigational charts) to the features that decide where a ship may go, in degrees.
+"""S-57 cells (electronic navigational charts) to allowed water: deep, clear of solids, dangers, restricted areas.
 
-GDAL reads the cell and applies the update files in its folder (.001, .002, ...). Whether it did is checked against the
-update number that the cell then states; a gap in the chain of updates is refused.
+Unknown depths count as too shallow. GDAL reads the cell and applies the update files in its folder (.001, .002, ...).
+Whether it did is checked against the update number that the cell then states; a gap in the chain of updates is refused.
 
 Source: International Hydrographic Organization, S-57 edition 3.1 (2000), appendix A (object catalogue) and B.1 (ENC
 product specification).
-
-Allowed water of an S-57 cell: deep enough, clear of solid objects, dangers and restricted areas.
-
-Unknown depths count as too shallow.
 """
 
 from __future__ import annotations
@@ -27,19 +23,23 @@ from pyogrio.errors import DataSourceError
 from expdesign.errors import NoPlan
 from expdesign.input_files import check_ends
 from expdesign.scenario.charts.area_tables import AreaTable
-from expdesign.scenario.charts.dangers import (
+from expdesign.scenario.charts.zones import (
     BUOYS,
     CLEARANCES,
     DANGERS,
     OVERHEAD,
     SOLID,
     UNSURVEYED,
+    Box,
     ChartedObject,
+    ChartZones,
+    OpenChart,
     ShipRules,
+    around,
     closed_water,
+    rule_text,
     united,
 )
-from expdesign.scenario.charts.zones import Box, ChartZones, OpenChart, around, rule_text
 from expdesign.scenario.tables import Entry
 from expdesign.sea_area import LocalFrame
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from expdesign.errors import InputError
 from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, offer, shown
 from expdesign.vessel import NOMINAL, ROLL_PARAMETERS, Body, Load, RollPendulum
-from expdesign.vessel.masses import G_MPS2
+from expdesign.vessel.roll import G_MPS2
 from expdesign.waves import Waves
 
 

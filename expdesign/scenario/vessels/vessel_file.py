@@ -46,8 +46,7 @@ from expdesign.vessel import (
     std_keys,
     structure_terms,
 )
-from expdesign.vessel.expressions import parse_expression
-from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS
+from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, parse_expression
 
 MOUNTING_KEYS = tuple(field.name for field in fields(Mounting))
 CORRELATION_ROUNDING = 1e-6

@@ -37,8 +37,9 @@ from scipy.optimize import linprog
 from expdesign.errors import InputError
 from expdesign.shortest_day.accuracy import Accuracy
 from expdesign.shortest_day.bounds.motions import Motions
-from expdesign.shortest_day.bounds.tuning import TUNING
 from expdesign.values import Array, seal
+
+ROUNDS = 40  # of adding samples to a measure
 
 FIRST_BOXES = 4096  # about as many to begin with, at most
 BOXES = 200_000  # most that a class of motions is parted into, where the bound is proved; fewer above four dimensions
@@ -264,7 +265,7 @@ class _Search:
     def measured(self) -> tuple[Array, float] | None:
         """A multiplier (k, k), with <G, M> >= 1 for all that is accurate enough, and the measure's own samples."""
         enough, cuts = np.inf, list[Array]()
-        for _ in range(TUNING.rounds):
+        for _ in range(ROUNDS):
             cuts = []
             for _ in range(STEPS):
                 M = self._information()

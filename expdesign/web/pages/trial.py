@@ -9,7 +9,7 @@ from nicegui import ui
 from expdesign.web import answers
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, shown_job, told, wrong
-from expdesign.workflows.planning.new import KINDS
+from expdesign.workflows.commands.new import KINDS
 
 
 def register(site: Site) -> None:

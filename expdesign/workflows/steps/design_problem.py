@@ -29,7 +29,7 @@ from expdesign.information import (
     estimated_parameters,
     excitation_refusal,
 )
-from expdesign.information.augmented import score_augmented
+from expdesign.information.disturbed import score_augmented
 from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information

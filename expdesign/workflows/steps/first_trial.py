@@ -25,7 +25,7 @@ from expdesign.progress import Progress
 from expdesign.scenario import Scenario
 from expdesign.simulation import simulate_many
 from expdesign.vessel import VesselModel
-from expdesign.vessel.hull import covering_discs
+from expdesign.vessel.vessel import covering_discs
 
 WIDE = 0.25  # median standard deviation of parameters, in their values, from which a prior is wide
 NEAR_HULLS = 1.5  # hull lengths about the planned track that ships of the prior keep to in the runs of a first trial

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from expdesign.assessment import EstimateOptions, assess, sentence
-from expdesign.assessment.tuning import TUNING
+from expdesign.assessment.misfit import AHEAD_S
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.regression import AIR, heading_of, inputs_of, model_for, signal_table
@@ -124,7 +124,7 @@ def studied(case: Case, data: Path) -> Iterator[str]:
         except NoAnswer as error:
             yield f"\n{case.folder}, {title}: no answer: {error}"
             continue
-        ahead = f"error {TUNING.ahead_s:g} s ahead [% of the spread]"
+        ahead = f"error {AHEAD_S:g} s ahead [% of the spread]"
         yield f"\n{case.folder}, {title}: fit of the simulated output [%], {ahead}"
         for limits, run in zip(found.limits, found.best.runs, strict=True):
             yield f"  {run.use[:4]} {run.batch.name:36}{_row(run.fit_percent)}   {_row(100 * limits.ahead_share)}"

@@ -1,0 +1,449 @@
+"""The page about an estimation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from markupsafe import Markup
+
+from expdesign.assessment import Assessed, Assessment, sentence
+from expdesign.assessment.misfit import AHEAD_S
+from expdesign.conventions import plus_minus
+from expdesign.estimation.excitation import sample_notes
+from expdesign.export import words
+from expdesign.export.document import Document, Figure, Items, Section, Table, filled, notes_of, section
+from expdesign.export.estimate_figures import autocorrelation_figure, interval_figure, residual_figure, run_figure
+from expdesign.export.files import (
+    breach_sentences,
+    disturbance_table,
+    estimate_warnings,
+    failure_rows,
+    fit_entries,
+    fit_table,
+    limit_entries,
+    limit_table,
+    motion_words,
+    parameter_entries,
+    parameter_table,
+    prediction_entries,
+    prediction_table,
+    prediction_title,
+    rows_entry,
+    steered_entry,
+    unstable_warning,
+)
+from expdesign.vessel import NOT_ACTING_BACK, Vessel
+
+FAST_DECAY = 1e-3  # growth of an initial error below which the table says that it decays
+DRAWN_METHODS = 3  # largest number of methods in the figures of runs
+STEERED_WORDS = {"use": "used", "leave-out": "left out", "planned": "instruments from planned inputs"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EstimateContent:
+    """The values that the page shows."""
+
+    vessel: Vessel  # as it was before the estimation
+    found: Assessment  # the estimates and their assessment
+    command: str  # the command line that reproduces the result
+    version: str  # of the program
+
+    @property
+    def drawn(self) -> tuple[Assessed, ...]:
+        """The methods whose simulations are drawn: the one in the vessel file, then those that simulate most runs."""
+        others = [item for item in self.found.methods if item is not self.found.best]
+        others.sort(key=lambda item: sum(bool(run.problem) for run in item.runs))
+        return (self.found.best, *others)[:DRAWN_METHODS]
+
+
+# Sentences on an estimation: its parameters and data, and which estimate to use.
+
+
+def summary(content: EstimateContent) -> list[str]:
+    """The estimated parameters and the data, in a few sentences."""
+    found, best = content.found, content.found.best
+    batches = found.record.batches
+    seconds = sum(len(batch) * batch.sample_time_s for batch in batches)
+    samples = sum(len(batch) for batch in batches)
+    tests = words.counted(len(found.tests.batches), "run")
+    apart = f" Test data, not used for estimation: {tests}." if found.tests.batches else ""
+    fixed = f" Fixed parameters: {', '.join(found.fixed)}." if found.fixed else ""
+    return [
+        f"Estimated: {words.counted(len(best.estimate.names), 'parameter')} of {content.vessel.name}, from "
+        f"{words.counted(len(batches), 'run')} with {words.counted(samples, 'sample')} in {words.duration(seconds)}."
+        f"{apart}{fixed}",
+        f"The file vessel-estimated.toml holds the estimate by {best.method.title} ({best.method.name}).",
+        _fit_sentence(best),
+    ]
+
+
+def _fit_sentence(best: Assessed) -> str:
+    kinds = [(use, [run for run in best.runs if run.use == use]) for use in ("estimation", "test")]
+    parts = []
+    for use, runs in kinds:
+        fits = np.array([run.fit_percent for run in runs if not run.problem])
+        if len(fits) and np.isfinite(fits).any():
+            medians = ", ".join(
+                f"{name} {words.number(float(np.nanmedian(column)), 0)}{words.NB}%"
+                for name, column in zip(best.model.outputs, fits.T, strict=True)
+                if np.isfinite(column).any()
+            )
+            parts.append(f"{medians} on the {use} runs{' that do not diverge' * (len(fits) < len(runs))}")
+        if len(fits) < len(runs):
+            parts.append(f"{len(runs) - len(fits)} of {words.counted(len(runs), f'{use} run')} diverged")
+    return f"Fit of its simulations, median over runs: {'; '.join(parts)}." if parts else "No run could be simulated."
+
+
+def conditions(content: EstimateContent) -> list[str]:
+    """Where the data of the chosen estimate break the excitation condition."""
+    best = content.found.best
+    chosen = sample_notes(best.estimate.residuals)
+    return [*chosen, *breach_sentences(best.breaches, len(content.found.record.batches))]
+
+
+def advice(content: EstimateContent) -> list[str]:
+    """Advice on the choice of the estimate, from the residuals of these data."""
+    best = content.found.best
+    lag = best.one_step.autocorrelation[1]
+    sentences = [*([content.found.why] if content.found.why else []), *unstable_warning(content.found)]
+    if (lag < -0.25).any():
+        sentences.append(
+            f"Successive residuals of {_names(best, lag < -0.25)} are negatively correlated. This indicates "
+            "measurement noise in the velocities, which biases least squares."
+        )
+    if (lag > 0.25).any():
+        sentences.append(
+            f"Successive residuals of {_names(best, lag > 0.25)} are positively correlated. The model lacks a slow "
+            "effect, such as wind, current, waves or a term. No method is consistent with a wrong model structure, "
+            "and the standard deviations do not include this error. The command diagnose searches for the cause."
+        )
+    if not best.stable:
+        sentences.append(
+            "No estimate can simulate every run, so none is ready for use. Runs with smaller unmodelled effects help, "
+            "and a model with fewer terms."
+        )
+    return sentences
+
+
+def _names(best: Assessed, chosen: np.ndarray) -> str:
+    return " and ".join(name for name, is_in in zip(best.one_step.outputs, chosen, strict=True) if is_in)
+
+
+FACTOR = 1.959964
+"""Standard deviations to either side that hold 95 % of a normal distribution."""
+LIMIT_HEADER = (
+    "Run", "Output", "Fit", "Constant force", "Slow forces", "Fast forces, noise", "Parameter uncertainty",
+    "Fit limit by noise", "Error growth over the run", f"Error of {AHEAD_S:g} s prediction",
+)  # fmt: skip
+
+
+def estimate_document(content: EstimateContent) -> Document:
+    """The estimates for people."""
+    found, ship = content.found, content.vessel
+    step_s, batches = found.record.batches[0].sample_time_s, found.record.batches
+    return Document(
+        kind="Estimated manoeuvring model",
+        title=ship.name,
+        name=f"Estimate {ship.name}",
+        about=f"{words.ship(ship)}; sample time {step_s:g} s",
+        findings=tuple(summary(content)),
+        facts={
+            "runs": len(batches),
+            "samples": sum(len(batch) for batch in batches),
+            "runs_kept_apart": len(found.tests.batches),
+            "vessel_file_holds": found.best.method.name,
+        },
+        values={**estimate_values(found), **({} if ship.pendulum is None else {"note_on_roll": NOT_ACTING_BACK})},
+        sections=filled(
+            _parameters(content),
+            *_choice(content),
+            _fit(found),
+            _limits(found),
+            *_runs(content),
+            _residuals(found),
+            *_methods(content),
+            section("Current and wind", _table(disturbance_table(found), texts=3), DISTURBANCES),
+            section("Samples used", used_samples(found)),
+            section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
+        ),
+        notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(content)),
+        command=content.command,
+        version=content.version,
+    )
+
+
+def estimate_values(found: Assessment) -> dict[str, object]:
+    """More numbers, for JSON."""
+    return {
+        **({"why": found.why} if found.why else {}),
+        "parameters_of": found.motion,
+        "what_limits_the_fit": limit_entries(found),
+        "methods_left_out": list(found.left_out),
+        "methods": {
+            item.method.name: {
+                "parameters": parameter_entries(item),
+                "horizon_s": item.horizon_s,
+                "predictions": prediction_entries(found, item),
+                "fit": fit_entries(item),
+                "samples_used": item.estimate.residuals.rows,
+                "samples_used_by_equation": rows_entry(item),
+                "steered": steered_entry(item),
+                "warnings": len(estimate_warnings(found, item)),
+            }
+            for item in found.methods
+        },
+    }
+
+
+def _table(headed: tuple[tuple[str, ...], list[tuple[str, ...]]], *, texts: int = 1, title: str = "") -> Table:
+    header, rows = headed
+    return Table(title=title, header=header, rows=rows, texts=texts)
+
+
+def _parameters(content: EstimateContent) -> Section:
+    found = content.found
+    explained = tuple(f"{item.method.name}\n\u00b1 standard deviation, 95 % interval" for item in found.methods)
+    chosen = next(number for number, item in enumerate(found.methods, start=2) if item is found.best)
+    of_page = Table(
+        header=("Parameter\nits term", "Before", *explained), rows=parameter_rows(content), shaded=chosen, on="page"
+    )
+    title, (header, rows) = "Estimates, with standard deviations", parameter_table(found)
+    return section(
+        "Parameters",
+        of_page,
+        Table(title=title, header=header, rows=rows, on="terminal"),
+        f"{motion_words(found)} The model is in {content.vessel.model.form} form. The shaded column is written to the "
+        "vessel file. The standard deviations account for correlated residuals. They measure random error only, not "
+        "errors of the model structure.",
+        Figure(
+            draw=partial(interval_figure, found.methods, found.best),
+            caption="Estimates of all methods with 95 % intervals. A parameter may be absent from the true ship if its "
+            "interval contains zero.",
+        ),
+    )
+
+
+def _choice(content: EstimateContent) -> Iterator[Section]:
+    """Which estimate to use."""
+    found = content.found
+    yield section("Which estimate to use", *notes_of(advice(content)), Items(METHODS_IN_WORDS))
+    predictions = _table(prediction_table(found), title=prediction_title(found))
+    yield section(prediction_title(found), predictions, PREDICTIONS, level=3)
+    broken = conditions(content)
+    holds = "It holds in all runs, for the noise stated in the vessel file and no current."
+    yield section("Excitation condition", *(notes_of(broken) or (holds,)), level=3)
+
+
+def _fit(found: Assessment) -> Section:
+    winds = found.best.method.name.endswith(("wind", "air"))
+    still = "in still water" + ", and, for methods with wind, in the measured wind" * winds
+    return section(
+        "Fit of the simulated output",
+        f"Each run is simulated from its first measured velocity with the measured inputs, {still}. 100 % is a perfect "
+        "fit. 0 % is as good as the mean of the measured velocity. Negative values are possible. A real current, "
+        "sensor noise and the accumulation of errors in long runs all lower the fit, even of a perfect model.",
+        _table(fit_table(found), texts=2, title="Fit of the simulated output to the measured one, in per cent"),
+    )
+
+
+def _limits(found: Assessment) -> Section:
+    header, rows = limit_table(found)
+    return section(
+        f"Causes of misfit of {found.best.method.name}",
+        MISFIT,
+        Table(header=LIMIT_HEADER, rows=limit_rows(found), texts=2, on="page"),
+        Table(header=header, rows=rows, texts=2, on="terminal"),
+    )
+
+
+def _runs(content: EstimateContent) -> Iterator[Section]:
+    """Every run as it was measured and simulated."""
+    found = content.found
+    figures = []
+    for number, (limits, run) in enumerate(zip(found.limits, found.best.runs, strict=True)):
+        use = "test run, not used for estimation" if run.use == "test" else "used for estimation"
+        about = " \u00b7 ".join([use, *([run.problem] if run.problem else [])])
+        caption = Markup("<b>{}</b> \u00b7 {}<br>{}").format(run.batch.name, about, sentence(limits, run))
+        figures.append(Figure(draw=partial(run_figure, number, content.drawn), caption=caption, above=True))
+    yield section("Run by run", *figures)
+
+
+def _residuals(found: Assessment) -> Section:
+    best, names = found.best, tuple(batch.name for batch in found.record.batches)
+    step_s = found.record.batches[0].sample_time_s
+    rows = [
+        (
+            item.method.name,
+            _listed(item.one_step.outputs, item.one_step.explained.tolist(), 3),
+            _listed(item.one_step.outputs, item.one_step.autocorrelation[1].tolist(), 2),
+        )
+        for item in found.methods
+    ]
+    header = ("Method", "Explained share of the sample-to-sample variance", "Correlation of successive residuals")
+    return section(
+        f"Residuals of {best.method.name}",
+        Figure(
+            draw=partial(residual_figure, best, names, step_s),
+            caption="One-step prediction errors, as accelerations. Dotted lines separate the runs.",
+        ),
+        Figure(
+            draw=partial(autocorrelation_figure, best, step_s),
+            caption="Autocorrelation of the residuals. White residuals stay in the grey band. A value near "
+            "\u22120.5 at the first lag indicates measurement noise. A slow decay indicates a slow effect that is "
+            "missing from the model.",
+        ),
+        Table(header=header, rows=rows, texts=3, on="page"),
+        "With noisy velocities the explained share is small or negative even for a good model: the noise of a "
+        "difference exceeds the motion between two samples. A small share is then no evidence against an estimate.",
+    )
+
+
+def _methods(content: EstimateContent) -> Iterator[Section]:
+    """How each method worked, and what it warns of."""
+    yield section("Methods and warnings")
+    for item in content.found.methods:
+        diverged = tuple(f"Simulation fails: {run.problem}." for run in item.runs if run.problem)
+        warnings = notes_of((*item.estimate.warnings, *diverged), of=item.method.name)
+        title = f"{item.method.name}: {item.method.title}"
+        yield section(title, _how(content.found, item), *(warnings or ("No warnings.",)), level=3)
+
+
+def _how(found: Assessment, item: Assessed) -> str:
+    """Where the instruments of a method come from."""
+    if not item.uses_instruments:
+        return "No instruments."
+    source = "the parameters of the vessel file" if item.start == "nominal" else "the least-squares estimate"
+    refined = words.counted(item.estimate.refinements, "time")
+    return f"The first instruments are simulated with {source}, and refined {refined}. Subtracted mean: {found.mean}."
+
+
+def used_samples(found: Assessment) -> Table:
+    """Samples used by each method and equation, those marked as steered, what became of these; where they differ."""
+    residuals = [item.estimate.residuals for item in found.methods]
+    marked = any(batch.steered is not None for batch in found.record.batches)
+    rows = [
+        (
+            item.method.name,
+            str(item.estimate.residuals.rows),
+            ", ".join(f"d{name}/dt {count}" for name, count in rows_entry(item).items()),
+            str(steered.samples),
+            STEERED_WORDS[steered.treatment] if steered.samples else "",
+        )
+        for item in found.methods
+        for steered in (item.estimate.steered,)
+        if marked or any((own.rows_of < own.rows).any() for own in residuals)
+    ]
+    header = ("Method", "Samples used", "By equation", "Marked as steered", "Treatment of these")
+    return Table(header=header, rows=rows, texts=5)
+
+
+METHODS_IN_WORDS = (
+    Markup(
+        "<b>Least squares</b> (ls) is consistent only if the velocities are measured without noise and every force is "
+        "modelled. It has the smallest variance. With little noise it is a good choice."
+    ),
+    Markup(
+        "<b>Instrumental variables</b> (iv) remain consistent with noisy velocities under three conditions. The "
+        "simulated instruments follow the true motion. No disturbance is correlated with the inputs; feedback from a "
+        "noisy measurement to the inputs breaks this. The excitation condition holds: every velocity inside an "
+        "absolute value keeps its sign and stays clear of zero."
+    ),
+    Markup(
+        "<b>Output error</b> (oe, or oe-air with the measured wind) minimises the simulation error. It needs neither "
+        "instruments nor the excitation condition. Over whole runs it is the most accurate method if the sensors are "
+        "the only disturbance. If weather acts, or the ship is course-unstable, a horizon stops errors from "
+        "accumulating."
+    ),
+    Markup(
+        "<b>Augmented</b> methods also estimate an unknown mean current and wind. Methods <b>with measured wind</b> "
+        "use the anemometer; in strong wind only they are suitable. Without wind in the model, the hydrodynamic "
+        "parameters absorb the wind force."
+    ),
+    "A good fit on test runs is stronger evidence than a small standard deviation.",
+)
+PREDICTIONS = (
+    "Runs are left out in turn, or pieces of a few; every method estimates from the rest and predicts what was left "
+    "out, from measured velocities. Each error is a geometric mean over runs; 100 is no better than a constant."
+)
+MISFIT = (
+    "The misfit of a simulation is the accumulated effect of its one-step errors. These are split into their mean over "
+    "the run, their slow part and the rest. Each share of the squared misfit is computed by propagating one part "
+    "alone; shares are negative where parts cancel. The last column predicts from measured velocities and is relative "
+    "to the standard deviation of the motion. If it is small while the fit is bad, errors accumulate or the ship is "
+    "unstable; the model itself can still be useful."
+)
+DISTURBANCES = (
+    "Velocities to north (N) and east (E) over ground, with standard deviations to first order. Mean current and "
+    "second moments are estimated from nuisance parameters. The sum of the variances is not among them: it is a "
+    "constant, which instruments without mean do not see. Without measured wind, drag terms of water and air coincide, "
+    "and only a combination of current and wind can be estimated."
+)
+
+
+def _data_notes(content: EstimateContent) -> tuple[str, ...]:
+    """Notes on the files, doubts first, and on methods without an answer."""
+    found = content.found
+    return tuple(dict.fromkeys([*found.record.doubts, *found.record.notes, *found.tests.notes, *found.left_out]))
+
+
+def parameter_rows(content: EstimateContent) -> list[tuple[str, ...]]:
+    """Every parameter of the model: its term, value before, and value with deviation and 95 % interval per method."""
+    model = content.vessel.model
+    return [
+        (
+            f"{term.name}\n{term.expression} in d{term.equation}/dt",
+            words.significant(float(value)),
+            *(_cell(item, term.name) for item in content.found.methods),
+        )
+        for term, value in zip(model.terms, model.parameters, strict=True)
+    ]
+
+
+def _cell(item: Assessed, name: str) -> str:
+    estimate = item.estimate
+    if name not in estimate.names:
+        return f"{words.significant(estimate.held[name])}\nnot estimated"
+    index = estimate.names.index(name)
+    value, std = float(estimate.values[index]), float(estimate.std[index])
+    low, high = (words.significant(value + sign * FACTOR * std) for sign in (-1, 1))
+    return f"{plus_minus(value, std)}\n{low} to {high}".replace("-", words.MINUS)
+
+
+def limit_rows(found: Assessment) -> list[tuple[str, ...]]:
+    """One row per run and output: fit, shares of the misfit, ceiling, growth, error ahead."""
+    rows = []
+    for limits, run in zip(found.limits, found.best.runs, strict=True):
+        for index, output in enumerate(limits.outputs):
+            shares = (limits.constant, limits.slow, limits.quick, limits.parameters)
+            rows.append(
+                (
+                    run.batch.name if index == 0 else "",
+                    output,
+                    _percent(run.fit_percent[index]),
+                    *(_percent(100 * share[index]) for share in shares),
+                    _percent(limits.ceiling_percent[index]),
+                    _growth(limits.growth) if index == 0 else "",
+                    _percent(100 * limits.ahead_share[index]),
+                )
+            )
+    return rows
+
+
+def _growth(factor: float) -> str:
+    """Growth of an initial error; "" where it is not known."""
+    if not math.isfinite(factor):
+        return ""
+    return "decays" if factor < FAST_DECAY else f"\N{MULTIPLICATION SIGN}{words.significant(factor, 2)}"
+
+
+def _percent(value: float) -> str:
+    return f"{words.number(float(value), 0)}{words.NB}%" if math.isfinite(value) else "-"
+
+
+def _listed(outputs: tuple[str, ...], values: list[float], decimals: int) -> str:
+    texts = ("-" if math.isnan(value) else words.number(value, decimals) for value in values)
+    return ", ".join(f"{name} {text}" for name, text in zip(outputs, texts, strict=True))

@@ -1,0 +1,115 @@
+"""What every command is asked: each of its options once, with name, type, help and default.
+
+The command line is made of these values, and so is the line that repeats a call.
+"""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import MISSING, dataclass
+from functools import cached_property
+from typing import Any, get_args, get_type_hints
+
+from expdesign.requests.operation import Monitor, WatchSteps
+from expdesign.requests.options import Argument, Option, Request
+from expdesign.requests.planning import (
+    CheckRoute,
+    Durations,
+    Export,
+    New,
+    Nominal,
+    Plan,
+    RollPlan,
+    Run,
+    Score,
+    WhatIf,
+)
+from expdesign.requests.recorded import Diagnose, Estimate, IdentifySteps, Import, Indices, Mine
+from expdesign.requests.trials import Foresee, Incline, Replan, Roll, Simulate, TrialResult, Validate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """One option or argument of a command."""
+
+    name: str  # of the field
+    kind: Any  # its type
+    typed: Option | Argument  # how it is given
+    default: Any  # MISSING where it must be given
+
+    @property
+    def flag(self) -> str:
+        """As it is typed; empty for an argument."""
+        return "" if isinstance(self.typed, Argument) else self.typed.flag or f"--{self.name.replace('_', '-')}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command: its name, and the workflow that carries it out."""
+
+    name: str  # on the command line
+    request: type[Request]
+    workflow: str  # name in `expdesign.workflows`
+    tells: bool = False  # whether the workflow also takes `tell`, for lines that are printed while it works
+
+    @cached_property
+    def asked(self) -> tuple[Asked, ...]:
+        """Options and arguments of the request, in their order."""
+        hints = get_type_hints(self.request, include_extras=True)
+        return tuple(
+            Asked(name=name, kind=kind, typed=typed, default=getattr(self.request, name, MISSING))
+            for name, (kind, typed) in ((name, get_args(hint)) for name, hint in hints.items())
+        )
+
+
+def _command(name: str, request: type[Request], *, workflow: str = "", tells: bool = False) -> Command:
+    return Command(name=name, request=request, workflow=workflow or name.replace("-", "_"), tells=tells)
+
+
+COMMANDS = (
+    _command("new", New),
+    _command("run", Run),
+    _command("nominal", Nominal),
+    _command("score", Score),
+    _command("durations", Durations),
+    _command("plan", Plan),
+    _command("export", Export),
+    _command("check-route", CheckRoute, workflow="check_routes"),
+    _command("whatif", WhatIf),
+    _command("roll-plan", RollPlan),
+    _command("import", Import, workflow="import_logs"),
+    _command("estimate", Estimate),
+    _command("diagnose", Diagnose),
+    _command("indices", Indices),
+    _command("identify-steps", IdentifySteps),
+    _command("mine", Mine),
+    _command("monitor", Monitor),
+    _command("watch-steps", WatchSteps, tells=True),
+    _command("foresee", Foresee),
+    _command("simulate", Simulate),
+    _command("validate", Validate, workflow="validate_design"),
+    _command("trial-result", TrialResult),
+    _command("replan", Replan),
+    _command("roll", Roll),
+    _command("incline", Incline),
+)
+"""In the order in which `--help` lists them."""
+
+
+def command_text(request: Request) -> str:
+    """`expdesign COMMAND ARGUMENTS OPTIONS`, ready to be typed; options with their usual values are left out."""
+    command = next(one for one in COMMANDS if one.request is type(request))
+    arguments, options = list[str](), list[str]()
+    for one in command.asked:
+        value = getattr(request, one.name)
+        words = [f"{item:g}" if isinstance(item, float) else str(item) for item in _listed(value)]
+        if isinstance(one.typed, Argument):
+            arguments += words
+        elif value != one.default or one.typed.stated:
+            options += [one.flag, *words]
+    return shlex.join(["expdesign", command.name, *arguments, *options])
+
+
+def _listed(value: object) -> tuple[object, ...]:
+    """The words of a value: none of a flag."""
+    return value if isinstance(value, tuple) else () if isinstance(value, bool) else (value,)

@@ -1,0 +1,205 @@
+"""What a command may be asked: an option or argument, and those that several commands share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, dataclass_transform
+
+from expdesign.errors import InputError
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a command, beside the type and the default of its field."""
+
+    flag: str = ""  # as it is typed; by default the name of the field
+    short: str = ""  # one letter, as in -o
+    metavar: str | None = None
+    help: str = ""
+    min: float | None = None
+    max: float | None = None
+    parser: Callable[[str], Any] | None = None  # of what is typed
+    callback: Callable[[Any], Any] | None = None  # checks the value, before the work begins
+    stated: bool = False  # whether the command that repeats a call states a usual value, too
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What is typed without a name."""
+
+    metavar: str
+    help: str
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Request:
+    """What a command is asked: annotations are its options, class attributes their defaults, the docstring its help.
+
+    It is a frozen dataclass to the type checker. At run time it is less, as every command loads all of them.
+    """
+
+    def __init__(self, **values: object) -> None:
+        """Take values by name.
+
+        Raises:
+            TypeError: a name is unknown or missing.
+        """
+        known = type(self).__annotations__
+        if wrong := {*values} - {*known} | {name for name in known if name not in values and not hasattr(self, name)}:
+            raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
+        vars(self).update(values)
+
+
+def parse_seed(text: str) -> int:
+    """The seed of all random numbers.
+
+    Raises:
+        InputError: not a whole number of 0 or more.
+    """
+    return _count("--seed", text)
+
+
+def parse_jobs(text: str) -> int:
+    """The number of processes, 0 for one per core.
+
+    Raises:
+        InputError: not a whole number of 0 or more.
+    """
+    return _count("--jobs", text)
+
+
+def check_out(out: Path | None) -> Path | None:
+    """The folder for results, before hours are spent on something that cannot be written there.
+
+    Raises:
+        InputError: it is a file, lies below a file, or may not be written to.
+    """
+    if out is None:
+        return None
+    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
+    if there.is_symlink() and not there.exists():
+        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
+    if not there.is_dir():
+        raise InputError(f"--out {out}: {there} is a file, expected a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: no permission to write in {there}")
+    return out
+
+
+def _count(option: str, text: str) -> int:
+    if not str(text).isdecimal():
+        raise InputError(f"{option} is {text}, expected a whole number of 0 or more")
+    return int(text)
+
+
+# Arguments and options that several commands share.
+
+
+def out_option(default: str) -> object:
+    """`--out`, checked; `default` says where results go without it."""
+    return Option(
+        "--out", "-o", metavar="FOLDER", callback=check_out, help=f"Folder for the results. Default: {default}."
+    )
+
+
+Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]
+OutBesidePlan = Annotated[Path | None, out_option("the folder of the plan")]
+OutByData = Annotated[Path | None, out_option("runs/<first data file>")]
+OutByLog = Annotated[Path | None, out_option("runs/<first log>-runs")]
+OutByVessel = Annotated[Path | None, out_option("runs/<vessel>-indices")]
+OutByCard = Annotated[Path | None, out_option("runs/<card>-nominal")]
+OutInclined = Annotated[Path | None, out_option("runs/<vessel>-incline")]
+OutWhatIf = Annotated[Path | None, out_option("runs/<scenario>-whatif")]
+
+ScenarioFile = Annotated[
+    Path,
+    Argument(
+        metavar="SCENARIO.toml", help="Names vessel, dictionary and area; see expdesign explain scenario for its keys."
+    ),
+]
+OtherVessel = Annotated[
+    Path | None,
+    Option(
+        "--vessel",
+        metavar="VESSEL.toml",
+        help="In place of the vessel file that the scenario names, e.g. vessel-steps.toml or vessel-estimated.toml.",
+    ),
+]
+PlanFile = Annotated[
+    Path,
+    Argument(metavar="PLAN.json", help="A plan made before; its track.csv and commands.csv must lie beside it."),
+]
+DataFiles = Annotated[
+    tuple[Path, ...],
+    Argument(
+        metavar="DATA.csv ...", help="Measured runs, or folders of them; see expdesign explain data for their columns."
+    ),
+]
+SEED = Option("--seed", parser=parse_seed, metavar="N", help="Seed of all random numbers; same seed, same result.")
+Seed = Annotated[int, SEED]
+StatedSeed = Annotated[int, replace(SEED, stated=True)]
+MOST_TRIALS = 100_000
+"""Simulated trials of a design, or of a manoeuvre, at most."""
+MOST_VOYAGES = 1000
+"""Simulated voyages of each change in operation, at most."""
+Jobs = Annotated[int, Option("--jobs", parser=parse_jobs, metavar="N", help="Number of processes; 0 for one per core.")]
+Scheduler = Annotated[
+    str | None,
+    Option("--scheduler", metavar="ADDRESS", help="Dask scheduler to compute on instead, e.g. tcp://host:8786."),
+]
+NoCache = Annotated[
+    bool,
+    Option(
+        "--no-cache",
+        help="Neither read nor keep results of earlier commands, as with EXPDESIGN_CACHE=off. That variable may also "
+        "name the folder for them. Default: ~/.cache/expdesign, at most 256 MiB.",
+    ),
+]
+Resume = Annotated[
+    bool,
+    Option(
+        "--resume",
+        help="Go on from the state that an earlier watch left in the same folder, however it ended. Rows that it had "
+        "read are skipped: give the same file, grown or not, the next one, or the stream from before its end.",
+    ),
+]
+Fixed = Annotated[
+    tuple[str, ...],
+    Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
+]
+Velocity = Annotated[
+    str,
+    Option(
+        metavar="HOW",
+        help="Source of u, v, r: measured; difference or smoothed, both from the pose; auto: measured where there are "
+        "such columns, else difference.",
+    ),
+]
+Mean = Annotated[
+    str,
+    Option(
+        metavar="HOW",
+        help="Mean subtracted from the instruments, against constant disturbances: complete, batch or none. Use none "
+        "where an input never changes.",
+    ),
+]
+Throttle = Annotated[
+    tuple[str, ...],
+    Option(
+        "--throttle",
+        metavar="NAME ...",
+        help="Signals whose mean drives the vessel, e.g. n1. Default: all n, else tau_x.",
+    ),
+]
+Rudder = Annotated[
+    tuple[str, ...],
+    Option(
+        "--rudder",
+        metavar="NAME ...",
+        help="Signals whose mean turns it. Default: all rudder, else all a, else tau_psi, else half the difference "
+        "of the first and the last n.",
+    ),
+]

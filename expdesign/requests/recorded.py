@@ -1,0 +1,317 @@
+"""Commands on measured data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from expdesign.requests.options import (
+    Argument,
+    DataFiles,
+    Fixed,
+    Jobs,
+    Mean,
+    Option,
+    OutByData,
+    OutByLog,
+    OutByVessel,
+    Request,
+    Rudder,
+    Seed,
+    StatedSeed,
+    Throttle,
+    Velocity,
+)
+
+
+class Import(Request):
+    """Turn logs, as ships and craft record them, into runs that the other commands read.
+
+    Writes a CSV file for each run, mapping.toml with all decisions, instruments.toml with what the logs tell of
+    sensors and actuators, import.json and import.html. Every command that reads measured runs takes the folder,
+    and uses instruments.toml where the vessel file says nothing.
+
+    Example: expdesign import bridge.nmea rudder.csv --vessel ship.toml
+    """
+
+    logs: Annotated[
+        tuple[Path, ...],
+        Argument(metavar="LOG ...", help="Logs of one trial or voyage, in any formats: expdesign explain import."),
+    ]
+    vessel: Annotated[
+        Path | None,
+        Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="Numbers thrusters and rudders as this file does, and holds the ship's answers against its model.",
+        ),
+    ] = None
+    plan: Annotated[
+        Path | None,
+        Option("--plan", metavar="PLAN.json", help="Cut out the runs of this plan, by their names."),
+    ] = None
+    map_file: Annotated[
+        Path | None,
+        Option(
+            "--map",
+            metavar="MAPPING.toml",
+            help="The mapping of an earlier import, edited; see expdesign explain mapping. Default: guessed.",
+        ),
+    ] = None
+    sample_time_s: Annotated[
+        float | None,
+        Option(
+            "--sample-time",
+            metavar="S",
+            help="Time between rows that are written [s]. Default: that of the slowest main sensor, at most 1.",
+        ),
+    ] = None
+    length_m: Annotated[
+        float | None,
+        Option("--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."),
+    ] = None
+    out: OutByLog = None
+
+
+class Estimate(Request):
+    """Estimate the model's parameters from measured data, with standard errors.
+
+    Writes estimate.json, vessel-estimated.toml and estimate.html.
+
+    Example: expdesign estimate zigzag.csv circle.csv --vessel ship.toml --method ls iv --test other.csv
+    """
+
+    data: DataFiles
+    vessel: Annotated[
+        Path, Option("--vessel", metavar="VESSEL.toml", help="Model structure, start values and sensors.")
+    ]
+    methods: Annotated[
+        tuple[str, ...],
+        Option(
+            "--method",
+            metavar="M ...",
+            help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind iv iv-air iv-augmented "
+            "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air oe-current oe-air-current. See "
+            "expdesign explain methods. "
+            "Default: ls, iv and oe, and those with wind where wind is measured and the model has terms for it. The "
+            "vessel file takes the one that predicts best what it has not seen.",
+        ),
+    ] = ()
+    fixed: Fixed = ()
+    tests: Annotated[
+        tuple[Path, ...],
+        Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to estimate."),
+    ] = ()
+    velocity: Velocity = "auto"
+    mean: Mean = "complete"
+    blocks: Annotated[
+        str,
+        Option(
+            metavar="HOW",
+            help="Instruments of all runs in one block, or batch: a block for each run, weighted by its information, "
+            "with --mean batch or none.",
+        ),
+    ] = "one"
+    start: Annotated[
+        str,
+        Option(
+            metavar="HOW",
+            help="Parameters that the first instruments are simulated with: nominal, the vessel file's; ls, least "
+            "squares; auto: nominal, unless these are all zero or fail.",
+        ),
+    ] = "auto"
+    motion: Annotated[
+        str,
+        Option(
+            metavar="WHAT",
+            help="Motion that the parameters describe: continuous, as plans use it, or euler, "
+            "Euler's map at the sample time.",
+        ),
+    ] = "continuous"
+    horizon_s: Annotated[
+        float | None,
+        Option(
+            "--horizon",
+            metavar="SECONDS",
+            help="Output error restarts its simulations from the data after this time, for ships unstable on their "
+            "course and for weather that is not measured. Default: 30, or never, whichever predicts better.",
+        ),
+    ] = None
+    constant: Annotated[
+        bool, Option("--constant", help="Give every run a constant force of its own in output error.")
+    ] = False
+    steered: Annotated[
+        str,
+        Option(
+            metavar="HOW",
+            help="Samples that the data mark as steered: use; leave-out; planned, instruments from columns of planned "
+            "inputs; auto: in methods with instruments planned where there are such columns, else leave-out.",
+        ),
+    ] = "auto"
+    samples: Annotated[
+        str,
+        Option(
+            metavar="HOW",
+            help="Samples of each equation: all; equation-wise, those where what stands inside its absolute values is "
+            "clear of zero in the simulated instruments, so that noise and disturbances leave no bias.",
+        ),
+    ] = "all"
+    offset_mps: Annotated[
+        float,
+        Option(
+            "--offset",
+            metavar="MPS",
+            help="Strongest current, and wind where it is not measured, that velocities must exceed in equation-wise "
+            "samples [m/s], beside three standard deviations of the sensors.",
+        ),
+    ] = 0.0
+    prior: Annotated[
+        str,
+        Option(
+            metavar="HOW",
+            help="parameter_std: join estimates with what the vessel file knew before, as after a step trial or an "
+            "earlier estimate, of which these data must be no part; none.",
+        ),
+    ] = "none"
+    out: OutByData = None
+
+
+class Diagnose(Request):
+    """Find the causes of the simulation error and extend the model by them.
+
+    Writes diagnosis.json, diagnosis.html and vessel-extended.toml. The causes: expdesign explain causes
+
+    Example: expdesign diagnose zigzag.csv circle.csv --vessel ship.toml
+    """
+
+    data: DataFiles
+    vessel: Annotated[
+        Path,
+        Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="The simulation model in use; parameter_std is the uncertainty of its parameters.",
+        ),
+    ]
+    scenario: Annotated[
+        Path | None,
+        Option(
+            "--scenario",
+            metavar="SCENARIO.toml",
+            help="Scenario whose dictionary is searched for manoeuvres that distinguish causes. Default: standard "
+            "manoeuvres.",
+        ),
+    ] = None
+    velocity: Velocity = "auto"
+    out: OutByData = None
+    jobs: Jobs = 0
+    seed: StatedSeed = 0
+
+
+class Indices(Request):
+    """Compute turning, zig-zag and stopping indices, simulated and measured, beside their IMO limits.
+
+    Writes indices.json and indices.html.
+
+    Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
+    """
+
+    vessel: Annotated[Path, Option("--vessel", metavar="VESSEL.toml", help="Model, length and actuators of the ship.")]
+    data: Annotated[
+        tuple[Path, ...], Argument(metavar="DATA.csv ...", help="Measured zig-zags, turning circles, stops.")
+    ] = ()
+    speed_mps: Annotated[
+        float | None,
+        Option("--speed-mps", metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
+    ] = None
+    scale: Annotated[
+        float, Option("--scale", metavar="S", help="Ship length by model length, for trials of a model.")
+    ] = 1.0
+    antenna_forward_m: Annotated[
+        float,
+        Option("--antenna-forward-m", metavar="X", help="Distance of the antenna forward of amidships [m]."),
+    ] = 0.0
+    depth_m: Annotated[
+        float | None, Option("--depth-m", metavar="D", help="Depth of the water in the measured trials [m].")
+    ] = None
+    wind_mps: Annotated[
+        float | None, Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials [m/s].")
+    ] = None
+    sea_state: Annotated[
+        int | None, Option("--sea-state", metavar="N", help="Sea state in the measured trials, 0 to 9.")
+    ] = None
+    out: OutByVessel = None
+
+
+class IdentifySteps(Request):
+    """Identify a model of speed and yaw rate from steps of throttle and rudder, each held until the vessel is steady.
+
+    Writes step-model.json, step-trial.html and, with --vessel, vessel-steps.toml: that vessel with the parameters,
+    covariance and dead times that the steps leave, from which a trial is designed with prior = "parameter_std".
+
+    Example: expdesign identify-steps steps.csv --vessel fast-8m.toml
+    """
+
+    data: DataFiles
+    vessel: Annotated[
+        Path | None,
+        Option(
+            "--vessel",
+            metavar="VESSEL.toml",
+            help="What is known of the vessel before the trial: its model with parameter_std. The steps update it.",
+        ),
+    ] = None
+    throttle: Throttle = ()
+    rudder: Rudder = ()
+    tests: Annotated[
+        tuple[Path, ...],
+        Option("--test", metavar="FILE ...", help="Runs held out: simulated, but not used to identify."),
+    ] = ()
+    steps: Annotated[
+        Path | None,
+        Option(
+            "--steps",
+            metavar="FILE",
+            help="What was to be sailed, as in watch-steps, e.g. plan.json: only these steps are asked to be repeated.",
+        ),
+    ] = None
+    velocity: Velocity = "auto"
+    out: OutByData = None
+    seed: Seed = 0
+
+
+class Mine(Request):
+    """Rank recorded runs by their information, and choose the few to estimate from.
+
+    Writes mining.json and chosen.csv, which `estimate` reads. With --labels: dictionary.json, durations.json, and
+    subsets.json with the simulation error of optimised and of random subsets on the pieces that they leave.
+
+    Example: expdesign mine voyage.csv --vessel ship.toml --piece 120 --keep 10
+    Example: expdesign mine trials --vessel ship.toml --labels file --piece 100 --keep 6
+    """
+
+    data: DataFiles
+    vessel: Annotated[
+        Path, Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
+    ]
+    keep: Annotated[int, Option("--keep", metavar="K", help="How many batches, or pieces, to choose.")]
+    piece_s: Annotated[
+        float | None,
+        Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
+    ] = None
+    fixed: Fixed = ()
+    mean: Mean = "complete"
+    velocity: Velocity = "auto"
+    labels: Annotated[
+        str | None,
+        Option(
+            "--labels",
+            metavar="WHERE",
+            help="Make a dictionary of labelled manoeuvres, share out K pieces of --piece seconds among them, and "
+            "compare with random pieces. Labels are in the column manoeuvre (column), or before the first underscore "
+            "of a file's name (file).",
+        ),
+    ] = None
+    draws: Annotated[int, Option("--draws", metavar="N", help="With --labels: subsets drawn of each design.")] = 500
+    out: OutByData = None
+    seed: Seed = 0

@@ -1,0 +1,192 @@
+"""`expdesign diagnose`: causes of the simulation error on measured data."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from expdesign import __version__, requests
+from expdesign.diagnosis import Diagnosis, Proposal
+from expdesign.diagnosis import diagnose as diagnose_record
+from expdesign.dictionary import build_dictionary
+from expdesign.errors import FileError, InputError, NotInformative
+from expdesign.estimation.regression import model_for
+from expdesign.export import Content, write_files
+from expdesign.export.diagnosis_page import accuracy_rows, diagnosis_html, diagnosis_notes
+from expdesign.export.diagnosis_results import (
+    RollVerdict,
+    accuracy_entry,
+    diagnosis_json,
+    diagnosis_tables,
+    extended_vessel,
+    finding_entry,
+    roll_sentences,
+)
+from expdesign.export.document import Table
+from expdesign.kinematics import in_stated_time
+from expdesign.progress import Estimated, Progress, silent
+from expdesign.requests import command_text
+from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
+from expdesign.scenario import load_scenario
+from expdesign.signals import Commands, Record
+from expdesign.values import Array
+from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
+from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.measured import doubted, equipped, measured
+from expdesign.workflows.steps.workers import workers
+
+SINCE_CHANGE = "since-change.csv"
+"""File that a watch leaves for a diagnosis."""
+MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
+"""Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
+
+
+def diagnose(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    scenario: Path | None = None,
+    velocity: str = "auto",
+    jobs: int = 1,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """Causes of the simulation error and the gain from adding them to the model, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files.
+        out: folder, or None.
+        vessel: the model in use.
+        scenario: whose dictionary is searched for manoeuvres that distinguish causes; standard ones by default.
+        velocity: where velocities come from, as in `estimate`.
+        jobs: processes; 0 for one per core. The results do not depend on it, and few data take one.
+        seed: of all chance.
+        progress: of the command.
+    """
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files")
+    progress("reading the data", 0.0)
+    ship, told = equipped(vessel, data)
+    ship, named = with_alarms(ship, data)
+    record = in_stated_time(measured(data, ship, velocity=velocity, told=told), ship.sensors)
+    proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
+    samples = sum(len(batch.inputs) for batch in record.batches)
+    drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
+    reported = Estimated(progress, after=drawing)
+    with workers(jobs, load=None), doubted(record):
+        found = diagnose_record(ship, record, seed=seed, proposals=proposals, suspected=named, progress=reported)
+    reported.after = 0.0
+    roll = _roll(ship, record)
+    command = command_text(
+        requests.Diagnose(data=tuple(data), vessel=vessel, scenario=scenario, velocity=velocity, seed=seed)
+    )
+    files: dict[str, Content] = {
+        "diagnosis.json": diagnosis_json(found, roll),
+        "diagnosis.html": partial(
+            diagnosis_html, found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
+        ),
+        "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
+    }
+    written = write_files(out or Path("runs") / data[0].stem, files)
+    progress("done", 1.0)
+    summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
+    return Outcome(files=written, document=document_of(summary, _tables(found), diagnosis_notes(found)))
+
+
+def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:
+    """The ship with parameters that a watch named as unsure as its alarm says; for files that it left.
+
+    Their standard deviations, of which the fit starts, are the size of the change together with its standard error.
+    Returns also the effects that were named, each with who named it, in words.
+    """
+    names, std, named = ship.model.names, ship.model.parameter_std.copy(), dict[str, str]()
+    for path in data:
+        told = path.with_name("monitor.json")
+        if path.name != SINCE_CHANGE or not told.is_file():
+            continue
+        try:
+            alarm = json.loads(told.read_text(encoding="utf-8"))["alarms"][-1]
+            effect, size, words = str(alarm["effect"]), math.hypot(alarm["value"], alarm["std"]), alarm["in_words"]
+        except (ValueError, KeyError, IndexError, TypeError):
+            raise FileError(told, "alarms", f"is not as expdesign monitor leaves it beside {path.name}") from None
+        named[effect] = f"{path.name}: expdesign monitor named {words}"
+        if (name := effect.removeprefix("theta:")) in names and size > std[names.index(name)] > 0.0:
+            std[names.index(name)] = size
+            named[effect] += f"; the standard deviation of {name} is taken as {size:.3g}"
+    return replace(ship, model=replace(ship.model, parameter_std=std)), named
+
+
+def _roll(ship: Vessel, record: Record) -> RollVerdict | None:
+    """Whether the ship rolls as [roll] says; None without it."""
+    if ship.pendulum is None:
+        return None
+    missing = dict.fromkeys(name for batch in record.batches for name in missing_columns(batch))
+    if missing:
+        return RollVerdict(reason=f"the data do not measure {' and '.join(missing)}")
+    try:
+        runs = with_one_source([roll_run(batch, ship=ship) for batch in record.batches])
+        return RollVerdict(judgement=judge_roll(ship.pendulum, runs, beam_m=ship.beam_m))
+    except (InputError, NotInformative) as error:
+        return RollVerdict(reason=str(error))
+
+
+def _proposals(scenario: Path, model: VesselModel) -> tuple[Proposal, ...]:
+    """The scenario's dictionary as commands of a model's inputs."""
+    case = load_scenario(scenario)
+    return tuple(
+        Proposal(
+            name=primitive.name,
+            inputs=as_inputs(primitive.commands, case.vessel, model),
+            velocity=primitive.entry_velocity,
+            sample_time_s=primitive.commands.sample_time_s,
+        )
+        for primitive in build_dictionary(case.vessel, case.dictionary)
+    )
+
+
+def as_inputs(commands: Commands, vessel: Vessel, model: VesselModel) -> Array:
+    """(k, m) commands of a vessel as inputs of a model, which may be driven by the force that they give.
+
+    Raises:
+        InputError: they are not what drives the model.
+    """
+    wanted = tuple(name for name in model.inputs if name != SHOAL)
+    table = dict(zip(commands.names, commands.values.T, strict=True))
+    if wanted == FORCE_SIGNALS and not set(wanted) & set(table) and not direct_terms(vessel.model):
+        forces = generalised_force(vessel.model.actuators, table, NUMPY)
+        table = dict(zip(FORCE_SIGNALS, np.broadcast_arrays(*forces, commands.values[:, 0])[:3], strict=True))
+    if not set(wanted) <= set(table):
+        raise InputError(
+            f"the scenario's vessel {vessel.name!r} takes {', '.join(commands.names)}, the inputs in the data are "
+            f"{', '.join(wanted)}; expected a scenario of the ship in the data"
+        )
+    return np.column_stack([table[name] for name in wanted])
+
+
+def _summary(found: Diagnosis) -> dict[str, object]:
+    return {
+        "verdict": found.verdict,
+        "baseline": accuracy_entry(found.before),
+        "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
+    }
+
+
+def _tables(found: Diagnosis) -> tuple[Table, ...]:
+    fits = ("output", "fit, %", "rms error", "mean error", "fit after", "rms error after", "mean error after")
+    accuracy = Table(
+        title="Simulation of the vessel file against the data, and after what was found",
+        header=fits,
+        rows=tuple(accuracy_rows(found)),
+    )
+    if not found.findings:
+        return (accuracy,)
+    header, rows = diagnosis_tables(found)
+    return Table(title="Causes of the simulation error", header=header, rows=tuple(rows)), accuracy

@@ -1,0 +1,156 @@
+"""`expdesign indices`: manoeuvring indices of a vessel, from its model and from measured runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from expdesign import __version__, requests
+from expdesign.errors import InputError
+from expdesign.export import Content, write_files
+from expdesign.export.document import Table
+from expdesign.export.indices_form import Held, IndicesContent, indices_json, verdict_rows, zigzag_rows
+from expdesign.export.indices_page import indices_html
+from expdesign.indices import NotStandard, StandardResults, measured_trial, standard_results
+from expdesign.indices.measured import Found
+from expdesign.progress import Progress, silent
+from expdesign.reduction import at_reference_point
+from expdesign.requests import command_text
+from expdesign.vessel import Vessel
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.measured import data_files, equipped, measured
+
+HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
+
+
+def indices(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    speed_mps: float | None = None,
+    scale: float = 1.0,
+    antenna_forward_m: float = 0.0,
+    depth_m: float | None = None,
+    wind_mps: float | None = None,
+    sea_state: int | None = None,
+    progress: Progress = silent,
+) -> Outcome:
+    """Turning, zig-zag and stopping indices with the limits of MSC.137(76), into `out` or runs/<vessel>-indices.
+
+    Depth of the water, mean true wind and sea state are those of the measured trials, for the form.
+    """
+    held = Held(depth_m=depth_m, wind_mps=wind_mps, sea_state=sea_state)
+    if not scale >= 1:
+        raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
+    progress("reading the vessel", 0.0)
+    ship, told = equipped(vessel, data)
+    _check_place(ship, antenna_forward_m)
+    seen, notes = _measured(data, ship, antenna_forward_m, progress)
+    progress("simulating the model's standard trials", 0.6)
+    found, why_not = _simulated(ship, speed_mps, needed=not data)
+    content = IndicesContent(
+        vessel=ship,
+        scale=scale,
+        simulated=found,
+        simulated_why_not=why_not,
+        measured=seen,
+        notes=(*told, *notes),
+        command=command_text(
+            requests.Indices(
+                data=tuple(data),
+                vessel=vessel,
+                speed_mps=speed_mps,
+                scale=scale,
+                antenna_forward_m=antenna_forward_m,
+                depth_m=depth_m,
+                wind_mps=wind_mps,
+                sea_state=sea_state,
+            )
+        ),
+        version=__version__,
+        held=held,
+    )
+    files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
+    written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
+    progress("done", 1.0)
+    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes_in_words))
+
+
+def _check_place(ship: Vessel, forward_m: float) -> None:
+    stated = [place.forward_m for place in (ship.sensors.position, ship.sensors.velocity) if place.forward_m]
+    if forward_m and stated:
+        raise InputError(
+            f"--antenna-forward-m is {forward_m:g}, expected none where the vessel file states a sensor's place, "
+            f"{stated[0]:g} m"
+        )
+
+
+def _measured(
+    data: Sequence[Path], ship: Vessel, forward_m: float, progress: Progress
+) -> tuple[tuple[Found, ...], tuple[str, ...]]:
+    """Each file by itself: trials need not share a sample time."""
+    seen: list[Found] = []
+    doubts: list[str] = []
+    notes: list[str] = []
+    files = data_files(data)
+    for number, path in enumerate(files):
+        progress(f"reading {path.name}", 0.6 * number / len(files))
+        record = at_reference_point(measured([path], ship), ship.sensors)
+        seen += [measured_trial(ship, batch, reference_forward_m=forward_m) for batch in record.batches]
+        doubts += record.doubts
+        notes += (note for note in record.notes if note not in record.doubts)
+    return tuple(seen), (*doubts, *notes)
+
+
+def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[StandardResults | None, str]:
+    """The model's trials; where measured ones are at hand, why there are none."""
+    try:
+        return standard_results(ship, speed_mps=speed_mps), ""
+    except InputError as error:
+        if needed:
+            raise
+        return None, str(error)
+
+
+def _summary(content: IndicesContent) -> dict[str, object]:
+    refused = sum(isinstance(item, NotStandard) for item in content.measured)
+    found = content.simulated
+    return {
+        "vessel": content.vessel.name,
+        "measured_runs": len(content.measured),
+        **({"measured_runs_without_result": refused, **_counts(content, "measured")} if content.measured else {}),
+        **({"simulated_at_mps": found.speed_mps, **_counts(content, "simulated")} if found else {}),
+        "results": {
+            f"{source} {v.run}: {v.criterion.key}": {
+                "value": v.value, "tolerance": v.tolerance, "limit": v.criterion.limit, "met": v.met
+            }
+            for source, v in content.verdicts
+        },
+    }  # fmt: skip
+
+
+def _counts(content: IndicesContent, source: str) -> dict[str, object]:
+    """How many results of a source stand how to their criteria."""
+    counted = content.counted(source).items()
+    return {f"{source}_criteria_{word.replace(' ', '_')}": number for word, number in counted}
+
+
+def _tables(content: IndicesContent) -> tuple[Table, ...]:
+    criteria = f"MSC.137(76): {content.vessel.name}"
+    if any(verdict.tolerance for _, verdict in content.verdicts):
+        criteria += " (± is one sample of the record at the order)"
+    zigzags = (
+        "From",
+        "Run",
+        "Approach",
+        "Heading / helm, deg",
+        "Heading at reversals, deg",
+        "Overshoot from there, deg",
+    )
+    tables = (
+        (criteria, HEADER, verdict_rows(content)),
+        ("Zig-zags", zigzags, zigzag_rows(content)),
+    )
+    return tuple(Table(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)

@@ -1,0 +1,276 @@
+"""`expdesign mine`: the most informative recorded batches, or a design from labelled ones."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from expdesign import __version__, requests
+from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
+from expdesign.errors import InputError, NotInformative
+from expdesign.export import write_files
+from expdesign.export.document import Table
+from expdesign.export.files import record_csv
+from expdesign.information import estimated_parameters
+from expdesign.information.recorded import BatchInformation, recorded_information
+from expdesign.progress import Progress, silent, within
+from expdesign.reduction import at_reference_point
+from expdesign.requests import command_text
+from expdesign.signals import Batch, Record
+from expdesign.vessel import Vessel, VesselModel
+from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.steps.labelled import (
+    Asked,
+    labelled_design,
+    labelled_files,
+    labelled_summary,
+    labelled_tables,
+    piece_of,
+)
+from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
+
+
+def mine(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    keep: int,
+    piece_s: float | None = None,
+    fixed: Sequence[str] = (),
+    mean: str = "complete",
+    velocity: str = "auto",
+    labels: str | None = None,
+    draws: int = 500,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """The `keep` batches with the most information together, into `out` or runs/<first data file>.
+
+    With labels, the data are cut into pieces of one label each; time is shared out among the labels, and draws of that
+    design are compared with random subsets of as many pieces.
+
+    Args:
+        data: CSV files, or folders of them; a gap starts a new batch.
+        out: folder, or None.
+        vessel: nominal model, which simulates the instruments.
+        keep: how many batches to choose.
+        piece_s: cut batches into pieces of about this length [s].
+        fixed: parameters held at the vessel's values.
+        mean: mean subtraction of the estimator that will follow.
+        velocity: source of the velocities, as in `estimate`.
+        labels: where labels are, one of `records.LABEL_SOURCES`; None for a choice of batches.
+        draws: of each design that is compared, with labels.
+        seed: of the draws.
+        progress: of the command.
+
+    Raises:
+        InputError: arguments or files that are wrong.
+        NoAnswer: the data do not inform about every parameter, or the nominal model is unstable.
+    """
+    if mean not in MEAN_SUBTRACTIONS:
+        raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
+    progress("reading the data", 0.02)
+    (ship, told), paths = equipped(vessel, data), data_files(data)
+    command = command_text(requests.Mine(
+        data=tuple(data), vessel=vessel, keep=keep, piece_s=piece_s, fixed=tuple(fixed), mean=mean, velocity=velocity,
+        labels=labels, draws=draws, seed=seed,
+    ))  # fmt: skip
+    folder = out or Path("runs") / data[0].stem
+    if labels is not None:
+        asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)
+        record = reduced_data(paths, ship, velocity=velocity, told=told)
+        with doubted(record):
+            return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
+    record = in_pieces(measured(paths, ship, velocity=velocity, told=told), piece_s)
+    with doubted(record):
+        return _mined(record, folder, ship, fixed, keep, mean, velocity, command, progress)
+
+
+def _mined(
+    record: Record,
+    folder: Path,
+    ship: Vessel,
+    fixed: Sequence[str],
+    keep: int,
+    mean: str,
+    velocity: str,
+    command: str,
+    progress: Progress,
+) -> Outcome:
+    """A choice of batches, written."""
+    windy = all(batch.wind is not None for batch in record.batches)
+    names, unseen = _parameters(ship.model, fixed, windy=windy)
+    progress("simulating the runs", 0.2)
+    seen = at_reference_point(record, ship.sensors, smoothed=velocity == "smoothed")
+    batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
+    _need_every_parameter(batches, names)
+    progress("choosing among them", 0.6)
+    subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
+    chosen = [batch for batch in record.batches if batch.name in subset.chosen]
+    content = {
+        **_content(subset, batches, names, unseen, mean=mean, command=command),
+        "notes": list(record.notes),
+    }
+    files = {
+        "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "chosen.csv": record_csv(chosen),
+    }
+    written = write_files(folder, files)
+    progress("done", 1.0)
+    return Outcome(files=written, document=document_of(_summary(content), (_table(subset, batches),), record.notes))
+
+
+SYMMETRIC = "symmetric part of the information"
+MAGNITUDE = "magnitude of the determinant: with this nominal model the symmetric part is not definite"
+MAY_FALL = "that of more batches may be less, and that of some more than 100 %: it is the magnitude of a determinant"
+
+
+def _stated(piece_s: float | None) -> float:
+    if piece_s is None:
+        raise InputError("--labels needs --piece, the length of a piece in seconds")
+    return piece_s
+
+
+def _designed(
+    record: Record,
+    paths: Sequence[Path],
+    folder: Path,
+    model: VesselModel,
+    fixed: Sequence[str],
+    asked: Asked,
+    command: str,
+    progress: Progress,
+) -> Outcome:
+    """A design from labelled data, written."""
+    windy = all(batch.wind is not None for batch in record.batches)
+    names, _ = _parameters(model, fixed, windy=windy)
+    found = labelled_design(
+        record,
+        paths,
+        model,
+        parameters=names,
+        predictor="basic-wind" if windy else "basic",
+        asked=asked,
+        progress=progress,
+    )
+    written = write_files(folder, labelled_files(found, names, model.outputs, command))
+    progress("done", 1.0)
+    tables = labelled_tables(found, model.outputs)
+    return Outcome(files=written, document=document_of(labelled_summary(found), tables, record.notes))
+
+
+def in_pieces(record: Record, piece_s: float | None) -> Record:
+    """Batches cut into equal pieces of about `piece_s` [s]; None leaves them whole.
+
+    Raises:
+        InputError: a piece of fewer than three samples.
+    """
+    if piece_s is None:
+        return record
+    step = record.batches[0].sample_time_s
+    if not piece_s >= 3 * step:
+        raise InputError(f"--piece is {piece_s:g}, expected three samples of {step:g} s or more")
+    return replace(record, batches=tuple(piece for batch in record.batches for piece in _pieces(batch, piece_s)))
+
+
+def _pieces(batch: Batch, piece_s: float) -> list[Batch]:
+    count = max(1, round(len(batch) * batch.sample_time_s / piece_s))
+    if count == 1:
+        return [batch]
+    edges = np.linspace(0, len(batch), count + 1).round().astype(int)
+    spans = [slice(int(first), int(last)) for first, last in pairwise(edges)]
+    return [piece_of(batch, span) for span in spans]
+
+
+def _parameters(model: VesselModel, fixed: Sequence[str], *, windy: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters to estimate, and those that data without measured wind cannot determine."""
+    wanted = estimated_parameters(model, fixed)
+    of_air = {
+        term.name
+        for term, expression in zip(model.terms, model.expressions, strict=True)
+        if {"u_q", "v_q"} & set(expression.signals)
+    }
+    unseen = () if windy else tuple(name for name in wanted if name in of_air)
+    names = tuple(name for name in wanted if name not in unseen)
+    if not names:
+        raise InputError("every parameter is fixed or needs measured wind, nothing is left to estimate")
+    return names, unseen
+
+
+def _need_every_parameter(batches: Sequence[BatchInformation], names: Sequence[str]) -> None:
+    """Refuse parameters whose regressor or instrument is always zero."""
+    size = np.max([np.abs(np.diag(batch.X)) for batch in batches], axis=0)
+    blind = tuple(name for name, value in zip(names, size, strict=True) if not value > 0)
+    if blind:
+        raise NotInformative(
+            f"no batch has information about {', '.join(blind)}; hold known parameters with --fixed", parameters=blind
+        )
+
+
+def _content(
+    subset: Subset,
+    batches: Sequence[BatchInformation],
+    names: Sequence[str],
+    unseen: Sequence[str],
+    *,
+    mean: str,
+    command: str,
+) -> dict[str, object]:
+    """`mining.json`."""
+    of = {batch.name: batch for batch in batches}
+    return {
+        "parameters": list(names),
+        "not_told_without_wind": list(unseen),
+        "mean_subtraction": mean,
+        "keep": len(subset.chosen),
+        "chosen": list(subset.chosen),
+        "efficiency": subset.efficiency,
+        "efficiency_bound": subset.bound if np.isfinite(subset.bound) else None,
+        "all_subsets_tried": subset.exact,
+        "counts": SYMMETRIC if subset.symmetric else MAGNITUDE,
+        "batches": [
+            {
+                "rank": rank,
+                "name": name,
+                "duration_s": of[name].seconds,
+                "samples": of[name].samples,
+                "chosen": name in subset.chosen,
+                "efficiency_up_to_here": float(efficiency),
+            }
+            for rank, (name, efficiency) in enumerate(zip(subset.names, subset.first, strict=True), start=1)
+        ],
+        "command": command,
+        "version": __version__,
+    }
+
+
+def _summary(content: Mapping[str, object]) -> dict[str, object]:
+    shown = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
+    # without a symmetric part that is definite, more data may hold less
+    note = {} if content["counts"] == SYMMETRIC else {"note_on_information": MAY_FALL}
+    return {**{name: content[name] for name in shown}, **note}
+
+
+def _table(subset: Subset, batches: Sequence[BatchInformation]) -> Table:
+    of = {batch.name: batch for batch in batches}
+    rows = zip(subset.names, subset.first, strict=True)
+    return Table(
+        title="Batches in the order in which each adds most, with the cumulative information",
+        header=("rank", "batch", "seconds", "information", "chosen"),
+        rows=tuple(
+            (
+                str(rank),
+                name,
+                f"{of[name].seconds:.1f}",
+                f"{100 * efficiency:.1f} %" if efficiency > 0 else "not yet enough",
+                "yes" if name in subset.chosen else "",
+            )
+            for rank, (name, efficiency) in enumerate(rows, start=1)
+        ),
+    )

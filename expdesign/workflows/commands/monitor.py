@@ -1,0 +1,330 @@
+"""`expdesign monitor`: whether a ship in operation still is the ship of its model."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from expdesign import __version__, requests
+from expdesign.errors import FileError, InputError, NotInformative
+from expdesign.export import Content, write_files
+from expdesign.export.monitor_page import Moment, MonitorContent, budget_entries, monitor_document, monitor_json
+from expdesign.export.pages import document_html
+from expdesign.export.words import counted
+from expdesign.monitoring import (
+    TUNING,
+    RollWatch,
+    restored_alarm,
+    restored_calibration,
+    restored_changes,
+    restored_noise,
+    restored_roll,
+    restored_state,
+    saved,
+)
+from expdesign.processes import ahead
+from expdesign.progress import Progress, silent
+from expdesign.records import STREAM, Taken, pieces
+from expdesign.requests import command_text
+from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.steps.measured import data_files, equipped
+from expdesign.workflows.steps.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
+from expdesign.workflows.steps.watching import (
+    HOUR,
+    Learning,
+    Reading,
+    Ready,
+    Watch,
+    Watching,
+    after_reading,
+    calibrated,
+    known_of,
+    rules_of,
+    with_piece,
+    with_reference,
+)
+from expdesign.workflows.steps.workers import workers
+
+
+def restored_watch(table: Mapping[str, Any]) -> Watch:
+    """A watch, read from what `saved` made of it.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: it is none.
+    """
+    return Watch(
+        changes=restored_changes(table["changes"]),
+        noise=restored_noise(table["noise"]),
+        reading=_reading(table["reading"]),
+        phase=_phase(table["phase"]),
+        roll=restored_roll(table["roll"]),
+        late=tuple(map(_late, table["late"])),
+    )
+
+
+def _late(table: Mapping[str, Any]) -> Late:
+    noise, time_s = restored_noise(table["noise"]), np.array(table["time_s"], float)
+    return Late(text=table["text"], time_s=time_s, offset_s=float(table["offset_s"]), noise=noise)
+
+
+def _phase(table: Mapping[str, Any]) -> Learning | Ready | Watching:
+    if "state" in table:
+        return _watching(table)
+    if "calibration" in table:
+        return Ready(calibration=restored_calibration(table["calibration"]), reference_s=table["reference_s"])
+    return Learning()
+
+
+def _reading(table: Mapping[str, Any]) -> Reading:
+    return Reading(
+        **{
+            **table,
+            "now_s": float(table["now_s"]),
+            "notes": tuple(table["notes"]),
+            "pending": tuple(table["pending"]),
+            "taken": tuple(Taken(**{**taken, "last_s": float(taken["last_s"])}) for taken in table["taken"]),
+        }
+    )
+
+
+def _watching(table: Mapping[str, Any]) -> Watching:
+    return Watching(
+        calibration=restored_calibration(table["calibration"]),
+        reference_s=table["reference_s"],
+        state=restored_state(table["state"]),
+        alarms=tuple(map(restored_alarm, table["alarms"])),
+        moments=tuple(
+            Moment(**{**m, "value": np.array(m["value"], float), "std": np.array(m["std"], float)})
+            for m in table["moments"]
+        ),
+        changed=tuple(table["changed"]),
+    )
+
+
+STATE = "monitor-state.json"
+MOST_ROWS = 20_000
+"""Largest number of rows in a piece of a file."""
+WRITTEN_EVERY_S = 20.0
+"""Time between writing files, from which a watch that is ended by force goes on [s]."""
+
+
+def monitor(
+    data: Sequence[Path],
+    out: Path | None,
+    *,
+    vessel: Path,
+    reference: Sequence[Path] = (),
+    learn_h: float = 24.0,
+    false_alarm_days: float = 30.0,
+    size: float = TUNING.relative_size,
+    every_s: float = 3600.0,
+    port_h: float = 1.0,
+    velocity: str = "auto",
+    model: str = VESSEL,
+    resume: bool = False,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> Outcome:
+    """Watch a ship in operation, into `out` or runs/<first data file>.
+
+    Args:
+        data: CSV files in the order of time, or `STREAM` for the standard input.
+        out: folder, or None.
+        vessel: the model.
+        reference: files of a period in which the ship was as known; without them the first `learn_h` hours of the data.
+        learn_h: see there [h].
+        false_alarm_days: average time between false alarms [d].
+        size: relative change of parameters, thrust and inertia that matters.
+        every_s: of a stream, time between looks at it [s].
+        port_h: time without way and propulsion, or without data, after which the ship may carry another load [h];
+            infinite for a ship that never does.
+        velocity: where velocities come from, as in `estimate`.
+        model: vessel, the vessel file's, or yaw-full or yaw-simplified, learnt from the reference.
+        resume: go on from the state in `out`.
+        jobs: processes; 0 for one per core. The results do not depend on it.
+        progress: of the command.
+    """
+    numbers = {"--learn-h": learn_h, "--false-alarm-days": false_alarm_days, "--every-s": every_s}
+    _check(data, reference, numbers, size, resume=resume)
+    check_model(model)
+    if not port_h > 0:
+        raise InputError(f"--port-h is {port_h:g}, expected more than 0; inf for a ship whose load never changes")
+    folder = out or Path("runs") / (Path(data[0]).stem if data[0] != STREAM else "monitor")
+    data, reference = data_files(data), data_files(reference)
+    ship, told = equipped(vessel, [source for source in (*reference, *data) if source != STREAM])
+    asked = Asked(
+        vessel=ship, told=told, size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
+        port_s=HOUR * port_h, velocity=velocity, model=model,
+    )  # fmt: skip
+    command = command_text(requests.Monitor(
+        data=tuple(data), vessel=vessel, reference=tuple(reference), learn_h=learn_h,
+        false_alarm_days=false_alarm_days, size=size, every_s=every_s, model=model, port_h=port_h, resume=resume,
+        velocity=velocity, out=out,
+    ))  # fmt: skip
+    now = _resumed(folder / STATE, asked) if resume else _with_reference(Watch(), reference, asked, progress)
+    work = _Work(asked=asked, folder=folder, command=command)
+    for number, source in enumerate(data):
+        rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
+        with workers(jobs, load=None):
+            now = _through(now, source, rows, work, more_follow=number + 1 == len(data), progress=progress)
+    if isinstance(now.phase, Learning):
+        raise NotInformative(
+            f"the data end before the reference does, which takes {learn_h:g} h: give files of a reference "
+            "(--reference) or a shorter one (--learn-h)"
+        )
+    if isinstance(now.phase, Ready):
+        raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
+    content = _content(now.phase, now, asked, command)
+    written = write_files(folder, _files(content, now, asked))
+    progress("done", 1.0)
+    return Outcome(files=written, document=monitor_document(content))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Work:
+    """What is asked for, and where results go."""
+
+    asked: Asked
+    folder: Path
+    command: str
+
+
+def _through(now: Watch, source: Path, rows: int, work: _Work, *, more_follow: bool, progress: Progress) -> Watch:
+    """Watch a whole source; the state is saved now and then, and at once when there are more alarms."""
+    asked, due, done = work.asked, (0, time.monotonic() + WRITTEN_EVERY_S * (source != STREAM)), 0
+    size_bytes = source.stat().st_size if source != STREAM and source.is_file() else 0
+    cut = pieces(
+        source, inputs=asked.vessel.model.inputs, stretch_s=asked.stretch_s, most_rows=rows, unread=asked.unread,
+        before=now.reading.pending, more_follow=more_follow, taken=now.reading.taken,
+    )  # fmt: skip
+    tasks = ((piece, (piece.text, piece.time_s, known_of(now))) for piece in cut)
+    for piece, read in ahead(prepared, (asked,), tasks):
+        now = with_piece(now, piece, read, asked)
+        done += len(piece.text)
+        alarms = sum(not one.settled for one in now.phase.alarms) if isinstance(now.phase, Watching) else 0
+        progress(
+            f"watching {source.name}, {counted(alarms, 'alarm')}", min(done / size_bytes if size_bytes else 0.0, 0.99)
+        )
+        if not piece.again and (alarms, time.monotonic()) >= due:
+            _save(now, source, work)
+            due = (alarms, time.monotonic() + WRITTEN_EVERY_S)
+    return now
+
+
+def _save(now: Watch, source: Path, work: _Work) -> None:
+    """Results so far; of a stream that is learnt from, the rows, as they cannot be read again."""
+    if isinstance(now.phase, Watching):
+        write_files(work.folder, _files(_content(now.phase, now, work.asked, work.command), now, work.asked))
+    elif isinstance(now.phase, Ready) or source == STREAM:
+        write_files(work.folder, {STATE: _state(now, work.asked)})
+
+
+def _check(
+    data: Sequence[Path], reference: Sequence[Path], numbers: dict[str, float], size: float, *, resume: bool
+) -> None:
+    if not data:
+        raise InputError("no data files are given, expected one or more CSV files, or - for the standard input")
+    if STREAM in data and len(data) > 1:
+        raise InputError("- stands beside other data files, expected it alone")
+    if resume and reference:
+        raise InputError("--resume and --reference are given, expected one: a state to go on from has its reference")
+    for name, value in numbers.items():
+        if not 0 < value < np.inf:
+            raise InputError(f"{name} is {value:g}, expected more than 0")
+    if not 0 < size < 1:
+        raise InputError(f"--size is {size:g}, expected a share between 0 and 1")
+
+
+def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progress: Progress) -> Watch:
+    """Calibrated on files of a reference, if there are some; the times of the data begin anew."""
+    for source in reference:
+        for piece in pieces(
+            source,
+            inputs=asked.vessel.model.inputs,
+            stretch_s=asked.stretch_s,
+            most_rows=MOST_ROWS,
+            unread=asked.unread,
+        ):
+            progress(f"reading the reference, {source.name}", 0.0)
+            read = prepared(asked, piece.text, piece.time_s, known_of(now))
+            now = after_reading(now, piece, read)
+            now = with_reference(now, piece, read, asked) if isinstance(read, Read) else now
+    if not reference:
+        return now
+    reading = replace(now.reading, now_s=-np.inf, offset_s=0.0, pending=(), taken=())
+    return replace(calibrated(now), reading=reading)
+
+
+def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> MonitorContent:
+    return MonitorContent(
+        vessel=asked.vessel.name,
+        changes=now.changes,
+        calibration=phase.calibration,
+        reference_s=phase.reference_s,
+        state=phase.state,
+        limit=rules_of(phase.calibration, asked).limit,
+        false_alarm_days=asked.false_alarm_days,
+        alarms=phase.alarms,
+        moments=phase.moments,
+        left_out_rows=now.reading.left_out_rows,
+        unread_rows=now.reading.unread_rows,
+        notes=(*asked.told, *now.reading.notes),
+        command=command,
+        version=__version__,
+        roll=None if asked.vessel.pendulum is None else now.roll,
+    )
+
+
+def _files(content: MonitorContent, now: Watch, asked: Asked) -> dict[str, Content]:
+    assert isinstance(now.phase, Watching)
+    files: dict[str, Content] = {
+        "monitor.html": partial(document_html, monitor_document(content)),
+        "monitor.json": monitor_json(content, budget_entries(content)),
+        STATE: _state(now, asked),
+    }
+    if now.phase.changed:
+        files["since-change.csv"] = "".join(now.phase.changed)
+    return files
+
+
+def _kept(asked: Asked) -> dict[str, float]:
+    """Options that a watch keeps: its statistics were compared with the threshold that follows from them."""
+    return {"--false-alarm-days": asked.false_alarm_days, "--size": asked.size}
+
+
+def _state(now: Watch, asked: Asked) -> str:
+    """The watch as a file; one that learns goes on from its rows, as if they had not been read."""
+    if isinstance(now.phase, Learning):
+        lines = (*now.phase.lines, *now.reading.pending[bool(now.phase.lines) :])
+        reading = replace(now.reading, pending=lines, now_s=-np.inf, offset_s=0.0)
+        now = replace(now, phase=Learning(), reading=reading, roll=RollWatch())
+    return json.dumps({**saved(now), "version": __version__, "options": _kept(asked)})
+
+
+def _resumed(path: Path, asked: Asked) -> Watch:
+    """A watch from its file.
+
+    Raises:
+        FileError: there is none, or it is of another kind or version.
+        InputError: it was begun with other options.
+    """
+    try:
+        table: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if table["version"] != __version__:
+            raise ValueError("of another version")
+        now, begun = restored_watch(table), {name: float(table["options"][name]) for name in _kept(asked)}
+    except FileNotFoundError:
+        raise FileError(path, "", "does not exist, expected the state that an earlier watch left") from None
+    except (KeyError, TypeError, ValueError, AttributeError):
+        raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
+    for name, value in _kept(asked).items():
+        if begun[name] != value:
+            raise InputError(f"{name} is {value:g}, but the watch was begun with {begun[name]:g}; expected the same")
+    return now

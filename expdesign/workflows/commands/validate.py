@@ -1,0 +1,148 @@
+"""`expdesign validate`: designs tested in simulated trials with a true ship."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import joblib
+import numpy as np
+
+from expdesign import __version__, requests
+from expdesign.errors import InputError
+from expdesign.estimation.methods import method_named, steady_current_method
+from expdesign.export import vessel_toml, write_files
+from expdesign.export.pages import document_html
+from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
+from expdesign.information import estimated_parameters
+from expdesign.progress import Progress, silent, within
+from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
+from expdesign.requests import command_text
+from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.values import Array
+from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.steps.design_problem import designed
+from expdesign.workflows.steps.scored import ready
+from expdesign.workflows.steps.workers import workers
+
+OPTIMISED, EQUAL = "optimised", "equal shares"
+INTEGRATORS = ("rk4", "euler")
+
+
+def validate_design(
+    scenario: Path,
+    out: Path | None,
+    *,
+    truth: Path | None = None,
+    trials: int = 100,
+    method: str | None = None,
+    integrator: str = "rk4",
+    jobs: int = 0,
+    scheduler: str | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """The optimised design beside equal shares and random runs, in trials of a true ship or of the scenario's own.
+
+    Without a method it is that of the designs' accuracies: iv, or with a steady current where the forecast leaves one
+    unknown. An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all
+    are done.
+    """
+    if integrator not in INTEGRATORS:
+        raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
+    case = load_scenario(scenario)
+    method = _method(case, method)
+    method_named(method)  # refused before the dictionary is scored
+    ship = case.vessel if truth is None else load_vessel(truth)
+    if case.vessel.model.roll is not None:
+        raise InputError(
+            f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate; "
+            "expected it in the vessel of --truth only"
+        )
+    information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
+    design = designed(case, information, seed=seed)
+    primitives = tuple(item.primitive for item in information)
+    rehearsal = Rehearsal(
+        truth=ship,
+        nominal=case.vessel,
+        primitives=primitives,
+        designs={OPTIMISED: design.repeats, EQUAL: equal_runs(primitives, case.design.total_s), RANDOM: None},
+        total_s=case.design.total_s,
+        environment=case.environment,
+        parameters=estimated_parameters(case.vessel.model, case.design.fixed_parameters),
+        method=method,
+        mean_subtraction=case.design.mean_subtraction,
+        excitation=case.design.excitation,
+        integrator=integrator,
+        trials=trials,
+        seed=seed,
+    )
+    folder = out or Path("runs") / case.name
+    done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
+    with workers(jobs, scheduler=scheduler, load=None):
+        results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))
+    content = ValidationContent(
+        scenario=case.name,
+        rehearsal=rehearsal,
+        results=results,
+        noisy_moduli=tuple(
+            item.primitive.name
+            for item, count in zip(information, design.repeats, strict=True)
+            if count and not item.excitation_condition
+        ),
+        command=command_text(
+            requests.Validate(
+                scenario=scenario, truth=truth, trials=trials, method=method, integrator=integrator, seed=seed
+            )
+        ),
+        version=__version__,
+    )
+    document = validation_document(content)
+    files = write_files(
+        folder, {"validation.json": validation_json(content), "validation.html": partial(document_html, document)}
+    )
+    forget()
+    progress("done", 1.0)
+    return Outcome(files=files, document=document)
+
+
+def _method(case: Scenario, stated: str | None) -> str:
+    """The estimator that is stated, or the one whose accuracy designs count."""
+    if case.design.excitation != "free":
+        usual = "iv-air" if case.vessel.model.reads_air else "iv"
+    else:
+        usual = steady_current_method(case.vessel.model) if case.environment.current_std_mps > 0 else "iv"
+    return stated or usual
+
+
+def _identity(rehearsal: Rehearsal) -> tuple[object, ...]:
+    """Everything that the trials depend on."""
+    arrays = [(item.name, item.commands.values, item.entry_velocity) for item in rehearsal.primitives]
+    ships = [vessel_toml(ship) for ship in (rehearsal.truth, rehearsal.nominal)]
+    weather = rehearsal.environment
+    return (
+        __version__,
+        arrays,
+        ships,
+        (weather.current_to, weather.current_std_mps, weather.wind_to, weather.wind_std_mps),
+        (weather.current_variation, weather.wind_variation),
+        (dict(rehearsal.designs), rehearsal.total_s, rehearsal.parameters, rehearsal.method),
+        (rehearsal.mean_subtraction, rehearsal.excitation, rehearsal.integrator, rehearsal.trials, rehearsal.seed),
+    )
+
+
+def _chunk_store(folder: Path) -> tuple[dict[str, Array], Callable[[str, Array], None], Callable[[], None]]:
+    """Chunks that an earlier call left, how to keep one more, and how to forget them all."""
+    done = {path.stem.replace("+", "/"): np.load(path) for path in sorted(folder.glob("*.npy"))}
+
+    def keep(key: str, rows: Array) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        target = folder / f"{key.replace('/', '+')}.npy"
+        beside = target.with_suffix(".part")
+        with beside.open("wb") as file:
+            np.save(file, rows)
+        beside.replace(target)
+
+    return done, keep, lambda: shutil.rmtree(folder, ignore_errors=True)

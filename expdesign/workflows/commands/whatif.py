@@ -1,0 +1,247 @@
+"""`expdesign whatif`: a scenario and variants of it, designed and optionally planned, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from expdesign import __version__, requests
+from expdesign.dictionary import Primitive
+from expdesign.durations import DurationDesign, efficiencies, optimal_shares
+from expdesign.durations.rounding import whole_runs
+from expdesign.errors import FileError, InputError, NoAnswer
+from expdesign.export import Content, write_files
+from expdesign.export.pages import document_html
+from expdesign.export.whatif_content import Case, WhatIfContent, whatif_json
+from expdesign.export.whatif_page import whatif_document
+from expdesign.information import PrimitiveInformation, estimated_parameters
+from expdesign.information.expected import covariance_of_repeats
+from expdesign.memory import Memory, recalled, remembering, user_memory
+from expdesign.plan.verify import track_covariance
+from expdesign.processes import as_finished, reported_together
+from expdesign.progress import Progress, in_phases, silent, within
+from expdesign.rehearsal import trial_parts
+from expdesign.requests import command_text
+from expdesign.scenario import Scenario, load_scenario, load_variant
+from expdesign.values import Array
+from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
+from expdesign.workflows.steps.design_problem import designed, duration_problem
+from expdesign.workflows.steps.planned import check_plannable, plan_summary
+from expdesign.workflows.steps.scored import ready, scored
+from expdesign.workflows.steps.workers import load_plans, workers
+
+WHOLE_RUNS = "repeats"
+SEARCHED = 0.1
+"""Share of the work that is done once for all cases, where trials are planned."""
+WORKED = 0.95
+"""Share of the work that the cases are."""
+SHARES = (0.25, 0.5, 2.0, 4.0)
+"""Of the time of all runs, for which the accuracy is shown as well."""
+WORK = (0.5, 0.5, 10.0, 0.5)
+"""Relative times of the parts of a case: scoring, sharing out time, planning, comparing criteria."""
+
+
+def whatif(
+    scenario: Path,
+    variants: Sequence[Path],
+    out: Path | None,
+    *,
+    with_plan: bool = False,
+    jobs: int = 0,
+    scheduler: str | None = None,
+    cache: bool = True,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Outcome:
+    """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
+
+    Every file is read before anything is computed, and every case's dictionary and durations are checked before
+    anything is planned. A variant without an answer is listed as such beside the others.
+    Before trials are planned, manoeuvres are searched for that shorten the scenario's day: variants that leave that
+    search as it is take over what it found, others the candidates simulated in it.
+
+    Args:
+        scenario: the scenario file.
+        variants: files with what differs.
+        out: folder.
+        with_plan: plan the trials, too.
+        jobs: processes; 0 for one per core.
+        scheduler: address of a Dask scheduler whose workers carry the work instead.
+        cache: read what is remembered, and remember what is computed. Without it the cases share what they compute all
+            the same, in a folder of their own. The results do not depend on it.
+        seed: of everything drawn.
+        progress: of the cases.
+    """
+    if not variants:
+        raise InputError("no variant files are given, expected one or more")
+    progress("reading the scenario", 0.0)
+    base = load_scenario(scenario)
+    read = [load_variant(scenario, variant) for variant in variants]
+    cases = [(base, ()), *((item.scenario, item.changes) for item in read)]
+    names = [case.name for case, _ in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
+    done: dict[str, Case] = {}
+    searched = SEARCHED if with_plan and base.design.accuracy else 0.0
+    with (
+        TemporaryDirectory(prefix="expdesign-") as folder,
+        remembering((user_memory() if cache else None) or Memory(Path(folder))) as memory,
+        workers(jobs, scheduler=scheduler, load=load_plans),
+    ):
+        for (case, _), path in zip(cases, (scenario, *variants), strict=True) if with_plan else ():
+            with suppress(NoAnswer):
+                _check(case, path, seed)
+        if searched:
+            with suppress(NoAnswer):  # the case itself says so
+                _search(base, seed, within(progress, 0.0, searched))
+        with reported_together(within(progress, searched, WORKED), len(cases)) as together:
+            tasks = [(*case, reporter) for case, reporter in zip(cases, together.reporters, strict=True)]
+            for found in as_finished(_case, (with_plan, seed, memory), tasks):
+                done[found.name] = found
+                together.finished(names.index(found.name), f"{found.name} is done")
+    content = WhatIfContent(
+        cases=tuple(done[name] for name in names),
+        planned=with_plan,
+        command=command_text(
+            requests.WhatIf(scenario=scenario, variants=tuple(variants), with_plan=with_plan, seed=seed)
+        ),
+        version=__version__,
+    )
+    if all(case.problem for case in content.cases):
+        raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
+    document = whatif_document(content)
+    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(document_html, document)}
+    written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
+    progress("done", 1.0)
+    return Outcome(files=written, document=document)
+
+
+def _check(case: Scenario, path: Path, seed: int) -> None:
+    """Raise FileError for what is wrong with a case and would else be found once others have been planned for long."""
+    try:
+        check_plannable(case)
+        information = scored(case)
+        design = designed(case, information, seed=seed)
+        if case.design.accuracy is not None:
+            checked_day(case, information, design)
+    except FileError:
+        raise
+    except InputError as error:
+        raise FileError(path, "", str(error)) from None
+
+
+def _search(case: Scenario, seed: int, progress: Progress) -> None:
+    """Search for manoeuvres that shorten the day, to be remembered for all cases."""
+    scoring, sharing, searching = in_phases(progress, *WORK[:2], WORK[2] / 4)
+    information, _ = ready(case, seed=seed, progress=scoring)
+    design = designed(case, information, seed=seed, progress=sharing)
+    search_additions(case, information, design, seed=seed, progress=searching)
+
+
+def _case(
+    with_plan: bool,
+    seed: int,
+    memory: Memory | None,
+    case: Scenario,
+    changes: tuple[str, ...],
+    progress: Progress,
+) -> Case:
+    """One case, perhaps in another process."""
+    with remembering(memory):
+        return _computed(case, changes, with_plan, seed, progress)
+
+
+def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: int, progress: Progress) -> Case:
+    def report(activity: str, share: float) -> None:
+        progress(f"{case.name}: {activity}", share)
+
+    scoring, sharing, planning, comparing = in_phases(report, *WORK)
+    try:
+        information, _ = ready(case, seed=seed, progress=scoring)
+        design = designed(case, information, seed=seed, progress=sharing)
+        plan: dict[str, object] = {}
+        track: Array | None = None
+        if with_plan:
+            day = planned_day(case, information, design, seed=seed, progress=planning)
+            information, design, plan = day.information, day.design, dict(plan_summary(case, day.plan))
+            length = day.plan.day
+            track = track_covariance(case.vessel, design, case.environment, day.plan.sailed)
+            plan |= {"trial_s": length.planned_s, "day_s": length.planned_s}
+            plan |= {"day_median_s": length.median_s, "day_95_s": length.most_s}
+        comparing("comparing criteria", 0.0)
+        return replace(_described(case, changes, information, design, plan, seed), track=track)
+    except NoAnswer as error:
+        empty = np.zeros((0, 0))
+        return Case(
+            name=case.name, changes=changes, problem=str(error), runs={}, efficiencies={}, plan={}, covariance=empty
+        )
+
+
+def _described(
+    case: Scenario,
+    changes: tuple[str, ...],
+    information: Sequence[PrimitiveInformation],
+    design: DurationDesign,
+    plan: dict[str, object],
+    seed: int,
+) -> Case:
+    parameters = estimated_parameters(case.vessel.model, case.design.fixed_parameters)
+    run_s = design.problem.run_s
+    others = _in_other_times(case, information, design, seed)
+    used = [place for place, runs in enumerate(zip(design.repeats, *others, strict=True)) if any(runs)]
+    of_runs = _covariance(case, [information[place].primitive for place in used], parameters)
+    times = []
+    for repeats in others:
+        with suppress(NoAnswer):
+            times.append((float(np.dot(repeats, run_s)), of_runs(np.array(repeats, dtype=float)[used])))
+    compared = {item.criterion: item.of[WHOLE_RUNS] for item in recalled(efficiencies, design) if WHOLE_RUNS in item.of}
+    return Case(
+        name=case.name,
+        changes=changes,
+        criterion=case.design.criterion,
+        runs={name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count},
+        informative_s=float(np.dot(design.repeats, run_s)),
+        gap_relative=design.gap_relative,
+        efficiencies=compared,
+        parameters=parameters,
+        covariance=of_runs(np.array(design.repeats, dtype=float)[used]),
+        plan=plan,
+        times=tuple(times),
+        legs_count=case.design.accuracy is not None,
+        remarks=case.remarks,
+    )
+
+
+def _in_other_times(
+    case: Scenario, information: Sequence[PrimitiveInformation], design: DurationDesign, seed: int
+) -> list[tuple[int, ...]]:
+    """The optimal whole runs in shorter and longer times, those that tell every parameter."""
+    found = []
+    for share in SHARES:
+        settings = replace(case.design, total_s=share * design.problem.total_s, accuracy=None)
+        with suppress(NoAnswer):
+            problem = duration_problem(replace(case, design=settings), information, seed=seed)
+            found.append(whole_runs(problem, optimal_shares(problem).fractions))
+    return found
+
+
+def _covariance(case: Scenario, primitives: Sequence[Primitive], parameters: Sequence[str]) -> Callable[[Array], Array]:
+    """(p, p) covariance expected of estimates from whole runs alone, as a function of how often each is run."""
+    parts = trial_parts(primitives, np.ones(len(primitives)).tolist(), environment=case.environment)
+    headings = len(parts) // len(primitives)
+    of_parts = covariance_of_repeats(
+        case.vessel,
+        parts,
+        parameters,
+        environment=case.environment,
+        mean_subtraction=case.design.mean_subtraction,
+    )
+    return lambda repeats: of_parts(np.repeat(repeats / headings, headings))

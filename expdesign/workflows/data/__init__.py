@@ -1,1 +1,0 @@
-"""Commands on measured data; one file each."""

@@ -1,1 +1,0 @@
-"""Commands that design and plan a trial, and compare or export the results; one file each."""

@@ -1,1 +1,0 @@
-"""Commands that run, test or continue a planned trial; one file each."""
