@@ -249,7 +249,7 @@ def _is_shown(before: HeldOut, after: HeldOut, re_estimated: HeldOut, ratios: Ar
     scatter = float(ratios.std(ddof=1)) if len(ratios) > 1 else np.inf
     middle, error = float(ratios.mean()), 1.96 * scatter / np.sqrt(len(ratios))
     predicts, share = middle + error < 0.0, 1.0 - np.exp(middle)
-    if predicts and share >= SELECTION_TUNING.least_predicted and gained[0] > 0.0:
+    if predicts and share >= SELECTION_TUNING.least_predicted and gained[0] >= 0.0:
         return True
     shows = (predicts and share >= SELECTION_TUNING.least_reduction) or shows_for_certain(re_estimated, after, 0)
     return bool(better and shows)

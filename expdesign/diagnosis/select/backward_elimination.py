@@ -118,9 +118,9 @@ def improves_held_out(
     a word, both by intervals that exclude zero. Of a first cause, that may be compared with the model that is fitted as
     it is but for the cause: parameters of a file that were fitted to the same data have seen what is held out, those
     fitted with a cause have not. Or it shows in predictions from one sample to the next, where simulations say too
-    little. A cause that imitates none may show in these beside simulations that gain on average; one that imitates
-    others, or a later one, if these gain by enough, too. Several parameters at once, which imitate
-    any cause, never do, nor does a change of the ship, whose time is chosen where predictions are worst.
+    little. A cause that imitates none may show in these beside simulations that lose nothing on average; one that
+    imitates others, or a later one, if these gain by enough, too. Several parameters at once, which imitate any cause,
+    never do, nor does a change of the ship, whose time is chosen where predictions are worst.
 
     Args:
         found: the selection.
@@ -181,7 +181,7 @@ def _shows_otherwise(
     first = found.steps[0].chosen
     share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
-    alone = share >= TUNING.least_predicted and not first.candidate.imitates and gain > 0.0
+    alone = share >= TUNING.least_predicted and not first.candidate.imitates and gain >= 0.0
     if least > 0.0 and _may_show_in_predictions(found.steps[0]) and (alone or (better and worth_a_word)):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
