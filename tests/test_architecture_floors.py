@@ -85,7 +85,7 @@ FLOORS = {
         ("outcome",),
         ("steps",),
         ("commands",),
-        ("notebook",),
+        ("notebook", "asked"),
     ),
 }
 """For the package and every room of rooms: what stands on what; neighbours on a floor do not know each other."""

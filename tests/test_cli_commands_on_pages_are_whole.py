@@ -67,7 +67,7 @@ def test_a_workflow_takes_what_its_command_asks_with_the_same_defaults(command: 
     assert taken.pop("progress").default is not inspect.Parameter.empty
     assert (taken.pop("tell", None) is not None) == command.tells
     stated = {one.name: one.default for one in command.asked}
-    assert set(taken) == set(given(stated))
+    assert set(taken) == {"cache" if name == "no_cache" else name for name in stated}
     for name in stated.keys() - WITHOUT_EFFECT:
         default = inspect.Parameter.empty if stated[name] is MISSING else stated[name]
         assert taken[name].default == default or stated[name] == (), name
@@ -83,6 +83,21 @@ def test_a_workflow_that_gives_its_command_states_all_that_results_depend_on(com
     ]
     stated = {keyword.arg for call in calls for keyword in call.keywords}
     assert not calls or {one.name for one in command.asked} - WITHOUT_EFFECT <= stated
+
+
+def test_a_request_reaches_its_workflow_with_all_its_values(monkeypatch) -> None:
+    for command in COMMANDS:
+        told: list[dict[str, object]] = []
+        monkeypatch.setattr(workflows, command.workflow, lambda told=told, **values: told.append(values))
+        workflows.carry_out(command.request(**unusual(command)))
+        ((reached),) = told
+        assert reached.pop("progress") is not None
+        assert ("tell" in reached) == command.tells
+        reached.pop("tell", None)
+        expected = unusual(command)
+        if "no_cache" in expected:
+            expected["cache"] = not expected.pop("no_cache")
+        assert reached == expected
 
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:

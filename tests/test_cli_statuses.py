@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-import expdesign
+import expdesign.workflows
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoAnswer, NoPlan
 
@@ -17,7 +17,7 @@ ASLEEP = """
 import sys
 import time
 import types
-import expdesign
+import expdesign.workflows
 from expdesign.cli import main
 def run(scenario, out, *, progress, **settings):
     progress("asleep", 0.5)

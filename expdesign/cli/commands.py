@@ -138,16 +138,15 @@ def _line(entry: Explained) -> str:
     return f"{entry.name}: {entry.meaning}" + (f" ({notes})" if notes else "")
 
 
-def carry_out(command: Command, options: Mapping[str, object], *, quiet: bool, json: bool) -> None:
+def run_command(command: Command, options: Mapping[str, object], *, quiet: bool, json: bool) -> None:
     """Run a command, show its progress, and print what came of it."""
-    with interruptions_wait():  # some solvers do not stand being interrupted while they load
-        from expdesign import workflows
+    with interruptions_wait():
+        from expdesign.workflows import carry_out
 
-        work = getattr(workflows, command.workflow)
-    lines = {"tell": _untold if quiet or json else _tell} if command.tells else {}
+        request = command.request(**options)
     with shown_progress(quiet=quiet) as progress, warnings.catch_warnings():
         warnings.simplefilter("ignore", NotDrawn)  # told below
-        outcome = work(**options, progress=progress, **lines)
+        outcome = carry_out(request, progress=progress, tell=_untold if quiet or json else _tell)
     if json:
         typer.echo(as_json(command.name, outcome))
     elif not quiet:
@@ -168,11 +167,8 @@ def _untold(line: str) -> None:
 
 
 def given(options: Mapping[str, object]) -> dict[str, object]:
-    """Options as a workflow takes them: lists as tuples, empty where none is given; --no-cache is no cache."""
-    found = {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
-    if "no_cache" in found:
-        found["cache"] = not found.pop("no_cache")
-    return found
+    """Options as a request has them: lists as tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
 
 
 def register(command: Command) -> None:
@@ -182,7 +178,7 @@ def register(command: Command) -> None:
 
     def run(*, quiet: bool, json: bool, **options: object) -> None:
         named = {name: value or () if name in lists else value for name, value in options.items()}
-        carry_out(command, given(named), quiet=quiet, json=json)
+        run_command(command, given(named), quiet=quiet, json=json)
 
     kind = inspect.Parameter.KEYWORD_ONLY
     parameters = [

@@ -96,9 +96,14 @@ COMMANDS = (
 """In the order in which `--help` lists them."""
 
 
+def command_of(request: Request) -> Command:
+    """The command that carries out a request."""
+    return next(one for one in COMMANDS if one.request is type(request))
+
+
 def command_text(request: Request) -> str:
     """`expdesign COMMAND ARGUMENTS OPTIONS`, ready to be typed; options with their usual values are left out."""
-    command = next(one for one in COMMANDS if one.request is type(request))
+    command = command_of(request)
     arguments, options = list[str](), list[str]()
     for one in command.asked:
         value = getattr(request, one.name)

@@ -2,7 +2,8 @@
 
 Each function reads its input, does the work and only then writes, so that a failure leaves no files. For notebooks
 there are the steps that commands share (`scored`, `designed`, `planned`: values in, values out) and `notebook`, a
-planned trial as one value. A name is loaded when it is first used, so that a command waits only for what it needs.
+planned trial as one value. `carry_out` does what a value of `expdesign.requests` asks. A name is loaded when it is
+first used, so that a command waits only for what it needs.
 """
 
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
+    from expdesign.workflows.asked import carry_out
     from expdesign.workflows.commands.diagnose import diagnose
     from expdesign.workflows.commands.durations import durations
     from expdesign.workflows.commands.estimate import estimate
