@@ -28,6 +28,7 @@ from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import silent
 from expdesign.signals import Record
+from held_out_cases import steps_of
 
 BIAS_RAD = 0.3
 selecting = import_module("expdesign.diagnosis.diagnose")
@@ -211,14 +212,15 @@ def test_stretches_of_runs_that_differ_are_no_independent_witnesses():
     assert (np.array(plain) < 0.05).mean() > 0.3
 
 
-def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeypatch):
-    """The finding carries its gain on the model without it that is fitted in the same way, and says so."""
+def test_a_diagnosis_that_drops_what_its_search_found_names_what_predicts_best(monkeypatch):
+    """However much is explained. The finding carries its gain on the same model fitted without it, and says so."""
 
     def nothing(found, _windows, cross_validated, *_):
         kept, held = cross_validated(found.with_steps(()))
         return replace(kept, beside_stated=True), held
 
     monkeypatch.setattr(selecting, "eliminate_backward", nothing)
+    monkeypatch.setattr(selecting, "explains_little", lambda *_: False)
     record = trial(2, faults={"heading_bias": BIAS_RAD})
     vessel = vessel_of("coaster", relative_std=0.1)
     found = diagnose(vessel, record)
@@ -234,6 +236,17 @@ def test_a_diagnosis_whose_search_finds_nothing_names_what_predicts_best(monkeyp
     assert [note for note in found.notes if "compared by predictions" in note]
     assert not [note for note in found.notes if "sign of the misalignment" in note]
     assert (found.after.fit > found.before.fit).all()
+
+
+def test_what_no_search_found_is_not_named_where_much_is_explained(monkeypatch):
+    """The search found and dropped another cause than the one that predicts best."""
+    (best,) = steps_of("best").steps  # a current
+    monkeypatch.setattr(selecting, "explains_little", lambda *_: False)
+    monkeypatch.setattr(selecting, "compare_predictions", lambda *_: SimpleNamespace(causes=()))
+    monkeypatch.setattr(selecting, "found_by_predictions", lambda kept, *_: (kept.with_steps((best,)), []))
+    monkeypatch.setattr(selecting, "eliminate_backward", lambda found, _w, check, *_: check(found.with_steps(())))
+    vessel = vessel_of("coaster", relative_std=0.1)
+    assert not diagnose(vessel, trial(2, faults={"heading_bias": BIAS_RAD})).findings
 
 
 def test_a_simulation_that_explains_much_is_left_to_the_search(monkeypatch):

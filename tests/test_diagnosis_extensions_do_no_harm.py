@@ -45,6 +45,34 @@ def test_models_that_run_away_or_simulate_worse_harm(record):
         assert harms(before, after, record) is harmful
 
 
+@pytest.mark.parametrize(
+    ("harmful", "fit_percent", "beside"),
+    [({"bias"}, 60.0, True), (set(), 60.0, False), ({"bias", "beside"}, 60.0, False), ({"bias"}, 49.0, False)],
+)
+def test_causes_that_re_estimated_parameters_spoil_are_fitted_beside_the_file(
+    monkeypatch, harmful, fit_percent, beside
+):
+    """Unless they harm there too, or improve nothing on its parameters."""
+    found, model = steps_of("bias"), lambda name: SimpleNamespace(ship=name, value=lambda _: 0.0)
+    last = SimpleNamespace(ship=SimpleNamespace(is_possible=lambda _: True, name="beside"), value=lambda _: 0.0)
+    kept = replace(found, first=SimpleNamespace(keys=("theta:Y_v",)), last=model("bias"))  # type: ignore[arg-type]
+    known = replace(found, last=last, beside_stated=True)  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "fitted_ahead", lambda *_, beside_stated: known if beside_stated else None)
+    monkeypatch.setattr(judgement, "harms", lambda _ship, after, _record: getattr(after, "name", after) in harmful)
+    monkeypatch.setattr(judgement, "with_runs_counted", lambda selection, *_: selection)
+    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [])
+
+    def of(fit_percent):
+        return replace(errors(fit_percent), ahead=lambda: replace(errors(fit_percent), in_stretches=True))
+
+    validation = SimpleNamespace(of=lambda _: of(fit_percent), short_windows=lambda _: None)
+    told = judgement.harmless_beside_the_file(kept, None, of(50.0), validation, (None, None), 0)  # type: ignore[arg-type]
+    assert (told is not None) is beside
+    if told is not None:
+        assert told[0] is known
+        assert all(item.in_stretches for item in told[1])
+
+
 def test_causes_are_taken_back_until_none_harms(monkeypatch):
     """Three causes, of which the second makes the simulation worse: the first is left, with its errors."""
     found = steps_of("good", "bad", "worse")
@@ -153,6 +181,7 @@ def test_a_first_cause_that_shows_nowhere_for_certain_is_a_remark(monkeypatch):
         (71.0, (0.0, (-0.1, 0.1)), True),
         (70.0, (0.06, (0.01, 0.1)), True),
         (70.0, (0.04, (0.01, 0.1)), False),
+        (68.5 + spread, (0.5, (0.4, 0.6)), False),  # half a point is lost on average
     ):
         monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_, predicted=predicted: predicted)
         found = steps_of("only")

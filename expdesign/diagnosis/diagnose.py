@@ -55,6 +55,7 @@ from expdesign.diagnosis.judgement import (
     LITTLE_FIT,
     errors_as_judged,
     found_by_predictions,
+    harmless_beside_the_file,
     harms,
     losses_without,
     parameters_alone,
@@ -150,14 +151,19 @@ def select_causes(
     re_estimated = validation.of(found.first) if comparable else None
     kept, held = eliminate_backward(found, windows, cross_validated, seed, re_estimated)
     kept = with_parameters_as_rival(kept, held, validation, windows, seed)
+    kept, held = harmless_beside_the_file(kept, ship, as_stated, validation, data, seed) or (kept, held)
     rejected = [step.chosen.fit for step in found.steps[len(kept.steps) :]]
     searched, compared = kept, None
     reached = accuracy(kept.last.ship, data[1]) if kept.steps else before
-    if explains_little(reached, windows) or _imitates(kept):
+    dropped = {step.chosen.candidate.cause for step in found.steps} if not kept.steps else set()
+    little = explains_little(reached, windows) or _imitates(kept)
+    if dropped or little:
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
         compared = compare_predictions(begun, short, seed, progress)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
-        if compared and not by_predictions and not kept.steps and found.first.keys:
+        if by_predictions and not little and by_predictions[0].steps[0].chosen.candidate.cause not in dropped:
+            by_predictions = None  # where much is explained, predictions confirm what likelihoods found, and no more
+        if compared and little and not by_predictions and not kept.steps and found.first.keys:
             stated = compare_predictions(ship.with_known_parameters(), short, seed, progress)
             by_predictions = stated and found_by_predictions(kept, stated, data, ship, seed, compared.without)
         if compared and kept.steps and not by_predictions:

@@ -35,6 +35,7 @@ from expdesign.diagnosis.select import (
     improves_held_out,
     only_nuisance,
     open_candidates,
+    with_runs_counted,
     without_step,
 )
 from expdesign.progress import Progress, within
@@ -281,6 +282,38 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
         one = None if others is None else validation.of(others[-1].chosen.fit).like(whole)
         losses.append(np.inf if one is None else whole.mean_fit - one.mean_fit)
     return np.array([*losses, whole.mean_fit - last.mean_fit])
+
+
+def harmless_beside_the_file(
+    kept: Selection,
+    ship: ExtendedModel,
+    as_stated: HeldOut,
+    validation: CrossValidation,
+    data: tuple[Windows, Record],
+    seed: int,
+) -> tuple[Selection, list[HeldOut]] | None:
+    """Causes fitted beside the parameters of the file, where it is re-estimated ones that make simulations worse.
+
+    None where they do not, or where a cause beside the file's parameters does not improve on them for certain.
+
+    Args:
+        kept: the causes, beside re-estimated parameters.
+        ship: the model in use.
+        as_stated: its errors as its file states it.
+        validation: of other fits.
+        data: as compared, and as measured.
+        seed: of the intervals.
+    """
+    windows, record = data
+    if not kept.steps or not kept.first.keys or kept.beside_stated or not harms(ship, kept.last.ship, record):
+        return None
+    known = fitted_ahead(kept, windows, validation.short_windows(ship), beside_stated=True)
+    if known is None or harms(ship, known.last.ship, record):
+        return None
+    held = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+    if not all(improves_held_out(known, held, seed)):
+        return None
+    return with_runs_counted(known, open_candidates(known.last, windows), np.random.default_rng(seed)), held
 
 
 def without_harm(

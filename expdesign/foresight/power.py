@@ -242,13 +242,14 @@ def _is_shown(before: HeldOut, after: HeldOut, re_estimated: HeldOut, ratios: Ar
         before: errors of simulating them without it; after: with it; re_estimated: without it, parameters fitted.
         ratios: (k b,) logarithms of the squared errors of predicting the blocks of each, with it over without.
     """
-    better = simulates_better(before, after, held_out_gain(before, after, 0))
+    gained = held_out_gain(before, after, 0)
+    better = simulates_better(before, after, gained)
     if shows_for_certain(before, after, 0):
         return better
     scatter = float(ratios.std(ddof=1)) if len(ratios) > 1 else np.inf
     middle, error = float(ratios.mean()), 1.96 * scatter / np.sqrt(len(ratios))
     predicts, share = middle + error < 0.0, 1.0 - np.exp(middle)
-    if predicts and share >= SELECTION_TUNING.least_predicted:
+    if predicts and share >= SELECTION_TUNING.least_predicted and gained[0] >= 0.0:
         return True
     shows = (predicts and share >= SELECTION_TUNING.least_reduction) or shows_for_certain(re_estimated, after, 0)
     return bool(better and shows)

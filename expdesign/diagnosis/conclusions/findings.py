@@ -301,8 +301,8 @@ def note_on_stretches(held: Sequence[HeldOut], *, beside_stated: bool = False) -
         return ()
     if beside_stated:
         return (
-            "Parameters re-estimated within their stated standard deviations simulate held-out runs worse than those "
-            "of the vessel file. So causes are fitted beside the parameters of the file, and gains are measured, in "
+            "Parameters re-estimated within their stated standard deviations simulate runs worse than those of "
+            "the vessel file. So causes are fitted beside the parameters of the file, and gains are measured, in "
             f"stretches of {AHEAD_S:g} s, each simulated from its first measured state.",
         )
     return (

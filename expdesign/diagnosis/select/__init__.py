@@ -17,6 +17,7 @@ from expdesign.diagnosis.select.selection import (
     fitted_ahead,
     p_value_between_runs,
     redundant_step,
+    with_runs_counted,
     without_step,
 )
 from expdesign.diagnosis.select.selection_round import leading_candidates, open_candidates, same_effects_as_any

@@ -118,9 +118,9 @@ def improves_held_out(
     a word, both by intervals that exclude zero. Of a first cause, that may be compared with the model that is fitted as
     it is but for the cause: parameters of a file that were fitted to the same data have seen what is held out, those
     fitted with a cause have not. Or it shows in predictions from one sample to the next, where simulations say too
-    little. A cause that imitates none may show in these alone, if it makes simulations no worse for certain; one that
-    imitates others, or a later one, beside simulations that gain on average. Several parameters at once, which imitate
-    any cause, never do, nor does a change of the ship, whose time is chosen where predictions are worst.
+    little. A cause that imitates none may show in these beside simulations that lose nothing on average; one that
+    imitates others, or a later one, if these gain by enough, too. Several parameters at once, which imitate any cause,
+    never do, nor does a change of the ship, whose time is chosen where predictions are worst.
 
     Args:
         found: the selection.
@@ -151,7 +151,7 @@ def improves_held_out(
     if windows is None or not gains:
         return improves
     if not shows_for_certain(held[0], held[1], seed):
-        improves[0] = _shows_otherwise(found, held, (better[0], gains[0][1]), (windows, re_estimated), seed)
+        improves[0] = _shows_otherwise(found, held, (better[0], gains[0]), (windows, re_estimated), seed)
     for index, step in enumerate(found.steps[1:], 1):
         if better[index] and not shown[index] and _may_show_in_predictions(step):
             share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
@@ -166,7 +166,7 @@ def _may_show_in_predictions(step: Step) -> bool:
 def _shows_otherwise(
     found: Selection,
     held: Sequence[HeldOut],
-    simulated: tuple[bool, tuple[float, float]],
+    simulated: tuple[bool, tuple[float, tuple[float, float]]],
     data: tuple[Windows, HeldOut | None],
     seed: int,
 ) -> bool:
@@ -174,14 +174,14 @@ def _shows_otherwise(
 
     Args:
         found, held, seed: as of `improves_held_out`.
-        simulated: whether it simulates better, and the interval of its gain.
+        simulated: whether it simulates better, and its gain with the interval.
         data: all of it, and errors of the model before any cause with its uncertain parameters fitted.
     """
-    (better, (low, high)), (windows, re_estimated) = simulated, data
+    (better, (gain, (low, high))), (windows, re_estimated) = simulated, data
     first = found.steps[0].chosen
     share, (least, _) = prediction_gain(held[0], held[1], windows, first.fit.noise)
     worth_a_word = share >= 1.0 - (1.0 - TUNING.least_reduction) ** 2  # of the squared error
-    alone = share >= TUNING.least_predicted and not first.candidate.imitates
+    alone = share >= TUNING.least_predicted and not first.candidate.imitates and gain >= 0.0
     if least > 0.0 and _may_show_in_predictions(found.steps[0]) and (alone or (better and worth_a_word)):
         return True
     beside = held_beside_the_same_fit(found, held, re_estimated) if better and low <= 0.0 <= high else None
