@@ -67,8 +67,11 @@ def assert_agree(summary: Mapping[str, object], table: Mapping[str, object]) -> 
             assert table[key] == pytest.approx(summary[key], rel=1e-9), key
 
 
+LONG = [pytest.param(one, marks=pytest.mark.thorough) for one in (steps_files, foreseen, validated)]
+
+
 @pytest.mark.usefixtures("undrawn_here")
-@pytest.mark.parametrize("asked", [steps_files, roll_files, load_plan, foreseen, validated])
+@pytest.mark.parametrize("asked", [roll_files, load_plan, *LONG])
 def test_what_a_page_says_first_is_on_the_terminal(
     asked: Callable[[Path], list[object]],
     tmp_path: Path,

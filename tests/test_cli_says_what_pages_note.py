@@ -70,7 +70,10 @@ COMMANDS = {
 DOUBT = {"monitor": "hours.csv: r_radps is 0.9"}
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+LONG = [pytest.param(name, marks=pytest.mark.thorough) for name in ("estimate", "diagnose")]
+
+
+@pytest.mark.parametrize("command", ["monitor", "indices", "mine", *LONG])
 def test_the_terminal_says_all_that_the_page_notes(
     folder: Path, tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
