@@ -108,7 +108,7 @@ def test_it_has_no_file_to_sail_by_and_none_can_be_made_from_it(draft):
         read_plan(draft[0] / "plan.json")
 
 
-def test_its_legs_are_where_a_chart_draws_them_too_coarse_to_sail_by(draft):
+def test_its_legs_are_where_a_chart_draws_them(draft):
     legs = planned(draft[0])["legs"]
     sketch = played(str(draft[0] / "plan.json"))["sketch"]
     assert [leg["places"] for leg in sketch] == [leg["sketch_deg"] for leg in legs]

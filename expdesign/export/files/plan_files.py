@@ -115,7 +115,7 @@ LATTICE_SENTENCE = (
 )
 
 METRE_DECIMALS, MOTION_DECIMALS, DEGREE_DECIMALS = 6, 9, 9
-SKETCHED, SKETCH_DECIMALS = 40, 5  # places of a leg of a draft, and decimals of their degrees
+SKETCHED, SKETCH_DECIMALS = 40, 7  # places of a leg of a draft, and decimals of their degrees
 
 
 def plan_json(
@@ -275,7 +275,7 @@ def _leg_entry(plan: Plan, index: int, leg: Leg) -> dict[str, Any]:
 
 
 def _sketch(plan: Plan, leg: Leg) -> list[list[float]]:
-    """Latitude and longitude of some places of a leg, enough for a drawing and too few and too coarse to sail by."""
+    """Latitude and longitude of some places of a leg, enough for a drawing and too few to sail by."""
     places = np.unique(np.linspace(leg.first, leg.last, SKETCHED).round().astype(int))
     degrees = plan.area.frame.to_degrees(plan.trajectory.pose[places, :2])
     return [[round(value, SKETCH_DECIMALS) for value in place] for place in degrees.tolist()]
