@@ -16,6 +16,16 @@ import pytest
 import scipy
 from pynmeagps import NMEAReader
 
+from binary_logs import (
+    write_ardupilot,
+    write_excel,
+    write_matlab,
+    write_matlab73,
+    write_parquet,
+    write_ros,
+    write_telemetry,
+    write_ulog,
+)
 from expdesign.cli import main
 from expdesign.errors import FileError
 from expdesign.importing import channels, guess, read_log
@@ -27,20 +37,12 @@ from logged_trial import (
     nmea,
     sentence,
     voyage,
-    write_ardupilot,
     write_dialect,
-    write_excel,
-    write_matlab,
-    write_matlab73,
     write_n2k,
     write_nmea,
     write_opencpn,
     write_own,
-    write_parquet,
-    write_ros,
     write_signalk,
-    write_telemetry,
-    write_ulog,
 )
 
 pytestmark = pytest.mark.usefixtures("undrawn")

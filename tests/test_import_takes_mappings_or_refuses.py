@@ -9,18 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from binary_logs import write_parquet, write_ulog
 from expdesign.cli import main
 from expdesign.importing import Sampled, Stretch, cut_by_plan
 from expdesign.signals import Commands
 from imported_runs import columns_of, run_import
-from logged_trial import (
-    Voyage,
-    logger_rows,
-    voyage,
-    write_dialect,
-    write_parquet,
-    write_ulog,
-)
+from logged_trial import Voyage, logger_rows, voyage, write_dialect
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -16,25 +16,27 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from binary_logs import (
+    write_ardupilot,
+    write_excel,
+    write_matlab,
+    write_matlab73,
+    write_parquet,
+    write_ros,
+    write_telemetry,
+    write_ulog,
+)
 from expdesign.cli import main
 from logged_trial import (
     SHIP,
     Voyage,
     voyage,
-    write_ardupilot,
     write_dialect,
-    write_excel,
-    write_matlab,
-    write_matlab73,
     write_n2k,
     write_nmea,
     write_opencpn,
     write_own,
-    write_parquet,
-    write_ros,
     write_signalk,
-    write_telemetry,
-    write_ulog,
 )
 
 CASES: dict[str, tuple[str, Callable[[Path, Voyage], Path]]] = {

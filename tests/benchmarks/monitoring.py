@@ -6,11 +6,8 @@ over D days of voyages of 12 hours each, at thresholds for one in 6 hours, one i
 is then made in N voyages of 3 hours, of which the first hour is without it. ``--year`` instead sends a year at 1 Hz
 through the command, as a stream, and prints its time and its peak memory. ``--ports`` gives the ship another load in a
 port call of eight hours in N voyages, and takes 5 % of its thrust an hour later. ``--weather`` sails N voyages of 6
-hours in each of several weathers, most of them beyond the reference, in which time should not be judged. ``--sea``
-sails N voyages of another ship in each of several cases, on autopilot in a slight sea, beside a plain average of her
-steady speeds; ``--calm`` the same without waves; ``--seas`` and ``--cases`` those alone, of more seas than these;
-``--white`` with no model of the noise within stretches; ``--seed`` with other numbers than those that constants were
-chosen on.
+hours in each of several weathers, most of them beyond the reference, in which time should not be judged. A ship on
+autopilot in a sea is sailed by ``monitoring_sea.py``.
 """
 
 from __future__ import annotations
@@ -21,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,9 +29,7 @@ from expdesign.monitoring.evidence import STRETCH_S
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.export.monitor_page.content import said_of_reference
 from expdesign.monitoring import (
-    AS_LIKELY,
     WHITE,
     Alarm,
     Calibration,
@@ -44,22 +39,16 @@ from expdesign.monitoring import (
     Rules,
     State,
     calibrate,
-    grams_and_noise,
     grams_of,
     joined,
     later_part,
-    stretch_length,
     threshold,
     watch,
     watched_changes,
 )
-from expdesign.scenario import load_vessel
-from expdesign.signals import Batch, Record
+from expdesign.signals import Record
 from expdesign.vessel import Vessel
 from monitoring_case import TENDER, tender, voyage_csv, voyage_record
-from sea_case import CALM, OTHER_SEAS, Sea, Ship, sailed, vessel_file
-from sea_case import CASES as SEA_CASES
-from sea_case import NAMES as SEA_COLUMNS
 
 HOUR, DAY = 3600, 86400
 
@@ -296,156 +285,6 @@ def trial(
     return first, named, named or number in alarm.as_likely, close, bool(early)
 
 
-SEAS: tuple[tuple[str, Sea], ...] = (
-    ("waves that sensors feel", Sea()),
-    ("waves that push the ship", Sea(pushed_s=5.0)),
-    ("waves that push her slowly", Sea(pushed_s=20.0)),
-)
-EXPECTED = {
-    "unchanged": (),
-    "thrust - 8 %": ("gain", "theta:X_nn"),
-    "drag + 15 %": ("theta:X_uu",),
-    "rudder + 2 degrees": ("offset:rudder",),
-    "yaw rate times 0.97": ("gyro",),
-    "mass + 12 %": ("inertia:u", "inertia:v", "inertia:r"),
-    "wind in yaw over an hour": ("push:r",),
-}
-"""Effects that name each case; a push is one of the weather, which is not the ship's."""
-WITHIN = 1.96
-"""Standard errors that 95 % of the sizes are to be within."""
-STEADY_S = 120
-"""Time without another set point from which speed counts as steady [s]."""
-
-
-def as_record(vessel: Vessel, table: np.ndarray) -> Record:
-    """A voyage of `sailed` as a record."""
-    column = dict(zip(SEA_COLUMNS, table.T, strict=True))
-    batch = Batch(
-        name="voyage",
-        sample_time_s=1.0,
-        input_names=vessel.model.inputs,
-        inputs=np.column_stack([column["n1_rps"], column["rudder1_rad"]]),
-        velocity=np.column_stack([column["u_mps"], column["v_mps"], column["r_radps"]]),
-        pose=np.column_stack([column["north_m"], column["east_m"], column["heading_rad"]]),
-    )
-    return Record(batches=(batch,), notes=())
-
-
-def steady_ratios(table: np.ndarray) -> np.ndarray:
-    """Means of speed per propeller speed over spans of ten minutes, of seconds that are steady."""
-    u, n, rudder = table[:, 4], table[:, 7], table[:, 8]
-    moving = (np.abs(np.diff(n, prepend=n[0])) > 1e-3) | (
-        np.abs(np.convolve(rudder, np.full(30, 1 / 30), "same")) > 0.05
-    )
-    steady = np.convolve(moving, np.ones(STEADY_S), "full")[: len(u)] < 0.5
-    spans = [slice(begin, begin + 600) for begin in range(0, len(u) - 599, 600)]
-    return np.array([(u[span] / n[span])[steady[span]].mean() for span in spans if steady[span].sum() > 60])
-
-
-def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str], *, first: int, white: bool) -> None:
-    """Statements about an unchanged ship, and delays and names of changes, after 4 hours of reference."""
-    with tempfile.TemporaryDirectory() as folder:
-        vessel = load_vessel(vessel_file(Path(folder) / "vessel.toml"))
-    stretch_s = stretch_length(vessel.length_m)
-    print(
-        "| sea | case | voyages | alarms before | said of the reference | found | in an hour | median delay |"
-        " named | or as likely | sizes in 95 % | bias, in std | left out | plain average beyond 4 std |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
-    for sea_name, sea in seas:
-        seeds = range(trials)
-        references = sailed([Ship()] * trials, 4 * HOUR, seeds=[10 * k + first for k in seeds], sea=sea)
-        known = []
-        for table in references:
-            record = as_record(vessel, table)
-            ship = extended_model(vessel, record)
-            changes = watched_changes(ship)
-            words = {"begins_s": [0.0], "stretch_s": stretch_s}
-            if white:
-                grams, noise = grams_of(ship, record, changes, **words), WHITE
-            else:
-                grams, noise = grams_and_noise(ship, record, changes, **words)
-            load = np.array([change.load for change in changes])
-            known.append((changes, noise, calibrate(grams, load=load)))
-        for number, (case, changed) in enumerate(SEA_CASES.items()):
-            if case not in cases:
-                continue
-            tables = sailed(
-                [changed] * trials, 3 * HOUR, seeds=[10 * k + first + 1 + number for k in seeds], sea=sea, since_s=HOUR
-            )
-            rows = [sea_trial(vessel, *one) for one in zip(references, tables, known, [case] * trials, strict=True)]
-            found = [row for row in rows if row["delay"] is not None]
-            delay = f"{np.median([row['delay'] for row in found]) / 60:.0f} min" if found else "-"
-            counts = [sum(row[key] for row in rows) for key in ("hour", "named", "likely")]
-            far = np.array([row["far"] for row in rows if row["far"] is not None])
-            inside, bias = f"{(np.abs(far) < WITHIN).sum()} of {len(far)}", f"{far.mean():+.2f}" if len(far) else "-"
-            left = 100 * np.mean([row["left"] for row in rows])
-            print(
-                f"| {sea_name} | {case} | {trials} | {sum(row['early'] for row in rows)} | "
-                f"{sum(row['said'] for row in rows)} | {len(found)} | {counts[0]} | {delay} | {counts[1]} | "
-                f"{counts[2]} | {inside} | {bias} | {left:.0f} % | {sum(row['plain'] for row in rows)} |",
-                flush=True,
-            )
-
-
-def sea_trial(
-    vessel: Vessel, reference: np.ndarray, table: np.ndarray, known: tuple[Any, ...], case: str
-) -> dict[str, Any]:
-    """What is said in one voyage whose ship changes after an hour."""
-    changes, noise, calibration = known
-    rules = Rules(limit=threshold(int(calibration.watched.sum()), 30.0 * DAY / calibration.stretch_s))
-    record = as_record(vessel, table)
-    if not noise.white:
-        words = {"begins_s": [0.0], "stretch_s": calibration.stretch_s, "known": noise}
-        _, noise = grams_and_noise(extended_model(vessel, record), record, changes, **words)
-    state, alarms = gone_on(
-        State.begun(calibration, time_s=0.0), vessel, record, changes, calibration, rules, begin_s=0.0, noise=noise
-    )
-    alarms = alarms if state.alarm is None else [*alarms, state.alarm]
-    late = [alarm for alarm in alarms if alarm.time_s >= HOUR]
-    last = [alarm for alarm in late if alarm.time_s == late[0].time_s][-1] if late else None
-    names = names_of(last, changes) if last else []
-    before, after = steady_ratios(reference), steady_ratios(table[HOUR : 2 * HOUR])
-    spread = before.std(ddof=1) * np.sqrt(1 / len(before) + 1 / max(len(after), 1))
-    plain = bool(len(after)) and abs(after.mean() - before.mean()) > 4 * spread
-    return {
-        "early": any(alarm.time_s < HOUR for alarm in alarms),
-        "said": bool(said_of_reference(calibration).any()),
-        "delay": last.time_s - HOUR if last else None,
-        "hour": bool(last and last.time_s <= 2 * HOUR),
-        "named": bool(names and names[0] in EXPECTED[case]),
-        "likely": bool(set(names) & set(EXPECTED[case])),
-        "far": error_of(last, changes[last.change], case) if last and sized(last, changes, case) else None,
-        "left": state.left_out_s / max(state.left_out_s + state.judged_s, 1.0),
-        "plain": plain,
-    }
-
-
-def names_of(alarm: Alarm, changes: tuple[Change, ...]) -> list[str]:
-    """What an alarm says it may be: pushes that explain the data better, the change, and what explains them as well."""
-    better = [f"push:{'uvr'[axis]}" for axis, gain in alarm.pushes if gain > AS_LIKELY]
-    as_well = [f"push:{'uvr'[axis]}" for axis, gain in alarm.pushes if gain <= AS_LIKELY]
-    return [*better, *(changes[k].effect for k in (alarm.change, *alarm.as_likely)), *as_well]
-
-
-def sized(alarm: Alarm, changes: tuple[Change, ...], case: str) -> bool:
-    """Whether the change that is named is the one that was made, so that its size may be judged."""
-    return changes[alarm.change].effect in EXPECTED[case]
-
-
-def error_of(alarm: Alarm, change: Change, case: str) -> float:
-    """By how much a size was told too large, in its standard errors; below zero: too small."""
-    true = true_size(change, case) / change.size
-    return float((alarm.value - true) / alarm.std * np.sign(true))
-
-
-def true_size(change: Change, case: str) -> float:
-    """The size of a case in the unit of an effect."""
-    share = {"gain": -0.08, "theta:X_nn": -0.08, "theta:X_uu": 0.15, "offset:rudder": np.deg2rad(2.0), "gyro": -0.03}
-    size = share.get(change.effect, 0.12)
-    return float(size * change.whole if change.effect.startswith("theta:") else size)
-
-
 def year(days: int) -> None:
     """A year at 1 Hz as a stream: a day's voyage again and again, with times that go on."""
     with tempfile.TemporaryDirectory() as folder:
@@ -487,21 +326,9 @@ if __name__ == "__main__":
     parser.add_argument("--days", type=float, default=30.0)
     parser.add_argument("--year", type=int, nargs="?", const=365, help="days of it")
     parser.add_argument("--ports", action="store_true", help="loads that change in port")
-    parser.add_argument("--sea", action="store_true", help="another ship on autopilot in a slight sea")
-    parser.add_argument("--calm", action="store_true", help="the same without waves")
-    parser.add_argument("--white", action="store_true", help="of these, without a model of the noise in stretches")
     parser.add_argument("--weather", action="store_true", help="weathers beyond the reference")
-    every = {**dict(SEAS), "calm": CALM, **OTHER_SEAS}
-    parser.add_argument("--seas", nargs="+", choices=every, help="of --sea, these")
-    parser.add_argument("--cases", nargs="+", choices=SEA_CASES, default=list(SEA_CASES), help="of --sea, these")
-    parser.add_argument("--seed", type=int, default=5000, help="of --sea, the first")
     asked = parser.parse_args()
-    if asked.sea or asked.calm or asked.seas:
-        names = asked.seas or (["calm"] if asked.calm else [name for name, _ in SEAS])
-        sea_study(
-            asked.trials, [(name, every[name]) for name in names], asked.cases, first=asked.seed, white=asked.white
-        )
-    elif asked.weather:
+    if asked.weather:
         weathers(asked.trials)
     elif asked.year:
         year(asked.year)
