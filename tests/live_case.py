@@ -9,6 +9,8 @@ import numpy as np
 
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import Event, Inputs, Row, Setup, State, after_row, beginning, step_list
+from plain_craft import CONSTANTS_S as PLAIN_CONSTANTS_S
+from plain_craft import RATE_PER_RAD, Craft, sailed, steady_speed
 from step_case import INPUTS
 
 SHORT = ((4.0, 0.1), (8.0, 0.1), (12.0, 0.1), (8.0, 0.1), (8.0, 0.3), (8.0, 0.1))
@@ -85,3 +87,17 @@ def rows_csv(rows: Sequence[Row]) -> str:
 def list_csv(steps: Sequence[tuple[float, float]] = SHORT) -> str:
     """As a list of steps."""
     return "\n".join(["n1_rps,rudder1_rad", *(f"{n!r},{d!r}" for n, d in steps)]) + "\n"
+
+
+def errors_of_watched(seed: int, craft: Craft) -> np.ndarray:
+    """(k, 2) errors of U and r of the steps that count, in their standard errors; the crew keeps to a timetable."""
+    wanted = step_list(INPUTS, np.array(craft.steps), controls_of(INPUTS))
+    setup = Setup(steps=wanted, constants_s=PLAIN_CONSTANTS_S, learn_s=0.8 * craft.hold_s)
+    told, state = sailed(seed, craft), beginning(setup)
+    columns = ("time_s", "u_mps", "v_mps", "r_radps", "n1_rps", "rudder1_rad")
+    for time_s, u, v, r, *commands in np.column_stack([told[name] for name in columns]).tolist():
+        state, _ = after_row(state, Row(time_s=time_s, motion=(u, v, r), inputs=tuple(commands)), setup)
+    after = {step.number: step.after for step in wanted.steps}
+    n, rudder = np.array([after[one.number] for one in state.finished]).T
+    truth = np.column_stack([steady_speed(n, rudder, craft), RATE_PER_RAD * rudder])
+    return (np.array([one.state for one in state.finished]) - truth) / [one.state_std for one in state.finished]

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_page import Moment, MonitorContent
-from expdesign.export.monitor_page.content import sentences
+from expdesign.export.monitor_page import Moment, MonitorContent, monitor_document
+from expdesign.export.monitor_page.content import monitor_json, sentences
+from expdesign.export.pages import document_html
 from expdesign.monitoring import (
+    AS_LIKELY,
     Alarm,
     Calibration,
     Change,
     Grams,
+    RollWatch,
     Rules,
     State,
     Step,
@@ -32,6 +35,7 @@ from expdesign.monitoring.alarms import beside_baseline
 from expdesign.monitoring.calibration import FEWEST_STRETCHES, SPARE
 from expdesign.monitoring.evidence import stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
+from expdesign.monitoring.rolled import RollEvent
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
 
 NOISE = np.array([1.0, np.inf, np.inf, np.inf])
@@ -354,6 +358,75 @@ def test_no_statistic_above_the_threshold_stands_beside_no_alarm(calibration: Ca
             assert dismissed == ("passed without an alarm" in words)
             assert (largest > limit or undecided or dismissed) == any(step.statistic > limit for step in steps)
     assert passed
+
+
+CHANGED = re.compile("(ship|weather) is another|ship has changed|no longer the ship")
+AS_BEFORE = re.compile("the ship is the one of the reference")
+ROLLED = RollEvent(
+    since_s=0.0, time_s=9.0, after_call=False, settled=True, p_value=0.0, causes=(), sizes=(), stds=(), load=None,
+    others=(), values={}, righting_nm=(1.0, 1.0), mass_kg=1.0,
+)  # fmt: skip
+
+
+def told_of(content: MonitorContent) -> tuple[str, str, str]:
+    """In sentences, as the terminal has them, on the page and in the file."""
+    page = document_html(monitor_document(content))
+    return " ".join(sentences(content)), page, monitor_json(content, [])
+
+
+def states(loaded: Calibration) -> Iterator[tuple[str, MonitorContent]]:
+    """What a watch may come to, and what it is told of."""
+    limit = threshold(CHANGES, 1e4)
+
+    def content(grams: Grams) -> MonitorContent:
+        told = content_of(loaded, watched(loaded, grams, limit, port_s=6 * HOUR), limit)
+        effects = ("inertia:u", "inertia:v", "inertia:r", "gain")
+        return replace(told, changes=tuple(map(lambda one, name: replace(one, effect=name), told.changes, effects)))
+
+    same = content(drawn_grams(200, seed=4))
+    noisy = drawn_columns(100, seed=7)
+    noisy[40:70, :, -1] += 8.0 * np.random.default_rng(0).standard_normal((30, 20))
+    squall = drawn_columns(70, seed=110, quick=0.5)
+    squall[50:54, :, -1] += 2.0 * squall[50:54, :, 0]
+    alarm = content(drawn_grams(200, seed=6, change=np.array([0.0, 0.0, 3.0, 0.0]), since=60))
+    yield "same", same
+    yield "partly beyond the reference", content(grams_from(noisy))
+    yield "beyond the reference", content(drawn_grams(300, seed=80, quick=3.0))
+    yield "too short", content(drawn_grams(2, seed=4))
+    for count in (53, 54, 55, 70):
+        yield f"squall, {count}", content(grams_from(squall[:count]))
+    yield "another load", content(with_call(20, LOAD, SAME))
+    for call in (True, False):
+        event = replace(ROLLED, after_call=call)
+        yield f"rolls otherwise, {call}", replace(same, roll=RollWatch(judged_s=HOUR, events=(event,)))
+    yield "rolls as before", replace(same, roll=RollWatch(judged_s=HOUR))
+    yield "alarm", alarm
+    for gain in (0.0, 2.0 * AS_LIKELY):
+        pushed = replace(alarm.found[-1], pushes=((2, gain),))
+        yield f"alarm or a push, {gain}", replace(alarm, alarms=(pushed,), state=replace(alarm.state, alarm=None))
+
+
+@pytest.mark.usefixtures("undrawn_here")
+def test_the_ship_is_another_only_by_an_alarm_and_the_same_only_where_nothing_else_is_said(loaded: Calibration) -> None:
+    alarms = same = 0
+    for name, content in states(loaded):
+        found, roll = bool(content.found), content.roll is not None and bool(content.roll.events)
+        beyond = content.state.left_out_s > content.state.judged_s
+        for text in told_of(content):
+            assert bool(CHANGED.search(text)) == found, name
+            assert ("For the cause, give the rows since then" in text) == found, name
+            if found or roll or beyond or "another load" in text or content.state.undecided_s:
+                assert not AS_BEFORE.search(text), name
+            assert not ("She rolls as in the reference" in text and "She rolls otherwise" in text), name
+            same += bool(AS_BEFORE.search(text))
+        alarms += found
+        if found and content.found[-1].pushes:
+            told, page, _ = told_of(content)
+            first = "weather or the ship" if content.found[-1].pushes[0][1] > AS_LIKELY else "ship or the weather"
+            assert f"the {first} is another: {'a steady push' if first[0] == 'w' else 'parameter p2'}" in told
+            assert f"the {first} is another" in page
+    assert alarms >= 3
+    assert same >= 6
 
 
 def test_a_size_that_was_known_stays_known_while_it_is_refined(calibration: Calibration) -> None:

@@ -133,6 +133,23 @@ def test_a_stream_tells_what_a_file_does_and_a_broken_off_watch_goes_on(
             assert one == other
 
 
+def test_speeds_are_over_ground_and_are_called_so(sailed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    header, *lines = (sailed / "trial.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines]
+    with_current = [",".join([time_s, repr(float(u) + 0.5), *rest]) for time_s, u, *rest in rows]
+    (sailed / "current.csv").write_text("\n".join([header, *with_current]) + "\n")
+    found = {}
+    for name in ("trial", "current"):
+        assert main(words(sailed, f"{name}.csv", "--out", str(sailed / name))) == 0
+        told = capsys.readouterr().out
+        assert told.count(" m/s") == told.count(" m/s over ground") > 5
+        assert "Speeds U of steps are over ground" in told
+        found[name] = json.loads((sailed / name / "watch-steps.json").read_text())
+        assert found[name]["U_is"] == "over ground"
+    speeds = [[one["U_mps"] for one in found[name]["finished"]] for name in ("trial", "current")]
+    assert np.subtract(speeds[1], speeds[0]) == pytest.approx(0.5, abs=1e-6)
+
+
 def test_what_is_left_of_a_broken_trial_is_a_list_of_steps_with_their_numbers(sailed: Path) -> None:
     text = (sailed / "trial.csv").read_text().splitlines(keepends=True)
     (sailed / "part.csv").write_text("".join(text[: 3 * len(text) // 4]))

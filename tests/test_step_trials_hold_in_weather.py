@@ -10,6 +10,7 @@ import pytest
 from expdesign.errors import NotInformative
 from expdesign.step_trials import StepTrial, controls_of, identify_steps
 from expdesign.step_trials.noise import mean_errors
+from live_case import errors_of_watched
 from plain_craft import RATE_PER_RAD, ROUND, SPEED_PER_RPS, Craft, record
 
 ASTERN = ((4.0, 0.2), (-4.0, 0.2), (-7.0, 0.2), (4.0, 0.2))
@@ -46,6 +47,12 @@ def test_intervals_of_steady_states_hold_in_gusts_and_in_a_current() -> None:
                 z = (one.plateau.state - [SPEED_PER_RPS * n, RATE_PER_RAD * rudder]) / one.plateau.std
                 inside += (np.abs(z) < 1.96).tolist()
         assert np.mean(inside) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / len(inside))
+
+
+def test_intervals_of_a_trial_that_is_watched_hold_in_waves() -> None:
+    """Readings of a step are correlated by waves and count as fewer: as independent ones, eight of ten held."""
+    inside = np.abs(np.concatenate([errors_of_watched(seed, Craft()) for seed in range(3)])) < 1.96
+    assert np.mean(inside) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / inside.size)
 
 
 def test_a_current_is_found_and_taken_off_where_the_heading_is_known() -> None:

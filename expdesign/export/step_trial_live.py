@@ -35,7 +35,7 @@ def event_line(event: Event, steps: StepList) -> str:
 def _event_words(event: Event, steps: StepList) -> str:
     step = f"step {event.step.number}" if event.step is not None else "this hold"
     commands = inputs_text(event.inputs, steps) if event.inputs else ""
-    at = "" if event.state is None else f"U {event.state[0]:.2f} m/s, r {event.state[1]:.3f} rad/s"
+    at = "" if event.state is None else f"U {event.state[0]:.2f} m/s over ground, r {event.state[1]:.3f} rad/s"
     texts = {
         "learnt": f"the noise is learnt at {1 / event.seconds if event.seconds else 0:.3g} samples a second",
         "begun": f"{step} begins: {commands}" if event.step is not None else f"on the way to a step: {commands}",
@@ -112,6 +112,7 @@ def live_json(content: LiveContent) -> str:
                 }
                 for one in state.finished
             ],
+            "U_is": "over ground",
             "to_do": _steps_json(state.left, content.steps),
             "left_out": _steps_json(state.left_out, content.steps),
             "expected_time_constants_s": dict(zip("Ur", content.constants_s, strict=True)),
@@ -141,6 +142,8 @@ def live_sentences(content: LiveContent) -> list[str]:
     """The findings."""
     state, count = content.state, len(content.steps.steps)
     found = [f"Steps that count: {len(state.finished)} of {count}."]
+    if state.finished:
+        found.append("Speeds U of steps are over ground: a current is in them, which identify-steps finds from turns.")
     if state.left:
         unsailed = sum(not step.attempts for step in state.left)
         found.append(f"{len(state.left)} to be sailed: {unsailed} not begun, {len(state.left) - unsailed} to repeat.")

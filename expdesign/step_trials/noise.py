@@ -97,7 +97,7 @@ def _continued(first: Array, count: int) -> Array:
     by = scipy.linalg.solve_toeplitz(row, first[1:])
     found = list(np.clip(first, -0.999, 1.0))
     while len(found) < count:
-        found.append(float(np.clip(by @ found[-1 : -len(by) - 1 : -1], -1.0, 1.0)))
+        found.append(min(max(float(by @ found[-1 : -len(by) - 1 : -1]), -1.0), 1.0))
     return np.asarray(found[:count])
 
 
@@ -105,7 +105,7 @@ def _hidden(shape: Array, count: int) -> float:
     """Variance of the mean of so many values, over theirs."""
     lags = np.arange(1, count)
     total = 1.0 + 2.0 * float((1.0 - lags / count) @ shape[1:count])
-    return float(np.clip(total / count, 1e-3 / count, 0.9))
+    return min(max(total / count, 1e-3 / count), 0.9)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -139,22 +139,35 @@ def _with_common_noise(
         return found
     ends = [slice(holds[place].end - part.samples, holds[place].end) for place, part in there]
     own = [batches[holds[place].batch] for place, _ in there]
-    columns = [[batch.state[end, state] for batch, end in zip(own, ends, strict=True)] for state in (0, 1)]
-    speed, rate = (mean_errors(parts) for parts in columns)
+    parts = with_errors([part for _, part in there], [batch.state[end] for batch, end in zip(own, ends, strict=True)])
     sways = [batch.sway[end] for batch, end in zip(own, ends, strict=True)]
     known = all(bool(np.isfinite(part).all()) for part in sways)
     sway = mean_errors(sways) if known else [None] * len(there)
-    for (place, part), batch, u, r, v in zip(there, own, speed, rate, sway, strict=True):
+    for (place, _), part, batch, v in zip(there, parts, own, sway, strict=True):
         drift = float(part.course @ batch.current_covariance @ part.course)
         across = np.array([-part.course[1], part.course[0]])
         aside = float(across @ batch.current_covariance @ across)
         found[place] = replace(
             part,
-            std=np.array([math.hypot(u.std, math.sqrt(drift)), r.std]),
+            std=np.array([math.hypot(part.std[0], math.sqrt(drift)), part.std[1]]),
             sway_std=part.sway_std if v is None else math.hypot(v.std, math.sqrt(aside)),
-            density=np.array([u.density, r.density]),
         )
     return found
+
+
+def with_errors(parts: Sequence[Plateau], states: Sequence[Array], *, beside: Sequence[Array] = ()) -> list[Plateau]:
+    """Plateaus with standard errors by the noise of all of them; samples correlated by waves count as fewer.
+
+    Args:
+        parts: the plateaus.
+        states: (k, 2) U and r that each is the mean of.
+        beside: the same of other plateaus, whose noise is counted, too.
+    """
+    both = [mean_errors([state[:, column] for state in (*beside, *states)])[len(beside) :] for column in (0, 1)]
+    return [
+        replace(part, std=np.array([u.std, r.std]), density=np.array([u.density, r.density]))
+        for part, u, r in zip(parts, *both, strict=True)
+    ]
 
 
 def plateau(batch: Sailed, begin: int, end: int) -> Plateau:

@@ -4,6 +4,7 @@
 
 steps: shares of 95 % intervals that hold, in gusts and in a current; hysteresis found; holds astern; halves.
 holds: at 1 Hz, shares of trials with a model when held for as long as there is, and as is said to do.
+watch: shares of 95 % intervals that hold while a trial is sailed, in calm water, waves and gusts.
 roll: loads inside their intervals, and trusted, in calm water, waves, with other damping, and sensors out of place.
 """
 
@@ -22,12 +23,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from expdesign.errors import ExpdesignError
 from expdesign.step_trials import StepTrial, controls_of, identify_steps
+from live_case import errors_of_watched
 from plain_craft import CONSTANTS_S, RATE_PER_RAD, ROUND, Craft, record, steady_speed
 from plain_roller import Sea, deviations, estimated, height_deviations
 
 LEVELS = tuple((n, a) for a in (0.15, 0.3) for n in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 12.0, 10.0, 8.0, 6.0, 4.0))
 ASTERN = ((4.0, 0.2), (-4.0, 0.2), (-7.0, 0.2), (-4.0, 0.2), (4.0, 0.2))
 COVERED = {"calm": Craft(), "gusts": Craft(gusts_mps=0.08), "current of 0.3 m/s": Craft(current_mps=0.3, hold_s=80.0)}
+WATCHED = {"calm": Craft(waves_mps=0.0), "waves": Craft(), "gusts": Craft(gusts_mps=0.08)}
 SEAS = {
     "calm": Sea(),
     "calm, rudder by the clock, damping 8 % by the square": Sea(zigzag_s=12.0, quadratic=0.08),
@@ -141,6 +144,20 @@ def holds(seeds: range) -> Iterator[tuple[str, str]]:
         yield f"1 Hz, holds of {hold_s:g} s", f"a model in {first} of {len(seeds)}{said}"
 
 
+def _watched(seeds: range, craft: Craft) -> str:
+    """States of the steps that count."""
+    errors = np.concatenate([errors_of_watched(seed, craft) for seed in seeds])
+    (u, r), spread = 100 * np.mean(np.abs(errors) < 1.96, axis=0), np.sqrt(np.mean(np.square(errors), axis=0))
+    steps = len(seeds) * (len(craft.steps) - 1)
+    return f"{len(errors)} of {steps} count; inside U {u:.0f} %, r {r:.0f} %; rms {spread[0]:.2f}, {spread[1]:.2f} std"
+
+
+def watch(seeds: range) -> Iterator[tuple[str, str]]:
+    """Rows of trials that are watched while they are sailed."""
+    for name, craft in WATCHED.items():
+        yield f"watched, {name}", _watched(seeds, craft)
+
+
 def roll(seeds: range, only: str = "") -> Iterator[tuple[str, str]]:
     """Rows of roll trials; intervals of two standard deviations where there is no profile."""
     for name, sea in SEAS.items():
@@ -167,7 +184,7 @@ def roll(seeds: range, only: str = "") -> Iterator[tuple[str, str]]:
         yield name, f"trusted {trusted} of {len(seeds)}, load inside in {inside}{rms}; {said}"
 
 
-STUDIES = {"steps": steps, "holds": holds, "roll": roll}
+STUDIES = {"steps": steps, "holds": holds, "watch": watch, "roll": roll}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)

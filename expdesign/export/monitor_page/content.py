@@ -109,7 +109,7 @@ def _sentences(content: MonitorContent) -> Iterator[str]:
     for alarm in found:
         yield _alarm(content, alarm)
     if found:
-        yield f"Alarms are raised {rate}. For the cause, give the rows since the change to expdesign diagnose."
+        yield f"Alarms are raised {rate}. For the cause, give the rows since then to expdesign diagnose."
     yield from _passed(content)
     yield from _beyond(content)
     if state.shoal_s and not (left_out > HALF and state.shoal_s > HALF * state.left_out_s):
@@ -145,7 +145,9 @@ def _no_alarm(content: MonitorContent, rate: str) -> str:
             f"{no_alarm}, which is too short to notice a change of a size that is watched for: the first would take "
             f"{hours(soonest_s)}. {numbers}"
         )
-    return f"{no_alarm}: the ship is the one of the reference, {rate}. {numbers}"
+    otherwise = any(carries_another(call).any() for call in content.calls) or (content.roll and content.roll.events)
+    same = "" if otherwise else ": the ship is the one of the reference"
+    return f"{no_alarm}{same}, {rate}. {numbers}"
 
 
 def _passed(content: MonitorContent) -> Iterator[str]:
@@ -190,8 +192,13 @@ def few(names: Sequence[str]) -> str:
     return f"{', '.join(names[:MOST_NAMES])} and {len(names) - MOST_NAMES} more"
 
 
+def carries_another(call: Call) -> NDArray[np.bool_]:
+    """(m,) what a port call changed of the load, clearly enough to be said."""
+    return np.asarray(np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE))
+
+
 def _call(content: MonitorContent, call: Call) -> str:
-    clear = np.abs(call.value) > np.maximum(CLEAR_LOAD * call.std, LARGE)
+    clear = carries_another(call)
     text = f"A port call until {when(call.time_s)} took {hours(call.stay_s)}. "
     if not clear.any():
         return text + "The ship carries the same load afterwards, as far as the data show."
@@ -201,23 +208,22 @@ def _call(content: MonitorContent, call: Call) -> str:
         for i, change in ((i, content.changes[i]) for i in clearest.tolist())
         if clear[i]
     ]
-    return text + f"The ship carries another load afterwards, which raises no alarm: {few(parts)}."
+    return f"{text}She carries another load afterwards, as far as the data show, which raises no alarm: {few(parts)}."
 
 
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     statistic, limit = told_apart(alarm.statistic, content.limit)
-    weather, push = "", ""
+    own, who = f"{change.words} by {size_in_words(content, alarm)}", "the ship is another"
     if alarm.pushes:
-        better = "better" if max(gain for _, gain in alarm.pushes) > AS_LIKELY else "as well"
-        weather = " or the weather"
-        push = (
-            f", or a steady push in {' or '.join(pushed(content, alarm))} by wind or current, which explains the data "
-            f"{better}"
-        )
+        push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
+        if pushed(content, alarm, beyond=AS_LIKELY):
+            own, who = f"{push}, or, explaining the data less well, {own}", "the weather or the ship is another"
+        else:
+            own, who = f"{own}, or {push}, which explains the data as well", "the ship or the weather is another"
     text = (
-        f"Since {when(alarm.since_s)} the ship{weather} is another: {change.words} by {size_in_words(content, alarm)}"
-        f"{push}. The alarm came at {when(alarm.time_s)}, with the statistic {statistic} above the threshold {limit}."
+        f"Since {when(alarm.since_s)} {who}: {own}. The alarm came at {when(alarm.time_s)}, with the statistic "
+        f"{statistic} above the threshold {limit}."
     )
     if alarm.as_likely:
         others = few([content.changes[number].words for number in alarm.as_likely])
@@ -232,11 +238,11 @@ def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     return text
 
 
-def pushed(content: MonitorContent, alarm: Alarm) -> list[str]:
-    """Equations in which a steady push would do what the change does, the likeliest first."""
+def pushed(content: MonitorContent, alarm: Alarm, *, beyond: float = -np.inf) -> list[str]:
+    """Equations in which a steady push would do what the change does, the likeliest first; by more than `beyond`."""
     named = {change.effect: change for change in content.changes}
     axes = [EQUATIONS[name] for name in EQUATIONS if f"inertia:{name}" in named]
-    return [axes[axis] for axis, _ in sorted(alarm.pushes, key=lambda one: -one[1])]
+    return [axes[axis] for axis, gain in sorted(alarm.pushes, key=lambda one: -one[1]) if gain > beyond]
 
 
 def said_of_reference(calibration: Calibration) -> NDArray[np.bool_]:
@@ -382,5 +388,6 @@ def _alarm_entry(content: MonitorContent, alarm: Alarm) -> dict[str, object]:
         "in_words": f"{change.words} by {size_in_words(content, alarm)}",
         "as_likely": [content.changes[number].effect for number in alarm.as_likely],
         "as_likely_pushes": pushed(content, alarm),
+        "likelier_pushes": pushed(content, alarm, beyond=AS_LIKELY),
         "settled": alarm.settled,
     }

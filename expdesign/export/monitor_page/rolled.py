@@ -24,9 +24,10 @@ def _sentences_roll(watch: RollWatch, days: float) -> Iterator[str]:
         yield f"Roll, [roll] of the vessel file, was not judged{why}."
         return
     if not watch.alarms:
+        same = "No alarm of roll" if watch.events else "She rolls as in the reference,"
         yield (
-            f"She rolls as in the reference, in {hours(watch.judged_s)} that were judged, with at most one false "
-            f"alarm of any kind in {days:g} days on average."
+            f"{same} in {hours(watch.judged_s)} that were judged, with at most one false alarm of any kind in "
+            f"{days:g} days on average."
         )
     yield from (_event(event) for event in watch.events[-SHOWN:])
     if watch.left_out_s > watch.judged_s:

@@ -11,6 +11,7 @@ import numpy as np
 from expdesign.step_trials.live.step_list import Inputs, Listed
 from expdesign.step_trials.samples import Plateau
 from expdesign.step_trials.steady_state import RatioTest, Watched
+from expdesign.values import Array
 
 LEARNT, BEGUN, STEADY, OVER, BAD, LEFT_OUT, GAP, UNLISTED, DONE = (
     "learnt", "begun", "steady", "over", "bad", "left out", "gap", "unlisted", "done",
@@ -72,6 +73,7 @@ class State:
     held: Held | None = None  # the present commands, None before the first row
     # steady state under the commands before, and these; None where there was none
     before: tuple[Inputs, Plateau] | None = None
+    steady: tuple[Array, ...] = ()  # (k, 2) U and r of the steady parts of the latest holds, which show the noise
     skipped: int = 0  # rows whose time did not increase
 
 
@@ -111,6 +113,7 @@ def restored_state(table: Mapping[str, Any]) -> State:
         watched=tuple(Watched(**{**one, "part": tuple(one["part"])}) for one in table["watched"]),
         held=None if held is None else _held(held),
         before=None if before is None else (_inputs(before[0]), _plateau(before[1])),
+        steady=tuple(np.array(part, dtype=float) for part in table["steady"]),
         skipped=table["skipped"],
     )
 

@@ -17,7 +17,7 @@ from expdesign.step_trials.holds import CHANNELS, Hold, Sailed, changed_words, c
 from expdesign.step_trials.live import values
 from expdesign.step_trials.live.step_list import Inputs, Listed, StepList, in_sequence
 from expdesign.step_trials.live.values import Event, Finished, Held, Row, State
-from expdesign.step_trials.samples import Plateau, plateau, step_sample
+from expdesign.step_trials.samples import Plateau, plateau, step_sample, with_errors
 from expdesign.step_trials.steady_state import (
     LEAST_MEMORY_SAMPLES,
     STEADY,
@@ -37,23 +37,26 @@ SETTLING_SHARE = 1 / 3  # beginning of the first hold that is not learnt from
 LEAST_PLATEAU_S = 10.0  # time that a steady state is held, for its mean
 LONGEST_TURN_S = 60.0  # a whole turn is made where it takes no longer, which takes a current out of the mean
 MOST_ATTEMPTS = 3  # at one step of a trial that is being sailed
+KEPT_HOLDS = 20  # the latest, whose noise gives the errors of means
 GAP_SAMPLE_TIMES = 1.5  # interval, in sample times, from which a trial that is being sailed has a gap
 
 
-def plateau_of(held: Held, sample_time_s: float, steps: StepList) -> Plateau:
-    """Mean of the rows since a hold has been steady."""
+def plateau_of(held: Held, state: State, steps: StepList) -> Plateau:
+    """Mean of the rows since a hold has been steady, its errors by the noise of all that were."""
     assert held.steady is not None
-    return plateau(_sailed(held, sample_time_s, steps), held.steady, len(held.rows))
+    batch = _sailed(held, state.sample_time_s, steps)
+    own = plateau(batch, held.steady, len(held.rows))
+    found = with_errors([own], [batch.state[-own.samples :]], beside=state.steady)[0]
+    # For a time constant with a dead time of its own, the noise would refuse steps that all together make good.
+    return replace(found, density=own.density)
 
 
-def judged(
-    held: Held, before: tuple[Inputs, Plateau] | None, sample_time_s: float, steps: StepList
-) -> tuple[Plateau, str]:
+def judged(held: Held, state: State, steps: StepList) -> tuple[Plateau, str]:
     """Plateau of a hold, and why its step does not count; "" where it does, and for commands that are only gone to."""
     assert held.steady is not None
     assert held.inputs is not None
-    batch = _sailed(held, sample_time_s, steps)
-    after = plateau(batch, held.steady, len(held.rows))
+    before, after = state.before, plateau_of(held, state, steps)
+    batch = _sailed(held, state.sample_time_s, steps)
     if held.step is None:
         return after, ""
     if held.gap_s:
@@ -217,8 +220,11 @@ def _ended(state: State, held: Held, row: Row, setup: Setup) -> StateAndEvents:
         state, events = _over(state, held, setup, quiet=True)
     elif not held.over:
         state, events = _failed(state, held, "the commands changed before it was steady", row.time_s, setup, quiet=True)
-    steady = None if held.steady is None else plateau_of(held, state.sample_time_s, setup.steps)
-    return replace(state, before=None if steady is None else (held.inputs, steady)), events
+    if held.steady is None:
+        return replace(state, before=None), events
+    steady = plateau_of(held, state, setup.steps)
+    known = (*state.steady, _states(held.rows[-steady.samples :]))[-KEPT_HOLDS:]
+    return replace(state, before=(held.inputs, steady), steady=known), events
 
 
 def _settled(state: State, setup: Setup) -> StateAndEvents:
@@ -288,7 +294,7 @@ def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> Sta
     state = replace(state, held=held)
     now = held.rows[-1].time_s
     assert held.steady is not None
-    plateau, why = judged(held, state.before, state.sample_time_s, setup.steps)
+    plateau, why = judged(held, state, setup.steps)
     if why:
         return _failed(state, held, why, now, setup, quiet=quiet)
     u, r = plateau.state.tolist()
