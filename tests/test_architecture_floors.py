@@ -213,6 +213,7 @@ def test_verification_imports_nothing_of_the_planner_but_its_values() -> None:
     assert set(imports) == {("plan", "values")}
 
 
+@pytest.mark.thorough
 def test_no_test_imports_from_another_test_file() -> None:
     tests = sorted(Path(__file__).parent.glob("*.py"))
     imports = {(path.name, name) for path in tests for name in imported_names(path) if name.startswith("test_")}

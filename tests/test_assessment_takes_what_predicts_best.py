@@ -257,6 +257,7 @@ def test_with_noise_of_the_sensors_alone_starts_are_estimated_as_well_as_the_dat
     assert problem.weight[0].max() == pytest.approx(problem.weight[1].max(), rel=0.3)  # third differences of 480
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("force", [0.0, 2e-3])
 def test_an_unseen_run_is_predicted_as_well_as_by_least_squares(force: float) -> None:
     """Judged by runs that no part of the program has seen; the noise is a tenth of the motion."""
@@ -277,6 +278,7 @@ def test_an_unseen_run_is_predicted_as_well_as_by_least_squares(force: float) ->
     assert np.mean(gains) < 0.01
 
 
+@pytest.mark.thorough
 def test_output_error_that_predicts_worse_gives_way_to_its_start_and_says_so() -> None:
     """Forces without memory and exact sensors: least squares is efficient, and simulations of whole runs are not."""
     fallen = []
@@ -293,6 +295,7 @@ def test_output_error_that_predicts_worse_gives_way_to_its_start_and_says_so() -
     assert all("output error starts from it" in why for why in fallen)
 
 
+@pytest.mark.thorough
 def test_a_method_without_an_answer_costs_itself_only_and_says_what_helps(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

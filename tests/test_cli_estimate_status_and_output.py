@@ -88,6 +88,7 @@ def test_bad_data_are_one_line_and_no_file(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("method", ["iv", "oe"])
 def test_a_parameter_without_information_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], method: str
@@ -106,6 +107,7 @@ def test_a_parameter_without_information_is_named(
     assert main([*arguments, "--fixed", "Y_mu"]) == 0
 
 
+@pytest.mark.thorough
 def test_the_table_holds_what_the_file_holds(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         main(["estimate", str(run), "--vessel", str(MODEL_SHIP), "--out", str(tmp_path), "--method", "ls", "iv"]) == 0
@@ -124,6 +126,7 @@ def test_the_table_holds_what_the_file_holds(run: Path, tmp_path: Path, capsys: 
     assert f"Open {tmp_path}/estimate.html in a browser." in lines
 
 
+@pytest.mark.thorough
 def test_json_says_the_same_without_a_table(told: tuple[Path, dict]) -> None:
     folder, summary = told
     found = json.loads((folder / "estimate.json").read_text(encoding="utf-8"))
@@ -134,6 +137,7 @@ def test_json_says_the_same_without_a_table(told: tuple[Path, dict]) -> None:
         assert entry["fit"] == found[method]["fit"]
 
 
+@pytest.mark.thorough
 def test_the_same_data_give_the_same_files(told: tuple[Path, dict], tmp_path: Path) -> None:
     folder, _ = told
     odd = folder.with_name("run <b> & co.csv")
@@ -142,6 +146,7 @@ def test_the_same_data_give_the_same_files(told: tuple[Path, dict], tmp_path: Pa
         assert path.read_bytes() == (tmp_path / path.name).read_bytes()
 
 
+@pytest.mark.thorough
 def test_results_go_to_runs_by_the_name_of_the_first_file(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

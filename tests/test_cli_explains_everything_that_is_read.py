@@ -87,6 +87,7 @@ def shown_help(command: str, capsys: pytest.CaptureFixture[str]) -> str:
     return " ".join(re.sub("[│╭╮╰╯─]", " ", capsys.readouterr().out).split())
 
 
+@pytest.mark.thorough
 def test_help_shows_every_text_as_it_is_written(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -52,6 +52,7 @@ def test_a_recorded_zigzag_stands_beside_the_models(tmp_path: Path) -> None:
     assert "http" not in page
 
 
+@pytest.mark.thorough
 def test_the_readmes_commands_for_indices_and_routes_run_as_they_stand(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

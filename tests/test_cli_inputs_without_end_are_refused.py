@@ -101,6 +101,7 @@ def test_more_simulated_trials_than_end_in_a_day_are_refused(capsys: pytest.Capt
         assert f"'{option}': Input should be less than or equal to 100000" in line
 
 
+@pytest.mark.thorough
 def test_a_route_of_very_many_waypoints_is_checked_in_linear_time() -> None:
     """So many that looking for each among all would take minutes; repeated ids are still found."""
     root = etree.fromstring(find_format("rtz").write(build_bridge_route(case.planned())))

@@ -325,6 +325,7 @@ def test_help_loads_no_solver() -> None:
     assert not {"casadi", "cvxpy", "ompl", "matplotlib", "scipy", "numpy"} & loaded
 
 
+@pytest.mark.thorough
 def test_a_mistyped_key_is_told_before_solvers_load_and_processes_start(tmp_path: Path) -> None:
     scenario = copied(tmp_path, "story", {"total_s = 720.0": "totl_s = 720.0"})
     calls = [(command, str(scenario)) for command in ("run", "plan", "durations", "score")]

@@ -41,6 +41,7 @@ def test_told_apart_is_the_lead_of_a_gaussian():
     assert (lead >= 5.0).mean() == pytest.approx(0.9, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_a_design_reveals_what_it_is_asked_to(tmp_path):
     """Where the design alone gives too little, and by the foresight of its whole runs, which have other headings."""
     case = load_scenario(story(tmp_path, 'reveal = ["lever_arm"]', "reveal_sizes = {lever_arm = 0.13}"))
@@ -68,6 +69,7 @@ def told_of(floor: InformationFloor, shares: np.ndarray) -> float:
     return float(1.0 / np.trace(floor.L.T @ np.linalg.inv(M) @ floor.L) / floor.least)
 
 
+@pytest.mark.thorough
 def test_a_cause_that_cannot_be_revealed_is_refused_with_the_best_probability(tmp_path):
     case = load_scenario(story(tmp_path, 'reveal = ["gyro_scale"]', "reveal_sizes = {gyro_scale = 0.001}"))
     with pytest.raises(NoAnswer, match=r"cannot reveal gyro_scale \(factor\) at 0.1 % .*the best is [\d.]+ %"):

@@ -263,6 +263,7 @@ def test_several_numbers_are_tested_together():
         assert (expected < TUNING.level) == clear
 
 
+@pytest.mark.thorough
 def test_a_block_of_parameters_is_replaced_by_the_one_effect_behind_it(monkeypatch):
     """While a change during the trial is unknown, a heavier ship looks like a block of yaw parameters."""
     effects = {"load_r": 0.35, "change_s": 350.0, "change_gain": 0.25}
@@ -418,6 +419,7 @@ def test_candidates_that_converge_to_zero_make_room_for_the_next_best(monkeypatc
     assert remaining(()) == []
 
 
+@pytest.mark.thorough
 def test_p_values_of_a_large_effect_count_all_tests(monkeypatch):
     """Short windows give the starting points of large effects; p-values still count all tests of the round."""
     record = hidden_record("barge", seed=3, batches=4, samples=200, effects={"gain": -0.35})

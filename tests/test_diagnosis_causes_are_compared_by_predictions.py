@@ -53,6 +53,7 @@ def biased() -> tuple[ExtendedModel, Compared]:
     return compared(trial(1, faults={"heading_bias": BIAS_RAD}))
 
 
+@pytest.mark.thorough
 def test_the_hidden_cause_predicts_best_and_is_certain():
     first = biased()[1].causes[0]
     assert first.cause == "heading_bias"
@@ -60,6 +61,7 @@ def test_the_hidden_cause_predicts_best_and_is_certain():
     assert abs(first.fit.value("heading_bias") - BIAS_RAD) < 3.5 * first.fit.std("heading_bias")
 
 
+@pytest.mark.thorough
 def test_where_nothing_is_hidden_nothing_is_certain():
     """A trial has a certain cause with a chance of 2.5 % at most: two trials have none in 95 of 100."""
     assert not [item.cause for seed in range(2) for item in compared(trial(seed))[1].causes if item.is_certain]
@@ -212,6 +214,7 @@ def test_stretches_of_runs_that_differ_are_no_independent_witnesses():
     assert (np.array(plain) < 0.05).mean() > 0.3
 
 
+@pytest.mark.thorough
 def test_a_diagnosis_that_drops_what_its_search_found_names_what_predicts_best(monkeypatch):
     """However much is explained. The finding carries its gain on the same model fitted without it, and says so."""
 
@@ -238,6 +241,7 @@ def test_a_diagnosis_that_drops_what_its_search_found_names_what_predicts_best(m
     assert (found.after.fit > found.before.fit).all()
 
 
+@pytest.mark.thorough
 def test_what_no_search_found_is_not_named_where_much_is_explained(monkeypatch):
     """The search found and dropped another cause than the one that predicts best."""
     (best,) = steps_of("best").steps  # a current
@@ -249,6 +253,7 @@ def test_what_no_search_found_is_not_named_where_much_is_explained(monkeypatch):
     assert not diagnose(vessel, trial(2, faults={"heading_bias": BIAS_RAD})).findings
 
 
+@pytest.mark.thorough
 def test_a_simulation_that_explains_much_is_left_to_the_search(monkeypatch):
     monkeypatch.setattr(selecting, "compare_predictions", lambda *_: pytest.fail("causes were compared"))
     diagnose(vessel_of("coaster", relative_std=0.1), trial(3))

@@ -146,6 +146,7 @@ def test_deep_water_is_draught_over_depth_zero():
     assert error < 2e-3
 
 
+@pytest.mark.thorough
 def test_estimates_read_the_measured_depth():
     """Noise-free motion of a model that reads depth, simulated over its depths, gives its parameters back."""
     model, _ = in_shallow_water(TUG.model, GROWTH, reach=0.6, known=TUG.model)
@@ -186,6 +187,7 @@ def test_growth_found_beyond_that_of_the_file_multiplies_it():
     assert deep[0] == deep[1]
 
 
+@pytest.mark.thorough
 def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
     """Models that are unstable on their course run away over whole runs; the size of that error says nothing."""
     lost = np.full(3, -1e8)

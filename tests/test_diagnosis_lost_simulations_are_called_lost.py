@@ -33,6 +33,7 @@ def test_errors_of_simulations_that_hold_are_not_touched():
     np.testing.assert_array_equal(clipped(error, measured), error)
 
 
+@pytest.mark.thorough
 def test_a_diagnosis_says_that_the_model_diverges_and_how_it_begins():
     """Anti-damping of 0.3 per second, where the vessel file allows damping: what is fitted to short windows holds."""
     record, ship = hidden_record("barge", seed=1, batches=2, samples=150), vessel_of("barge", relative_std=0.5)

@@ -153,6 +153,7 @@ def test_of_several_parameters_the_clearest_is_drawn(clean):
     assert suspected_force(clean, item, clean.residuals.variables)[1] == "Y_v: v"
 
 
+@pytest.mark.thorough
 def test_two_findings_of_one_cause_have_a_picture_each(clean):
     items = tuple(
         finding((f"theta:{name}",), estimates=(Estimate(name=name, value=0.1, std=0.01, unit=""),))

@@ -14,6 +14,7 @@ from expdesign.diagnosis.vessel_file.reading import extended_model
 BIAS_RAD = 0.08
 
 
+@pytest.mark.thorough
 def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
     """The file has the true parameters, stated to 10 %, and eight runs of a minute tell them worse than that."""
     beside = 0

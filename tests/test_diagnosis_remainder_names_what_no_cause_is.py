@@ -105,6 +105,7 @@ def test_kinds_are_named_with_their_size(case: tuple[str, dict], words: str, siz
     assert size is None or abs(found.value - size) < 4.0 * found.std
 
 
+@pytest.mark.thorough
 def test_a_lag_that_changes_with_speed_is_named_beside_its_mean():
     """12 s at rest, 3 s less for each m/s."""
     vessel, record = trial("coaster", 0, alter=slower_at_low_speed, runs=6, samples=300)
@@ -117,6 +118,7 @@ def test_a_lag_that_changes_with_speed_is_named_beside_its_mean():
     assert found.value < -4.0 * found.std
 
 
+@pytest.mark.thorough
 def test_what_is_found_does_not_depend_on_how_many_windows_are_taken_at_once(monkeypatch):
     base = fitted(*trial("tug", 0, alter=ventilated, **SHORT))
     windows = base.linear.motion.windows
@@ -132,6 +134,7 @@ def test_what_is_found_does_not_depend_on_how_many_windows_are_taken_at_once(mon
         assert one == pytest.approx(other, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_a_term_that_no_cause_is_gets_into_the_vessel_file():
     """A yaw damping like u r |r|; the model with it simulates held-out runs better."""
     true = -1.0

@@ -101,6 +101,7 @@ def test_a_limit_of_nothing_leaves_all_causes_untried(monkeypatch: pytest.Monkey
     assert found.untried == ("further causes",)
 
 
+@pytest.mark.thorough
 def test_a_cause_stays_that_is_found_with_the_last_of_the_work(monkeypatch: pytest.MonkeyPatch):
     """The one before it becomes redundant, and no work is left to begin again without that."""
 
@@ -126,6 +127,7 @@ def test_a_cause_stays_that_is_found_with_the_last_of_the_work(monkeypatch: pyte
     assert found.untried[0] == "further causes"
 
 
+@pytest.mark.thorough
 def test_a_second_round_from_the_same_fit_costs_no_simulations():
     record = hidden_record("barge", seed=6, batches=2, samples=120, effects={"gain": -0.3})
     ship = extended_model(vessel_of("barge"), record)
@@ -142,6 +144,7 @@ def test_a_second_round_from_the_same_fit_costs_no_simulations():
     assert costs[1] == 0
 
 
+@pytest.mark.thorough
 def test_parameters_within_their_standard_deviations_are_re_estimated_and_nothing_is_called_missing():
     """The true ship's parameters are drawn with the standard deviations that the file states."""
     record = hidden_record("barge", seed=11, relative_std=0.3, batches=4, samples=200)

@@ -180,6 +180,7 @@ def test_runs_that_differ_by_themselves_are_no_evidence_of_a_cause_on_average():
     assert np.median(counted) > np.median(plain)
 
 
+@pytest.mark.thorough
 def test_a_missing_term_that_noise_cannot_imitate_is_fitted_however_much_runs_differ_without_it():
     """Y_ur is missing: without it, its own effect in turns of all kinds is most of how three runs differ."""
     counted = []

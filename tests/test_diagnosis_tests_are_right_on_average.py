@@ -83,6 +83,7 @@ def test_causes_have_equal_shares_of_false_alarms():
     assert np.allclose(factors[1:], every * 0.05 / (1 - 0.95**0.05), rtol=0.4)
 
 
+@pytest.mark.thorough
 def test_times_that_cannot_be_negative_have_uniform_one_sided_p_values(clean_scores):
     """In clean data half of the estimates are negative, which is no sign of a dead time or a lag."""
     for rows in clean_scores.values():
@@ -217,6 +218,7 @@ TRIALS = 14
 CLEAN = (("theta:X_uu",), ("theta:N_ur",), ("theta:Y_ur",), ("gain",), ("inertia:r",), ("heading_bias",), ("late:psi",))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sample_time_s", [1.0, 0.2])
 def test_p_values_of_clean_trials_are_uniform(sample_time_s):
     """A ship that accelerates from rest, orders that change at once, headings whose differences have their own noise.

@@ -83,6 +83,7 @@ def test_a_number_found_by_trying_lies_within_three_standard_errors(ship, hidden
     assert found.likelihood_gain >= rough.likelihood_gain - 1.0
 
 
+@pytest.mark.thorough
 def test_a_width_is_as_unsure_as_the_commands_leave_it():
     """Steering in square waves has a few sizes only; any dead band between two of them is as good as another."""
     hidden = {"deadband": 34.0, "dead_on": 0b100}

@@ -95,6 +95,7 @@ def test_a_diagnosis_without_findings_leaves_the_vessel_unchanged():
     np.testing.assert_array_equal(again.environment.current_to, vessel.environment.current_to)
 
 
+@pytest.mark.thorough
 def test_the_current_of_another_day_is_found_and_written():
     record = hidden_record("barge", seed=3, batches=2, samples=120, current=(-0.15, 0.1))
     found = diagnose(in_current("barge", 0.15, 0.0), record)
@@ -130,6 +131,7 @@ def test_a_stated_current_is_left_out_where_no_heading_is_measured():
     np.testing.assert_array_equal(again.environment.current_to, [0.3, 0.2])
 
 
+@pytest.mark.thorough
 def test_a_cause_with_little_gain_alone_is_judged_again_beside_later_ones():
     """A compass and an antenna that are both not as stated: turned alone, the simulation hardly gains.
 

@@ -56,6 +56,7 @@ def test_a_stated_and_a_measured_current_are_combined_by_their_precisions():
     assert both.covariance[np.ix_(index, index)] == pytest.approx(expected, abs=0.2 * expected.max())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("off", "names"), [(0.01, []), (0.15, ["current"])])
 def test_a_current_is_found_again_within_its_standard_deviation_and_wrong_beyond_it(off, names):
     record = hidden_record("barge", seed=4, current=TRUE, batches=4, samples=200)

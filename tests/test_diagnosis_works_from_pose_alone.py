@@ -25,6 +25,7 @@ def check(found, cause: str, name: str, truth: float) -> None:
     assert abs(one.value - truth) < 4 * one.std + 0.002 * abs(truth)
 
 
+@pytest.mark.thorough
 def test_a_compass_that_shows_too_little_is_named():
     """v_measured = v + u sin(bias) where the heading that turns the positions lacks the bias."""
     record = pose_only("barge", seed=21, faults={"heading_bias": 0.06}, batches=3, samples=200)

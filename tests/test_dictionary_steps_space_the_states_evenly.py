@@ -51,6 +51,7 @@ def test_a_rise_out_of_reach_and_too_much_helm_are_refused() -> None:
         build_primitive(ship, spec("rudder_steps", duration_s=100.0, speed_mps=5.0, helm_rad=1.0))
 
 
+@pytest.mark.thorough
 def test_the_step_trial_of_the_dictionary_identifies_a_craft_that_differs_from_the_guess() -> None:
     truth, rng = load_vessel(TRUTH), np.random.default_rng(1)
     runs = build_dictionary(load_vessel(GUESS), load_dictionary(SCENARIOS / "dictionaries" / "step-trial.toml"))

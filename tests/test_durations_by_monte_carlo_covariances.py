@@ -47,6 +47,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.thorough
 def test_scatter_about_the_nominal_parameters_is_the_predicted_covariance():
     noisy = load_vessel(SCENARIOS / "vessels" / "tender-20m.toml")
     ship = replace(noisy, sensors=Sensors(velocity_mps=0.002, yaw_rate_radps=0.0002))  # theory is for little noise
@@ -69,6 +70,7 @@ def test_scatter_about_the_nominal_parameters_is_the_predicted_covariance():
     assert 0.1 < np.median(np.diag(found.covariance) / theory) < 2.2
 
 
+@pytest.mark.thorough
 def test_shares_are_those_of_the_covariances_told(scenario: Path, tmp_path: Path):
     arguments = ["durations", str(scenario), "--monte-carlo", "13", "--jobs", "1", "--out", str(tmp_path), "-q"]
     assert main(arguments) == 0

@@ -117,6 +117,7 @@ def test_the_price_of_a_budget_is_what_a_little_more_of_it_brings():
     assert (more - less) / 0.002 == pytest.approx(price, rel=1e-2)  # prices are per share of the limit
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("balance", [0.5, 0.8])
 def test_a_balance_keeps_the_information_of_every_equation(balance: float):
     kept = 0

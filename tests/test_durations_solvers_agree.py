@@ -111,6 +111,7 @@ def test_working_sets_agree_with_all_candidates_at_once(case: str, monkeypatch):
     assert whole.method == CVXPY or not task.smooth  # of which the answer with more digits is taken
 
 
+@pytest.mark.thorough
 def test_thousands_of_candidates_are_solved_a_few_at_a_time_under_any_limits(monkeypatch):
     asked = []
     newton = maximise._by_newton
@@ -123,6 +124,7 @@ def test_thousands_of_candidates_are_solved_a_few_at_a_time_under_any_limits(mon
     assert max(len(part.polytope.least) for part in asked) < 750
 
 
+@pytest.mark.thorough
 def test_floors_beyond_reach_are_refused_however_many_candidates_there_are():
     for given in (FEW["D, least information"], dict(cases(1000, models=1))["D, least information"]):
         (floor,) = given.floors
@@ -159,6 +161,7 @@ assert "cvxpy" in sys.modules
 """
 
 
+@pytest.mark.thorough
 def test_only_final_durations_load_cvxpy():
     """No module does when it is imported, nor does D without limits where it is solved only to compare."""
     subprocess.run([sys.executable, "-c", IMPORTED_WHEN_USED], check=True)

@@ -56,6 +56,7 @@ def test_whole_runs_of_one_length_are_the_best_there_are():
     assert max(losses) < 1e-9
 
 
+@pytest.mark.thorough
 def test_whole_runs_of_different_lengths_are_mostly_the_best_and_never_far_from_it():
     losses = [loss(problem, solve_durations(problem)) for problem in (small_problem(d, equal=False) for d in range(30))]
     # Exchange finds a local optimum; `whole_runs` states how good those were on such problems.
@@ -132,6 +133,7 @@ def test_whole_runs_of_one_length_are_never_worse_than_efficient_apportionment(c
     assert information(problem, design.repeats) >= information(problem, tuple(other)) - 1e-9
 
 
+@pytest.mark.thorough
 def test_many_candidates_of_different_lengths_are_rounded_better_than_downwards():
     rng = np.random.default_rng(0)
     matrices = random_matrices(rng, count=200, parameters=18, outputs=3, samples=12)

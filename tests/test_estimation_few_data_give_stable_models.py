@@ -49,6 +49,7 @@ def check(trials: int) -> None:
     assert np.median(bias) < 3
 
 
+@pytest.mark.thorough
 def test_few_data_give_stable_models():
     check(12)
 

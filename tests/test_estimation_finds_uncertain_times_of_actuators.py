@@ -113,6 +113,7 @@ def test_derivatives_by_times_are_those_of_the_ship_s_simulation(times: dict[str
         np.testing.assert_allclose(slopes[:, 0, :, index], numeric, atol=1e-4 * np.abs(numeric).max())
 
 
+@pytest.mark.thorough
 def test_without_noise_dead_times_and_parameters_are_found_exactly() -> None:
     """From dead times 0.01 and 0.16 s off, across a sample; what is stated of them then weighs nothing."""
     ship = stated()
@@ -123,6 +124,7 @@ def test_without_noise_dead_times_and_parameters_are_found_exactly() -> None:
     np.testing.assert_allclose(found.model.parameters, CRAFT.model.parameters, rtol=2e-3)
 
 
+@pytest.mark.thorough
 def test_least_squares_counts_what_stated_errors_do() -> None:
     """Where dead times move little, the covariance grows by G S G^T with G from estimates at other dead times."""
     raw, std_s, methods = measured_run(2, holds=24, quiet=False), 0.01, EstimateOptions(methods=("ls",), mean="none")
@@ -144,6 +146,7 @@ def test_least_squares_counts_what_stated_errors_do() -> None:
     np.testing.assert_allclose((counted - known) / np.outer(size, size), grown / np.outer(size, size), atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_times_are_written_with_their_standard_deviation_and_named(tmp_path: Path) -> None:
     batch = measured_run(3, holds=14, quiet=False).batches[0]
     columns = dict(zip(("u_mps", "v_mps", "r_radps"), batch.velocity.T, strict=True))

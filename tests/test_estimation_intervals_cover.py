@@ -48,6 +48,7 @@ def covered(case: str, trials: int, samples: int = 4000) -> np.ndarray:
     return (np.abs(errors) < 1.96 * std).mean(axis=0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("case", "trials", "samples"), [("iv", 24, 2000), ("short", 12, 12 * 300)])
 def test_intervals_cover_small(case: str, trials: int, samples: int) -> None:
     shares = covered(case, trials, samples)
@@ -66,6 +67,7 @@ TABLE = [
 """Not of methods that estimate a steady current, whose intervals are not promised: see `benchmarks/README.md`."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", TABLE[::8], ids=str)
 def test_intervals_of_every_method_cover_small(case: Case) -> None:
     """All parameters together; those of an equation err together, which the chance of four standard errors allows."""
@@ -139,6 +141,7 @@ def test_whitened_scores_are_the_same_sum(colour: float) -> None:
         assert found == Colour(0.0, 0.0)
 
 
+@pytest.mark.thorough
 def test_predicted_variance_is_right_when_noise_nearly_cancels() -> None:
     """y = theta u + e(k) - 0.9 e(k-1), slow u: the variance follows from the noise alone, in closed form."""
     rng, k, runs = np.random.default_rng(35), 1500, 200

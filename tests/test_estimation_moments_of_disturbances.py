@@ -72,6 +72,7 @@ def test_a_current_estimated_as_steady_has_no_second_moments() -> None:
     assert np.isnan(moments.central).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("trials", [8, pytest.param(40, marks=pytest.mark.slow)])
 def test_moments_of_a_varying_current_are_right_within_their_errors(trials: int) -> None:
     """Its components vary alike and independently, so that the moments about the mean are zero."""

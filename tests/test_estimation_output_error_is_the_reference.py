@@ -82,6 +82,7 @@ def test_without_forces_the_covariance_is_the_inverse_of_the_information() -> No
     assert np.median(found.std / expected) < 1.15
 
 
+@pytest.mark.thorough
 def test_forces_that_nobody_measured_widen_its_intervals() -> None:
     """A wandering current is seen few times, while sensors are read at every sample."""
     errors, alone = [], estimate(trials(TRUE), NOMINAL, method="oe").std
@@ -181,6 +182,7 @@ def windy_trials() -> Record:
     return record(*(measured(TRUE, commands(900, rng), weather=weather, seed=seed) for seed in (1, 2)))
 
 
+@pytest.mark.thorough
 def test_measured_wind_leads_to_the_air_terms_and_without_it_the_wind_is_misfit() -> None:
     data = windy_trials()
     found, calm = (estimate(data, NOMINAL, method=name) for name in ("oe-air", "oe"))
@@ -270,6 +272,7 @@ def test_runge_kutta_gives_the_parameters_of_the_motion_and_euler_those_of_its_m
     assert euler.value("N_r") == pytest.approx(np.expm1(exact.value("N_r")), rel=0.01)
 
 
+@pytest.mark.thorough
 def test_thinner_samples_on_the_way_do_not_change_where_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     data = trials(TRUE)
     found = estimate(data, NOMINAL, method="oe")

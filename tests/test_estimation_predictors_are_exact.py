@@ -103,6 +103,7 @@ def test_a_steady_current_is_removed_exactly_and_read_out(mean: str) -> None:
     np.testing.assert_allclose(current_moments(found).mean, CURRENT, rtol=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("mean", ["none", "complete", pytest.param("batch", marks=pytest.mark.slow)])
 def test_a_steady_current_of_two_parameters_is_found_whatever_the_moduli_do(mean: str) -> None:
     """Moduli change their sign here, which the nuisance regressors of (5.68)-(5.70) do not allow."""

@@ -44,15 +44,18 @@ def treated(treatment: str) -> tuple[Estimate, ...]:
     return tuple(estimate(sailed(seed, SAMPLES, steered=steered), MODEL, settings=settings) for seed in range(SEEDS))
 
 
+@pytest.mark.thorough
 def test_instruments_from_steered_inputs_are_biased() -> None:
     assert in_standard_errors(treated("use")).max() > 3.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("treatment", ["planned", "leave-out"])
 def test_instruments_from_planned_inputs_or_open_loop_are_not(treatment: str) -> None:
     assert in_standard_errors(treated(treatment)).max() < 3.0
 
 
+@pytest.mark.thorough
 def test_output_error_holds_under_feedback_of_white_sensor_noise_where_least_squares_does_not() -> None:
     calm = [sailed(seed, 600, steered=np.ones(600), current_std_mps=0.0) for seed in range(12)]
     assert in_standard_errors([estimate(trial, MODEL, method="oe") for trial in calm]).max() < 3.0
@@ -65,6 +68,7 @@ def test_inputs_that_follow_disturbances_are_found() -> None:
     assert any("Inputs follow earlier disturbances" in warning for warning in found[0].warnings)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("correlation_s", [0.0, 100.0], ids=["white", "wandering"])
 def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: float) -> None:
     count = 40
@@ -75,6 +79,7 @@ def test_external_inputs_are_suspected_as_often_as_chance_says(correlation_s: fl
         assert abs((found < share).mean() - share) < 3.0 * np.sqrt(share * (1 - share) / count)
 
 
+@pytest.mark.thorough
 def test_a_wrong_model_alone_is_not_taken_for_feedback() -> None:
     """The drag is linear, the model's quadratic: past inputs take up what is wrong."""
     quadratic = replace(MODEL, terms=(Term("u", "X_u", "u*abs(u)"), MODEL.terms[1]), parameters=np.array([-0.05, 0.02]))

@@ -32,6 +32,7 @@ def columns(card: html.HtmlElement) -> dict[str, tuple[str, ...]]:
     return {row[0]: tuple(row[1:]) for row in rows}
 
 
+@pytest.mark.thorough
 def test_every_run_is_on_one_card_in_order_and_under_its_name() -> None:
     found = [(number, text(card.find(".//h1"))) for card in page().find_class("card") for number in columns(card)[""]]
     assert [number for number, _ in found] == [f"Run {n}" for n in range(1, len(case.runs()) + 1)]

@@ -92,6 +92,7 @@ def odd_page(name: str = ODD) -> str:
     )
 
 
+@pytest.mark.thorough
 def test_the_page_needs_nothing_from_outside() -> None:
     read = Page(page())
     assert all(reference.startswith("#") for reference in read.references)
@@ -109,6 +110,7 @@ def test_ids_are_unique_and_every_reference_finds_its_target() -> None:
     assert inside <= set(read.ids)
 
 
+@pytest.mark.thorough
 def test_every_figure_is_well_formed_and_has_a_label() -> None:
     for html in (page(), odd_page()):
         figures = re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL)
@@ -124,6 +126,7 @@ def test_odd_names_are_shown_and_never_run() -> None:
     assert 'x <script>alert(1)</script> & "$\\alpha$" $ \N{REPLACEMENT CHARACTER} \N{SNOWMAN}' in read.text
 
 
+@pytest.mark.thorough
 def test_a_very_long_name_is_whole_in_the_text_and_cut_only_beside_axes() -> None:
     long = "a very long name " * 30 + "end"
     html = odd_page(long)  # a figure squeezed by a name would be a warning, and so an error

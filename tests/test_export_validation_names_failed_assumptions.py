@@ -122,6 +122,7 @@ def test_when_nothing_that_can_be_checked_fails_noise_is_left():
     assert "Assumption that fails" not in said
 
 
+@pytest.mark.thorough
 def test_wind_that_the_method_does_not_know_is_found_and_named():
     """The whole way: trials of the 30 m ship in wind, estimated as if there were none."""
     ship = vessel("azimuth-30m-true")

@@ -54,6 +54,7 @@ def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report_page, "_figures", lambda content, after: drawn)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("_no_figures")
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.102, 0.49])
 def test_report_cards_files_and_terminal_agree_on_the_verdict(tmp_path, share: float) -> None:

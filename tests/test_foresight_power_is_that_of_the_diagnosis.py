@@ -91,6 +91,7 @@ def test_power_of_nothing_is_the_level_and_rises_with_the_size():
     assert float(power(9.0, 1, 0.025)) == pytest.approx(two_sided)
 
 
+@pytest.mark.thorough
 def test_a_gyro_is_as_visible_as_its_own_readings_make_it(case, of_known_ship):
     """With a known ship the noise of the yaw rate alone hides a scale error: size squared times sum r^2 / sigma^2.
 
@@ -106,6 +107,7 @@ def test_a_gyro_is_as_visible_as_its_own_readings_make_it(case, of_known_ship):
     assert 0.7 * expected < found.noncentrality < 1.05 * expected
 
 
+@pytest.mark.thorough
 def test_what_uncertain_parameters_imitate_is_harder_to_find(foreseen, of_known_ship):
     """A heavier ship looks like other damping and thrust; a sensor's place does not."""
 
@@ -117,6 +119,7 @@ def test_what_uncertain_parameters_imitate_is_harder_to_find(foreseen, of_known_
     assert 0.5 < kept("forward_m") < 1.1
 
 
+@pytest.mark.thorough
 def test_a_heavier_ship_is_not_heavier_in_proportion(known, foreseen):
     """Twice the inertia halves the accelerations: by less than twice what a little more inertia takes, per unit."""
     item = foreseen["inertia_factor_u"]
@@ -126,6 +129,7 @@ def test_a_heavier_ship_is_not_heavier_in_proportion(known, foreseen):
     assert np.abs(much).max() == pytest.approx(0.5 * np.abs(little).max(), rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(foreseen):
     lag = {item.cause: item for item in foreseen["lag_all_s"].confusions}
     assert lag["actuator_delay"].cosine > 0.95
@@ -137,6 +141,7 @@ def test_a_lag_and_a_dead_time_are_not_told_apart_but_a_current_and_a_gyro_are(f
             assert item.named <= item.found + 4 * np.sqrt(item.power * (1 - item.power) / 2000) + 1e-9
 
 
+@pytest.mark.thorough
 def test_held_out_runs_show_most_of_what_is_certain_and_never_more_than_the_test_accepts(foreseen):
     sized = [item for item in foreseen.values() if item.sized]
     assert all(0.0 <= item.found <= item.power for item in sized)
@@ -174,6 +179,7 @@ def test_what_is_found_does_not_hang_on_one_record():
     assert share(simulated(0.1, 0.1, 1.0)) == pytest.approx((shown + hidden) / 2, abs=3 * 0.5 / np.sqrt(60))
 
 
+@pytest.mark.thorough
 def test_predictions_of_surge_sway_and_yaw_rate_tell_less_than_these_with_the_heading(known, foreseen):
     """What is known beside initial states never falls with another channel; a heading tells of damping in yaw."""
     (direction,) = foreseen["factor"].effect.directions
@@ -211,6 +217,7 @@ TRIALS = 100
 EFFECTS = ("inertia_factor_r", "velocity_angle_rad", "forward_m", "thrust_offset_m", "Y_abs_v_v", "lag_all_s")
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_the_test_finds_as_often_as_foreseen(case, known, foreseen, name):

@@ -42,6 +42,7 @@ def found() -> OperationForesight:
         return foreseen()
 
 
+@pytest.mark.thorough
 def test_large_changes_are_found_and_such_as_are_none_are_not(found: OperationForesight) -> None:
     tiny, large = ([item for item in found.rows if item.size == size] for size in (1e-4, 0.2))
     quiet = sum(item.found for item in tiny) + found.false_alarms

@@ -68,6 +68,7 @@ def test_joined_names_say_what_they_share_once():
     assert joined(["lag_all_s"]) == "lag_all_s"
 
 
+@pytest.mark.thorough
 def test_the_command_writes_probabilities_that_follow_from_their_noncentralities(tmp_path, capsys):
     from expdesign.foresight import power
 

@@ -55,6 +55,7 @@ def test_candidates_simulated_together_have_the_information_of_primitives(ship: 
         np.testing.assert_allclose(velocity, item.primitive.trajectory.velocity, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_every_addition_gains_and_none_gains_more_than_concavity_allows():
     growth = grown()
     assert growth.rounds
@@ -76,6 +77,7 @@ def test_the_gains_add_up_to_the_certified_optimum():
     assert growth.rounds[-1].efficiency == pytest.approx(gain, rel=1e-6)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("free_form", [False, True])
 def test_additions_keep_to_the_velocities_and_to_the_actuators_limits(free_form: bool):
     growth, ship = grown(free_form=free_form), vessel("model-ship")
@@ -102,6 +104,7 @@ def test_freely_optimised_commands_tell_more_than_the_candidate_they_began_as_an
     assert (np.abs(item.primitive.exit_velocity[1:]) <= 0.01 * span[1:]).all()
 
 
+@pytest.mark.thorough
 def test_the_same_seed_grows_the_same_and_another_seed_looks_elsewhere():
     ship, information = vessel("model-ship"), scored_example("model-ship")
     given = replace(SMALL, rounds=1, pool=8)
@@ -131,6 +134,7 @@ def test_a_familys_candidates_and_steps_do_not_depend_on_the_others_that_are_sea
     assert not np.array_equal(alone["zigzag"][:8], searched(few, run_s=25.0)["zigzag"][:8])
 
 
+@pytest.mark.thorough
 def test_what_is_left_is_the_largest_sensitivity_of_all_that_was_looked_at():
     # Grown from one family with one searched setting, so that all of it can be looked at from outside.
     ship = vessel("model-ship")
@@ -154,6 +158,7 @@ def test_what_is_left_is_the_largest_sensitivity_of_all_that_was_looked_at():
         assert sensitivity(best, item, "complete") <= growth.dimension * (1 + 1e-6)
 
 
+@pytest.mark.thorough
 def test_a_ship_with_propeller_and_rudder_grows_from_families_of_all_kinds():
     ship = rudder_ship()
     runs = [

@@ -42,6 +42,7 @@ def grown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, workflows.Out
     return folder / "out", workflows.durations(path, folder / "out", seed=3)
 
 
+@pytest.mark.thorough
 def test_the_written_dictionary_gives_the_same_design_without_searching(grown, tmp_path: Path):
     folder, outcome = grown
     again = workflows.durations(scenario(tmp_path, dictionary=folder / "dictionary-grown.toml"), tmp_path / "out")
@@ -71,6 +72,7 @@ def test_recorded_additions_lie_beside_the_dictionary(grown):
     assert {f"dictionary-grown-{spec.name}.csv" for spec in recorded} <= files
 
 
+@pytest.mark.thorough
 def test_trials_are_rehearsed_with_the_design_that_a_run_makes(grown):
     """Additions and seed included: as many runs of every manoeuvre as in durations.json."""
     folder, _ = grown

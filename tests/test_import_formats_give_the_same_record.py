@@ -356,6 +356,7 @@ def test_doubts_that_sentences_state_are_told(body: str, told: str, tmp_path: Pa
     assert told in "\n".join(read_log(tmp_path / "a.log").notes)
 
 
+@pytest.mark.thorough
 def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> None:
     _, said = imported(write_own(tmp_path / "a.csv", trip))
     rate = said["actuators"]["rudder1"]["rate"]  # type: ignore[index]
@@ -363,6 +364,7 @@ def test_order_and_feedback_give_the_slew_rate(tmp_path: Path, trip: Voyage) -> 
     assert "angle_rate_radps = 0.05" in (tmp_path / "out" / "instruments.toml").read_text()
 
 
+@pytest.mark.thorough
 def test_the_folder_is_what_other_commands_take(
     tmp_path: Path, trip: Voyage, capsys: pytest.CaptureFixture[str]
 ) -> None:

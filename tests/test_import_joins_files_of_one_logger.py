@@ -81,6 +81,7 @@ def dated(path: Path, sailed: dict[str, np.ndarray], names: tuple[str, ...]) -> 
     return header, rows
 
 
+@pytest.mark.thorough
 def test_a_log_in_parts_gives_the_runs_of_the_whole(tmp_path: Path) -> None:
     """Written in parts at any sample; the files of the runs are the same to the last bit."""
     (sailed,) = voyages(1, "zigzag", last_s=240.0, gust=0.3)
@@ -97,6 +98,7 @@ def test_a_log_in_parts_gives_the_runs_of_the_whole(tmp_path: Path) -> None:
         assert (tmp_path / "of-parts" / name).read_bytes() == (tmp_path / "of-whole" / name).read_bytes()
 
 
+@pytest.mark.thorough
 def test_years_between_two_files_take_no_memory(tmp_path: Path) -> None:
     """Units and answers of actuators are those of each file; no array has a number for each second between."""
     (sailed,) = voyages(1, "zigzag", last_s=240.0, gust=0.3)

@@ -42,6 +42,7 @@ def test_a_rudder_of_another_clock_is_set_by_the_turn(offset_s: float, tmp_path:
     assert "are added to its times, by rudder and turn" in notes_of(said)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("late_s", [0.0, 2.3, -40.0])
 def test_a_computers_clock_is_held_against_what_a_receiver_saw(late_s: float, tmp_path: Path, trip: Voyage) -> None:
     bridge = write_nmea(tmp_path / "bridge.nmea", trip.every(5))

@@ -43,6 +43,7 @@ def test_the_runs_of_a_plan_are_found_by_its_commands() -> None:
     assert "not found" in words
 
 
+@pytest.mark.thorough
 def test_a_mapping_says_otherwise(tmp_path: Path, trip: Voyage) -> None:
     path = write_dialect(tmp_path / "a.csv", trip.every(10))
     _, said, out = run_import(path)
@@ -101,6 +102,7 @@ def test_a_wrong_mapping_is_one_line_with_file_key_and_what_would_be_right(
     assert sorted((tmp_path / "out").iterdir()) == before
 
 
+@pytest.mark.thorough
 def test_a_second_import_takes_the_runs_of_the_first_away(tmp_path: Path, trip: Voyage) -> None:
     assert run_import(write_dialect(tmp_path / "a.csv", trip.every(10)))[0] == 0
     own = tmp_path / "out" / "measured.csv"
@@ -143,6 +145,7 @@ def test_a_hostile_file_gets_one_line(tmp_path: Path, trip: Voyage, capsys: pyte
             assert not (tmp_path / "out" / "import.json").exists()
 
 
+@pytest.mark.thorough
 def test_any_choice_of_channels_is_imported_or_refused_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

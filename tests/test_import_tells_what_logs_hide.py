@@ -32,6 +32,7 @@ def trip() -> Voyage:
     return voyage(parts=(("steady", 60.0), ("zigzag", 200.0), ("steady", 150.0), ("circle", 250.0)))
 
 
+@pytest.mark.thorough
 def test_a_rudder_that_turns_the_ship_the_wrong_way_is_told(tmp_path: Path, trip: Voyage) -> None:
     other = replace(trip, order_rad=-trip.order_rad, rudder_rad=-trip.rudder_rad).every(5)
     for name, case, told in (("right", trip.every(5), False), ("wrong", other, True)):
@@ -41,6 +42,7 @@ def test_a_rudder_that_turns_the_ship_the_wrong_way_is_told(tmp_path: Path, trip
         assert ("turns against the rudder" in notes_of(said)) == told
 
 
+@pytest.mark.thorough
 def test_course_in_place_of_heading_is_told(tmp_path: Path, trip: Voyage) -> None:
     for name, case, told in (("right", trip, False), ("course", replace(trip, heading_rad=trip.course_rad), True)):
         (tmp_path / name).mkdir()
@@ -82,6 +84,7 @@ def test_a_magnetic_heading_is_made_true_by_the_logs_variation(tmp_path: Path, t
     assert np.abs(off).max() < 2e-6
 
 
+@pytest.mark.thorough
 def test_averages_across_north_are_left_out(tmp_path: Path) -> None:
     trip = voyage(heading=0.05)  # the zig-zag swings through north
     rows = logger_rows(trip)
@@ -100,6 +103,7 @@ def test_averages_across_north_are_left_out(tmp_path: Path) -> None:
     assert np.abs(off).max() < 0.01  # a reading is missing where the turn bends: the line between its neighbours
 
 
+@pytest.mark.thorough
 def test_an_antenna_is_moved_to_midships(tmp_path: Path, trip: Voyage) -> None:
     ahead, aside = 18.0, -4.0
     c, s = np.cos(trip.heading_rad), np.sin(trip.heading_rad)

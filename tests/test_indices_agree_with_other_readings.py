@@ -64,6 +64,7 @@ def test_a_record_of_a_trial_shows_what_the_trial_showed(vessel: Vessel, side: s
     assert swing.overshoots_rad == pytest.approx(zig.overshoots_rad, abs=math.radians(0.4))
 
 
+@pytest.mark.thorough
 def test_a_recorded_stop_is_found_and_other_runs_give_the_reason_for_no_trial() -> None:
     ship = nomoto_ship()
     conduct = Conduct(speed_mps=7.0, approach_s=20.0)

@@ -53,6 +53,7 @@ def test_every_index_stands_under_its_side_beside_its_criterion() -> None:
     assert (lines[6].both[0].verdict == "met") == (found.stops[0].track_reach_m <= limits["track_reach_m"])
 
 
+@pytest.mark.thorough
 def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() -> None:
     wide = Circle(
         name="wide.csv", side="port", helm_rad=0.6, speed_mps=SPEED, advance_m=811.0, transfer_m=1.0,

@@ -106,6 +106,7 @@ def test_outcomes_are_the_requested_results_by_name() -> None:
         outcomes(SHIP, names=("advance",))
 
 
+@pytest.mark.thorough
 def test_outcomes_change_evenly_with_parameters() -> None:
     """Central differences of two sizes agree, so derivatives mean something."""
     ship = nomoto_ship(sample_time_s=1.0)

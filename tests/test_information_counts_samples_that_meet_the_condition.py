@@ -139,6 +139,7 @@ def test_predicted_covariance_follows_the_samples() -> None:
         expected_covariance(SHIP, parts, sway, environment=fast, excitation=REQUIRED)
 
 
+@pytest.mark.thorough
 def test_a_dictionary_without_offset_is_refused_by_name(tmp_path: Path) -> None:
     text = (
         (ROOT / "helsinki-hour.toml")

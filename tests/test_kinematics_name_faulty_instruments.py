@@ -37,6 +37,7 @@ def findings(folder: Path, log: Log, ship: Vessel, names: tuple[str, ...] = NAME
     return {finding.name: finding for finding in _disagreements(record.batches, ship, ship.model)}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("sample_s", "count"), [(1.0, 4), (0.2, 2), *(pytest.param(s, 20, marks=pytest.mark.slow) for s in (1.0, 0.2))]
 )

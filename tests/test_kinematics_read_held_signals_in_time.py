@@ -116,6 +116,7 @@ def estimates(folder: Path, log: Log, capsys: pytest.CaptureFixture[str]) -> dic
     return {name: (one["value"], one["std"]) for name, one in found.items()}
 
 
+@pytest.mark.thorough
 def test_estimates_from_held_headings_are_right(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Held for 5 s, N_ur was nine standard errors off, Y_ur eleven."""
     errors = []

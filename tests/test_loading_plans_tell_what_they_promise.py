@@ -76,6 +76,7 @@ def plan() -> LoadPlan:
     return choose_loads(asked(NOMINAL, HIGH, Load(mass_kg=0.4, z_m=-0.05), LOW, None), runs, total_s=240.0)
 
 
+@pytest.mark.thorough
 def test_the_certificate_bounds_every_other_share_of_time(plan: LoadPlan) -> None:
     """No share of random designs is better by more than the gap, and equal shares are worse."""
     problem, rng = plan.design.problem, np.random.default_rng(1)
@@ -147,6 +148,7 @@ def small(folder: Path) -> tuple[Path, Path]:
     return folder / "trial.toml", folder / "candidates.toml"
 
 
+@pytest.mark.thorough
 def test_the_command_writes_what_plan_and_roll_read(tmp_path: Path) -> None:
     scenario, candidates = small(tmp_path)
     outcome = roll_plan(scenario, tmp_path / "out", loads=candidates)
@@ -163,6 +165,7 @@ def test_the_command_writes_what_plan_and_roll_read(tmp_path: Path) -> None:
         assert dict(zip(names, repeats, strict=True)) == {**dict.fromkeys(names, 0), **case["runs"]}
 
 
+@pytest.mark.thorough
 def test_work_that_takes_too_long_is_given_up_and_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -205,6 +208,7 @@ def test_every_load_case_has_cards_that_name_its_load_and_the_same_runs_are_plan
     assert sum(what.startswith("sailing to the goal, load case") for what in said) == len(runs)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seeds", [range(101, 103), pytest.param(range(201, 221), marks=pytest.mark.slow)])
 def test_estimates_scatter_no_less_than_the_bound(seeds: range) -> None:
     """Mean squares of p errors over n seeds are 1 or more, but for three standard errors sqrt(2 / (n p))."""

@@ -46,18 +46,21 @@ def carried_out(commands: list[list[str]], folder: Path, monkeypatch: pytest.Mon
         assert all(path.exists() for path in named)
 
 
+@pytest.mark.thorough
 def test_what_the_tutorials_ask_before_a_plan_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = [command for command in tutorial("first-plan") if command[0] not in LONG]
     assert {command[0] for command in commands} == {"new", "explain", "score", "durations"}
     carried_out(commands, tmp_path, monkeypatch)
 
 
+@pytest.mark.thorough
 def test_a_card_becomes_a_vessel_as_its_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     commands = tutorial("pilot-card")
     assert [command[0] for command in commands] == ["explain", "nominal", "nominal", "indices"]
     carried_out(commands, tmp_path, monkeypatch)
 
 
+@pytest.mark.thorough
 def test_a_log_is_imported_and_estimated_as_the_tutorial_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     carried_out(tutorial("your-log"), tmp_path, monkeypatch)
 

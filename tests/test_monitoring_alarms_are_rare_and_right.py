@@ -119,6 +119,7 @@ def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
     assert float(two - one) == pytest.approx(costs[1] - costs[0], abs=1e-2)
 
 
+@pytest.mark.thorough
 def test_the_calibration_finds_noise_and_force(calibration: Calibration) -> None:
     assert calibration.std[0] == pytest.approx(1.0, abs=0.03)
     quick, slow = calibration.force.variance.reshape(2, FORCES)
@@ -128,6 +129,7 @@ def test_the_calibration_finds_noise_and_force(calibration: Calibration) -> None
     assert calibration.watched.all()
 
 
+@pytest.mark.thorough
 def test_where_nothing_changes_the_likelihood_ratio_has_mean_one_and_alarms_are_rare(calibration: Calibration) -> None:
     between, count = 150.0, 3000
     limit = threshold(CHANGES, between)
@@ -182,6 +184,7 @@ def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration)
     assert not alarms
 
 
+@pytest.mark.thorough
 def test_stronger_weather_is_not_judged_and_is_no_change(calibration: Calibration) -> None:
     limit = threshold(CHANGES, 1e4)
     for quick, unlike in ((0.3, False), (3.0, True)):
@@ -232,6 +235,7 @@ def loaded(calibration: Calibration) -> Calibration:
 LOAD, SAME = np.array([0.0, 0.0, 1.5, -0.8]), np.zeros(CHANGES)
 
 
+@pytest.mark.thorough
 def test_another_load_after_a_port_call_is_told_and_raises_no_alarm(loaded: Calibration) -> None:
     limit, far = threshold(CHANGES, 1e5), []
     for seed in SEEDS:
@@ -243,11 +247,13 @@ def test_another_load_after_a_port_call_is_told_and_raises_no_alarm(loaded: Cali
     assert (np.array(far) ** 2).mean() < 1.0 + 3.0 * np.sqrt(2.0 / np.size(far))
 
 
+@pytest.mark.thorough
 def test_without_port_calls_another_load_is_a_change_of_the_ship(loaded: Calibration) -> None:
     limit = threshold(CHANGES, 1e5)
     assert all(watched(loaded, with_call(seed, LOAD, SAME), limit)[1] for seed in SEEDS)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [0, 2])
 def test_a_change_under_way_after_a_port_call_is_an_alarm_even_if_it_is_one_of_load(
     loaded: Calibration, number: int
@@ -297,6 +303,7 @@ def bent(columns: np.ndarray, change: np.ndarray, since: int) -> tuple[Grams, Ca
     return linearised(np.zeros(CHANGES)), linearised
 
 
+@pytest.mark.thorough
 def test_the_size_of_a_large_change_is_right_once_it_is_simulated(calibration: Calibration) -> None:
     """Over ships: without bias, and within what is stated; linearised at the ship before, it is too large."""
     change, since = np.array([0.0, 0.0, 3.0, 0.0]), 30
@@ -339,6 +346,7 @@ def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], t
     )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_no_statistic_above_the_threshold_stands_beside_no_alarm(calibration: Calibration) -> None:
     limit, passed = threshold(CHANGES, 1e3), 0
     for seed in (101, 110, 128, 151, 152):  # squalls of four stretches, told at every moment

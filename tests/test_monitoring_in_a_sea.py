@@ -120,6 +120,7 @@ def test_the_filtered_columns_have_the_inner_products_of_generalised_least_squar
     assert whitened(columns, seen, transition, WHITE, step_s=1.0) is columns
 
 
+@pytest.mark.thorough
 def test_the_noise_is_that_of_the_sea(vessel: Vessel) -> None:
     voyages = [sailed([Ship()], 2 * HOUR, seeds=[3], sea=sea)[0] for sea in (CALM, Sea(), PUSHED)]
     calm, waves, pushed = (stretches(vessel, table)[1] for table in voyages)
@@ -135,6 +136,7 @@ def test_the_noise_is_that_of_the_sea(vessel: Vessel) -> None:
     assert stretches(vessel, voyages[2], known=waves)[1].pushes[2] > 0.0  # another sea is learnt anew
 
 
+@pytest.mark.thorough
 def test_scores_of_an_unchanged_ship_are_unbiased_where_the_rudder_answers_the_sea(vessel: Vessel) -> None:
     seeds, far = range(3), {True: [], False: []}
     for table in sailed([Ship()] * len(seeds), 2 * HOUR, seeds=seeds, sea=PUSHED):
@@ -148,6 +150,7 @@ def test_scores_of_an_unchanged_ship_are_unbiased_where_the_rudder_answers_the_s
     assert bias[False] > 3.0 / np.sqrt(len(seeds))
 
 
+@pytest.mark.thorough
 def test_drag_is_found_within_an_hour_and_nothing_in_an_unchanged_ship(
     vessel: Vessel, known: tuple[Noise, Calibration]
 ) -> None:
@@ -157,6 +160,7 @@ def test_drag_is_found_within_an_hour_and_nothing_in_an_unchanged_ship(
     assert alarms_of(vessel, known, changed)[1][0] in ("theta:X_uu", "theta:X_nn", "gain")
 
 
+@pytest.mark.thorough
 def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
     vessel: Vessel, known: tuple[Noise, Calibration]
 ) -> None:
@@ -169,6 +173,7 @@ def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
         assert state.left_out_s < 0.2 * state.judged_s
 
 
+@pytest.mark.thorough
 def test_wind_that_turns_her_is_named_beside_the_change_that_it_looks_like(
     vessel: Vessel, known: tuple[Noise, Calibration]
 ) -> None:
@@ -218,6 +223,7 @@ def false_in(vessel: Vessel, sea: Sea, seeds: Sequence[int], *, hours: int = 2) 
     return false
 
 
+@pytest.mark.thorough
 def test_nothing_false_is_said_of_an_unchanged_ship_in_a_quartering_sea(vessel: Vessel) -> None:
     assert false_in(vessel, OTHER_SEAS["quartering"], [1], hours=1) == []
 
@@ -229,6 +235,7 @@ def test_nothing_false_is_said_of_unchanged_ships_in_other_seas(vessel: Vessel, 
     assert false_in(vessel, OTHER_SEAS[sea], range(9000, 9020)) == []
 
 
+@pytest.mark.thorough
 def test_shallower_water_than_the_references_is_told_and_not_judged(tmp_path: Path) -> None:
     path = vessel_file(tmp_path / "vessel.toml")
     deep, shoal = (

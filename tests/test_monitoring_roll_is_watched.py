@@ -47,6 +47,7 @@ def watched(pieces: list[tuple[str, Load, int]], *, called: int | None = None, m
     return now
 
 
+@pytest.mark.thorough
 def test_false_alarms_keep_to_the_rate_asked() -> None:
     """One in a hundred pieces is asked for, so that two or more in ten have a chance of 0.4 %."""
     now = watched([("same", NOMINAL, seed) for seed in range(510, 520)], mean_days=100 * PIECE_S / DAY)
@@ -54,6 +55,7 @@ def test_false_alarms_keep_to_the_rate_asked() -> None:
     assert len(now.alarms) <= 1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("ship", "load", "cause"), [("lost", NOMINAL, "k"), ("same", HIGH, "load")])
 def test_lost_stability_and_a_load_are_alarms_once(ship: str, load: Load, cause: str) -> None:
     now = watched([("same", NOMINAL, 521), *((ship, load, seed) for seed in (522, 523, 525))])
@@ -76,6 +78,7 @@ def test_a_load_after_a_port_call_is_told_and_no_alarm() -> None:
     assert event.load[0] == pytest.approx(HIGH.mass_kg, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_monitor_tells_lost_stability_from_files(tmp_path: Path) -> None:
     reference = write_csv(tmp_path / "reference.csv", trial(SHIP, NOMINAL, 531, samples=20800))
     data = [

@@ -129,6 +129,7 @@ def test_instruments_take_away_the_bias_that_noisy_inputs_leave() -> None:
     assert crossed.of("A")[found].std() > plain.of("A").std()  # which is the price
 
 
+@pytest.mark.thorough
 def test_stretches_show_the_changes_of_the_ship_that_sailed_them(folder: Path) -> None:
     vessel = load_vessel(folder / "ship.toml")
     ship = YawShip(model=FULL, vessel=vessel.model, parameters=YAW_TRUE)
@@ -141,6 +142,7 @@ def test_stretches_show_the_changes_of_the_ship_that_sailed_them(folder: Path) -
     assert told == pytest.approx(0.2 * 33.7 / 62.4 / 0.1, abs=5.0 * np.hypot(other.baseline_std[0], 0.1))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("model", ["yaw-full", pytest.param("yaw-simplified", marks=pytest.mark.slow)])
 def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, model: str) -> None:
     reference = [folder / f"reference-{number}.csv" for number in range(REFERENCES)]
@@ -161,6 +163,7 @@ def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, mode
     assert "Both halves of the reference" in notes or "Not informative enough" in notes
 
 
+@pytest.mark.thorough
 def test_what_a_yaw_model_needs_is_asked_for(folder: Path, tmp_path: Path) -> None:
     lines = (folder / "same.csv").read_text().splitlines()
     place = lines[0].split(",").index("roll_rad")
@@ -212,6 +215,7 @@ def inertial_difference(how: Orders, *, count: int) -> float:
     return float(np.sqrt(np.mean(np.square(apart))))
 
 
+@pytest.mark.thorough
 def test_inertia_moves_the_yaw_rate_by_less_than_the_sum_of_the_thesis_counts() -> None:
     """Its constant d is 0.0025 rad/s; what inertia does grows with the changes of orders: detection rests on them."""
     calm, brisk = (inertial_difference(how, count=5) for how in (CALM, BRISK))

@@ -108,6 +108,7 @@ def test_inertia_shows_on_the_spot_and_hardly_in_a_turn(turned: Voyage, rotated:
     assert turn(heavier(inertia=1.1)).column("psi")[-1] >= turned.column("psi")[-1] - 1e-6
 
 
+@pytest.mark.thorough
 def test_exact_data_give_the_true_parameters_and_a_wrong_force_scales_them_all(departure: Voyage) -> None:
     data = exact(departure)
     found = estimate_yaw(FULL, data, YAW_TRUE)
@@ -120,6 +121,7 @@ def test_exact_data_give_the_true_parameters_and_a_wrong_force_scales_them_all(d
     assert again.fit == pytest.approx(found.fit, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_fewer_parameters_have_more_bias_and_less_spread(departure: Voyage) -> None:
     data = measured(departure, count=12, seed=2, every=4)
     full, simple = (estimate_yaw(model, data, YAW_TRUE) for model in (FULL, SIMPLE))
@@ -133,6 +135,7 @@ def test_fewer_parameters_have_more_bias_and_less_spread(departure: Voyage) -> N
     assert abs(without_noise.of("N_uv")[0] / YAW_TRUE["N_uv"] - 1.0) > 0.2
 
 
+@pytest.mark.thorough
 def test_ten_per_cent_of_inertia_is_seen_and_of_mass_is_not(departure: Voyage) -> None:
     nominal = estimate_yaw(SIMPLE, measured(departure, count=6, seed=3, every=4), YAW_TRUE).of("I_r")
     heavy = estimate_yaw(
@@ -159,6 +162,7 @@ def test_damping_and_coriolis_are_one_unless_the_ship_goes_astern(turned: Voyage
     assert excitation_rank(separate, exact(rotation(ahead=2.0)), YAW_TRUE) == size
 
 
+@pytest.mark.thorough
 def test_halves_of_a_poor_voyage_disagree_and_those_of_a_rich_one_do_not(turned: Voyage) -> None:
     rich = measured(harbour(seconds=500.0, seed=5), count=1, seed=6, every=4)
     poor = measured(turned, count=1, seed=6, every=4)

@@ -123,6 +123,7 @@ def test_a_thruster_that_no_candidate_uses_and_limits_far_off_are_named(tmp_path
     assert "n3_rps" not in far
 
 
+@pytest.mark.thorough
 def test_speeds_beyond_those_of_the_data_are_named(tmp_path: Path) -> None:
     new(tmp_path / "trial")
     path = tmp_path / "trial" / "vessel.toml"
@@ -136,6 +137,7 @@ def test_speeds_beyond_those_of_the_data_are_named(tmp_path: Path) -> None:
         assert bool(speed_remarks(case.vessel, tracks, "candidate")) is told
 
 
+@pytest.mark.thorough
 def test_most_ships_of_a_wide_prior_reach_the_speed_and_the_turn_of_a_first_trials_legs(tmp_path: Path) -> None:
     """Other ships, drawn anew: full ahead they are faster than legs on a straight course, and so than all runs."""
     case = load_scenario(new(tmp_path / "trial", kind="propeller-rudder").files[0])
@@ -154,6 +156,7 @@ def test_most_ships_of_a_wide_prior_reach_the_speed_and_the_turn_of_a_first_tria
     assert np.mean(surge > 0.0) > ABLE - 4 * np.sqrt(ABLE * (1 - ABLE) / DRAWN)  # of the speed's own draws
 
 
+@pytest.mark.thorough
 def test_a_first_trial_keeps_ships_of_a_wide_prior_near_its_tracks(tmp_path: Path) -> None:
     """Runs are cut to the time that most ships stay near; other ships, drawn anew, do as well."""
     from expdesign.dictionary import build_primitive

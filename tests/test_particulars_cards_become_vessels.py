@@ -51,6 +51,7 @@ def values_of(
     return tuple(one for one in found if math.isfinite(one.value))
 
 
+@pytest.mark.thorough
 def test_a_planted_ship_is_found_again() -> None:
     problem = Problem(COASTER)
     planted = np.zeros(len(FACTORS))
@@ -70,6 +71,7 @@ def test_a_planted_ship_is_found_again() -> None:
     assert found.contradictions == ()
 
 
+@pytest.mark.thorough
 def test_planted_factors_lie_within_the_stated_covariance() -> None:
     """Of ships drawn from the prior, (estimate - truth)' C^-1 (estimate - truth) has the mean of chi square."""
     problem = Problem(COASTER)
@@ -87,6 +89,7 @@ def test_planted_factors_lie_within_the_stated_covariance() -> None:
     assert 0.49 - spread < np.mean(distances) < 1 + spread
 
 
+@pytest.mark.thorough
 def test_a_stated_circle_narrows_the_intervals() -> None:
     alone = nominal(COASTER, also=(CIRCLE, ZIGZAG)).predicted
     known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
@@ -107,6 +110,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.thorough
 def test_the_vessel_file_does_what_the_table_says(made: Path) -> None:
     vessel = load_vessel(made / "vessel.toml")
     rows = json.loads((made / "nominal.json").read_text())["trials"]
@@ -137,6 +141,7 @@ def test_the_vessel_file_states_honest_scatter(made: Path) -> None:
     assert model.parameter_correlation_matrix[sway, yaw] < -0.7  # one rudder, behind midships
 
 
+@pytest.mark.thorough
 def test_ships_drawn_from_the_file_sail_as_the_table_says(made: Path) -> None:
     """The normal prior of a vessel file stands for the ships of the table, whose factors are drawn and simulated."""
     vessel = load_vessel(made / "vessel.toml")
@@ -161,6 +166,7 @@ def test_parameters_keep_the_signs_that_physics_gives(made: Path) -> None:
         assert low <= value <= high
 
 
+@pytest.mark.thorough
 def test_values_that_contradict_are_named() -> None:
     known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
     wrong = tuple(
@@ -175,6 +181,7 @@ def test_values_that_contradict_are_named() -> None:
     assert nominal(replace(COASTER, stated=known)).contradictions == ()
 
 
+@pytest.mark.thorough
 def test_particulars_that_no_ship_has_together_are_named() -> None:
     (screw,) = COASTER.thrusters
     weak = replace(COASTER, thrusters=(replace(screw, power_w=50e3),), top_speed_mps=10.0)
@@ -189,6 +196,7 @@ def test_particulars_that_no_ship_has_together_are_named() -> None:
     assert any("pitch ratio of more than" in said for said in nominal(slow).contradictions)
 
 
+@pytest.mark.thorough
 def test_a_trial_without_end_is_shown_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A craft with a fin at the bow instead of the stern: heavy astern, she turns for ever in a zig-zag."""
     craft = '[ship]\nname = "s"\nlength_m = 12.0\nbeam_m = 3.5\ndraught_m = 1.6\nblock_coefficient = 0.6\n'

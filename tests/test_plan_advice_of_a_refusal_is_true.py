@@ -85,6 +85,7 @@ def gap(half_m: float) -> shapely.Geometry:
     return WIDE.difference(shapely.box(-10, -400, 10, -half_m).union(shapely.box(-10, half_m, 10, 400)))
 
 
+@pytest.mark.thorough
 def test_the_clearance_named_for_a_narrow_passage_leads_through_it():
     case = problem(gap(24.0), clearance_m=25.0)
     text = refusal(case)
@@ -93,6 +94,7 @@ def test_the_clearance_named_for_a_narrow_passage_leads_through_it():
     plan_trial(changed(case, clearance_m=setting(text, "clearance_m")))
 
 
+@pytest.mark.thorough
 def test_the_clearance_named_for_a_run_without_a_place_gives_it_one():
     pool = problem(shapely.box(-90, -90, 90, 90), start=(0.0, -5.0, 0.0), goal=(0.0, 5.0, 0.0), clearance_m=65.0)
     certain = replace(pool.vessel.model, parameter_std=np.zeros(len(pool.vessel.model.names)))
@@ -105,6 +107,7 @@ def test_the_clearance_named_for_a_run_without_a_place_gives_it_one():
     plan_trial(followed)
 
 
+@pytest.mark.thorough
 def test_a_goal_that_land_cuts_off_comes_with_the_nearest_one_that_can_be_reached():
     case = problem(gap(-1.0))
     text = refusal(case)
@@ -122,6 +125,7 @@ def test_the_confidence_named_where_it_cannot_be_estimated_can_be():
     plan_trial(changed(case, confidence=setting(text, "confidence")))
 
 
+@pytest.mark.thorough
 def test_the_speed_named_against_a_current_overcomes_it():
     stream = Environment(current_to=np.array([0.0, 0.5]))
     case = problem(WIDE, environment=stream, transit_speed_mps=0.4)

@@ -66,6 +66,7 @@ def verified(asked: PlanProblem, sailed) -> tuple[str, ...]:
     ).problems
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("moves", [TURNING, pytest.param(ASTERN, marks=pytest.mark.slow)], ids=["turning", "astern"])
 def test_the_first_sample_is_the_state_asked_for_and_the_check_sees_when_it_is_not(moves):
     asked = problem(moves)
@@ -93,6 +94,7 @@ def test_the_first_sample_is_the_state_asked_for_and_the_check_sees_when_it_is_n
     assert 0 < least_s <= sailed.seconds("reposition")
 
 
+@pytest.mark.thorough
 def test_rest_said_as_a_motion_is_rest():
     u_c, v_c = to_body(CURRENT.current_to, 0.5, NUMPY)
     rest = UnderWay(velocity=np.array([u_c, v_c, 0.0]), inputs=np.zeros(4))
@@ -101,6 +103,7 @@ def test_rest_said_as_a_motion_is_rest():
     assert np.array_equal(said.states, silent.states)
 
 
+@pytest.mark.thorough
 def test_actuators_that_answer_late_deliver_what_stands():
     vessel = ship()
     slow = [replace(item, responses=(Response(lag_s=2.0),) * 2) for item in vessel.model.actuators]

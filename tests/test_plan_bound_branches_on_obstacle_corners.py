@@ -89,6 +89,7 @@ def test_a_half_circle_to_starboard_saves_the_detour_round_a_pier_on_that_side_o
     assert least_s < saved[run.name] < most_s
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 2, 3, 4))])
 def test_no_random_placement_saves_more_than_the_bound(seed):
     rng = np.random.default_rng(seed)

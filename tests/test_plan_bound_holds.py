@@ -346,6 +346,7 @@ def test_ships_with_stopped_engines_accelerate_no_faster_than_the_limit_at_any_a
     assert (fastest[within] <= most[::10][within] + 1e-6).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(2))
 def test_legs_found_in_random_water_take_longer_than_the_bound(seed):
     rng = np.random.default_rng(seed)

@@ -167,6 +167,7 @@ def test_a_lattice_without_a_plan_says_which_and_what_was_not_tried():
         LatticeSearch(spacing_m=60.0).place(case, (1,), start=np.zeros(3))
 
 
+@pytest.mark.thorough
 def test_mirrored_water_and_runs_cost_the_same():
     water = OPEN.difference(shapely.box(-200, 200, 500, 500))
     case = space(water, (900, 900, 0.5), run("aside", (100, 130, 0.7)))

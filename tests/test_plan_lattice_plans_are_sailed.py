@@ -83,6 +83,7 @@ def runs_of(plan) -> Counter[str]:
     return Counter(leg["name"] for leg in plan["legs"] if leg["kind"] == "primitive")
 
 
+@pytest.mark.thorough
 def test_every_zigzag_is_run_three_times_on_a_verified_round_trip(harbour):
     plan, track = plan_of(harbour), columns(harbour / "track.csv")
     assert plan["verified"] is True
@@ -93,6 +94,7 @@ def test_every_zigzag_is_run_three_times_on_a_verified_round_trip(harbour):
     assert track["north_m"].min() < 300.0 < track["north_m"].max()  # out between the moles and back
 
 
+@pytest.mark.thorough
 def test_the_hull_keeps_its_clearance_from_land_and_from_water_that_is_too_shallow(harbour):
     chart = json.loads((SCENARIOS / "areas" / "harbour.geojson").read_text())
     layers: dict[str, list[shapely.Geometry]] = {}
@@ -111,6 +113,7 @@ def test_the_hull_keeps_its_clearance_from_land_and_from_water_that_is_too_shall
         assert shapely.distance(boundary, shapely.points(east, north)).min() > 0.98 * 20.0
 
 
+@pytest.mark.thorough
 def test_the_proof_is_written_with_the_plan(harbour):
     proof = plan_of(harbour)["lattice"]
     assert 0.0 < proof["lower_bound_s"] <= proof["cost_s"]
@@ -119,12 +122,14 @@ def test_the_proof_is_written_with_the_plan(harbour):
     assert proof["headings"] == 8
 
 
+@pytest.mark.thorough
 def test_the_sailed_plan_takes_about_as_long_as_the_lattice_says(harbour):
     plan = plan_of(harbour)
     assert plan["lattice"]["places_refused"] == 0
     assert plan["reposition_s"] == pytest.approx(plan["lattice"]["cost_s"], rel=0.15)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("planner", [pytest.param("beam", marks=pytest.mark.slow), "lattice"])
 def test_both_planners_give_verified_plans_of_the_same_runs(planner, tmp_path):
     summary = workflows.plan(small(tmp_path, planner), tmp_path / "out").summary

@@ -91,6 +91,7 @@ def test_actuators_that_need_longer_lose_no_less():
     assert (transition_losses_s(RULE, 1.0, 0.5) <= transition_losses_s(slow, 1.0, 0.5) + 1e-9).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("legs", [8, pytest.param(60, marks=pytest.mark.slow)])
 def test_half_of_optimised_legs_take_as_long_as_the_rule_says_within_three_seconds(legs):
     water = leg_water(shapely.box(-1000, -1000, 1000, 1000))

@@ -72,6 +72,7 @@ def moving(vessel, speed):
     return ahead.velocity, ahead.inputs
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("exit_mps", "entry_mps", "hulls"),
     [(0.0, 5.0, 7.0), pytest.param(4.8, 5.0, 8.0, marks=pytest.mark.slow), (2.4, 0.0, 6.0)],

@@ -39,6 +39,7 @@ def test_dubins_curves_have_their_closed_form_lengths():
     assert half_turn[len(half_turn) // 2, 0] == pytest.approx(50.0, abs=0.5)  # first ahead, then to starboard
 
 
+@pytest.mark.thorough
 def test_a_path_round_a_wall_is_found_and_its_hull_is_clear():
     water = leg_water(BASIN.difference(WALL))
     start, end = at_rest(0, -150, 0.0), at_rest(0, 150, np.pi)
@@ -103,6 +104,7 @@ def test_commands_take_the_vessel_to_the_desired_state_within_limits_and_rates(s
     assert shapely.contains_properly(water.safe, swept_area(track.pose, water.vessel.hull_b))
 
 
+@pytest.mark.thorough
 def test_a_leg_without_a_solution_in_its_corridor_is_found_where_the_whole_water_holds_one(monkeypatch):
     solved = agile.solve_leg
     monkeypatch.setattr(agile, "solve_leg", lambda problem: None if problem.bounded else solved(problem))

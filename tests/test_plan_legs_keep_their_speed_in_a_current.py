@@ -63,6 +63,7 @@ def test_legs_between_moving_ends_keep_the_stated_speed_and_zermelos_time(way, m
     assert least_s <= seconds <= 1.03 * least_s + 2.0
 
 
+@pytest.mark.thorough
 def test_a_leg_that_turns_across_a_current_round_a_wall_keeps_the_stated_speed():
     current = np.array([0.1, 0.2])
     sea = shapely.box(-700, -700, 700, 700).difference(shapely.box(-20, -700, 20, 200))
@@ -97,6 +98,7 @@ def test_legs_from_rest_to_rest_take_no_less_than_the_bound(way):
     assert bound_s <= len(values) * water.vessel.sample_time_s
 
 
+@pytest.mark.thorough
 def test_ships_with_a_helm_keep_the_stated_speed_against_a_current():
     still = open_water(coaster())
     length, fastest = still.vessel.length_m, still.ship.transit_speed_mps

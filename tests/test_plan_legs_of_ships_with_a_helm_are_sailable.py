@@ -65,6 +65,7 @@ BOTH = pytest.mark.parametrize(
 ONE = pytest.mark.parametrize("ship", ["coaster", pytest.param("catamaran", marks=pytest.mark.slow)])
 
 
+@pytest.mark.thorough
 @BOTH
 def test_the_commands_sailed_with_a_tenth_of_the_step_arrive(ship, case):
     water, task, values = sailed(ship, case)
@@ -125,6 +126,7 @@ def test_a_long_leg_is_steady_ahead_in_between_and_hardly_longer_than_its_path(s
     assert time_s < 1.15 * path_m / transit.speed_mps
 
 
+@pytest.mark.thorough
 @ONE
 def test_a_run_begins_after_a_steady_run_up_with_its_own_commands(ship):
     water, task, values = sailed(ship, "after a turn")

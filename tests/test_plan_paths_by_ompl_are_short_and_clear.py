@@ -54,6 +54,7 @@ def test_paths_are_clear_and_hardly_longer_than_the_shortest(seed: int) -> None:
     assert np.allclose([path.length_m for path in found], shortest, rtol=0.01)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", AGILE)
 def test_on_every_example_chart_no_path_is_a_hundredth_longer_than_the_shortest(name: str) -> None:
     case = load_scenario(SCENARIOS / f"{name}.toml")
@@ -87,6 +88,7 @@ def islanded(graph: Roadmap, rng: np.random.Generator, count: int) -> list[tuple
     return pairs
 
 
+@pytest.mark.thorough
 def test_a_path_does_not_depend_on_what_was_asked_before() -> None:
     first = [path.points for path in paths(islands(0), ENDS)]
     paths(islands(1), ENDS)
@@ -115,6 +117,7 @@ def test_the_graph_is_asked_where_it_is_wished_and_where_the_roadmap_has_no_path
     assert (found.source, found.points.tolist()) == (wished.source, wished.points.tolist())
 
 
+@pytest.mark.thorough
 def test_a_leg_says_what_found_its_path() -> None:
     water, rest = islands(0), np.zeros(4)
     start, end = (np.r_[place, np.zeros(4)] for place in ENDS)

@@ -64,6 +64,7 @@ def crossing_m(track) -> float:
     return float(np.interp(STRAIT_M, track.pose[:, 0], track.pose[:, 1]))
 
 
+@pytest.mark.thorough
 def test_a_wider_passage_is_taken_where_too_many_trials_leave_the_direct_one_whatever_the_work_budget(attempts):
     case = problem((0.0, GAP_M), (ASIDE_M, 45.0))
     track = plan_trial(replace(case, settings=replace(case.settings, time_budget_s=0.1)))
@@ -82,6 +83,7 @@ def test_with_known_weather_the_direct_passage_meets_the_chance_constraint(attem
     assert abs(crossing_m(track)) < GAP_M
 
 
+@pytest.mark.thorough
 def test_without_a_wider_passage_the_refusal_names_the_share_the_leg_and_the_place(attempts):
     with pytest.raises(NoPlan) as caught:
         plan_trial(problem((0.0, GAP_M)))

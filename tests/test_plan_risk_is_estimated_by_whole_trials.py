@@ -59,6 +59,7 @@ def sailing(basin=OPEN, environment=None, *, certain=False, draws=30, seed=0):
     return water, sail_trials(water, planned(), draws=draws, rng=rng)
 
 
+@pytest.mark.thorough
 def test_nominal_ships_reach_the_goal_without_go_arounds():
     _, trials = sailing(certain=True, draws=3)
     assert trials.completed.all()
@@ -97,6 +98,7 @@ def test_parts_sailed_in_turn_have_streams_of_their_own_and_no_more_ships_than_o
     assert not np.array_equal(parted.used[2, 10:20], alone.used[2])
 
 
+@pytest.mark.thorough
 def test_an_unknown_current_causes_go_arounds_and_costs_time():
     calm = leg_water(OPEN, clearance_m=5.0)
     windy = replace(calm, environment=Environment(current_std_mps=0.5))

@@ -48,6 +48,7 @@ def test_water_too_small_for_a_run_names_the_run_its_length_and_the_widest_place
     assert "no single change of those tried helps" in text
 
 
+@pytest.mark.thorough
 def test_too_narrow_a_passage_names_its_width_its_place_and_the_setting():
     wall = shapely.box(-10, -1000, 10, 300).union(shapely.box(-10, 330, 10, 1000))
     text = refusal(WIDE.difference(wall))

@@ -200,6 +200,7 @@ def test_a_vessel_with_forces_in_every_direction_needs_no_helm():
     assert not needs_helm(load_vessel(VESSELS / "model-ship.toml"))
 
 
+@pytest.mark.thorough
 def test_thrusters_steer_a_ship_on_legs_only_where_they_hold_a_turn_against_her_hull():
     """A hull that turning pushes outwards goes round by drifting: held without drift, she would go straight on."""
     ship = load_vessel(TEMPLATES / "azimuth" / "vessel.toml")

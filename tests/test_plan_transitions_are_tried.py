@@ -38,6 +38,7 @@ def test_each_pair_of_runs_counts_once_and_so_do_both_ends():
     assert pairs_of(places) == [("", "a"), ("a", "b"), ("b", "b"), ("b", "a"), ("a", "")]
 
 
+@pytest.mark.thorough
 def test_a_tried_transition_is_sailed_as_optimised_and_loses_no_more_than_others(water, space):
     go = primitive(water.vessel)
     known = tried(space, water, {"go": go})

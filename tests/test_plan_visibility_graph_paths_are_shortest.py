@@ -147,6 +147,7 @@ def test_corners_tested_in_parts_give_the_graph_of_all_at_once(monkeypatch):
     assert (whole.lengths != parts.lengths).nnz == 0
 
 
+@pytest.mark.thorough
 def test_passages_between_a_thousand_islands_remain():
     """Islands have four corners each at least, so 4000 must be accepted before their passages are lost."""
     pitch_m, radius_m, side = 1000.0, 200.0, 32

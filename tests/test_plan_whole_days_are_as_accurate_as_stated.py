@@ -50,6 +50,7 @@ def days(planned, request):
     return simulated_days(case, sailed.commands, trials=TRIALS, environment=environment, method=method)
 
 
+@pytest.mark.thorough
 def test_standard_deviations_are_those_stated_but_for_chance_and_noise_beyond_first_order(days):
     assert days.failed == 0
     least, most = np.sqrt(chi2.ppf([RARE, 1 - RARE], TRIALS - 1) / (TRIALS - 1))
@@ -58,6 +59,7 @@ def test_standard_deviations_are_those_stated_but_for_chance_and_noise_beyond_fi
     assert (ratio > least / (1 + FIRST_ORDER)).all()
 
 
+@pytest.mark.thorough
 def test_estimates_are_right_on_average_and_their_intervals_hold_the_truth(days):
     error = days.bias / (days.found / np.sqrt(TRIALS))
     assert (np.abs(error) < t.isf(RARE, TRIALS - 1) + FIRST_ORDER * np.sqrt(TRIALS)).all()

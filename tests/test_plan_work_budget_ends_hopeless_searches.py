@@ -39,6 +39,7 @@ def test_the_same_leg_costs_the_same_each_time(water):
     assert spent[0] == spent[1] > 0.0
 
 
+@pytest.mark.thorough
 def test_a_leg_that_cannot_be_sailed_costs_no_more_than_it_may(water):
     ends = at_rest(15, 0, 0.0) + np.array([0.0, 0.0, 0.0, -3.0, 3.0, 0.0])  # faster sideways than the ship can go
     much, little = (replace(task(ends), budget=WorkBudget(most_s=most_s)) for most_s in (2.0, 0.2))
@@ -61,6 +62,7 @@ def test_transitions_are_left_to_the_rule_when_there_is_nothing_left_to_spend(wa
     assert found.tried == space.tried
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("planner", ["beam", "lattice"])
 @pytest.mark.parametrize(("leg_s", "tries"), [(0.0, 11), (8.0, 3)])  # 2 s each at least: 11 x 2, or 3 x 8, pass 20
 def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_by_a_clock(monkeypatch, planner, leg_s, tries):

@@ -36,6 +36,7 @@ LIMITS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", LIMITS)
 def test_no_phase_does_more_than_its_limit(made_once, name):
     done = example_work(made_once, name)

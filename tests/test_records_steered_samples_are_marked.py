@@ -66,6 +66,7 @@ def test_wrong_marks_are_refused(tmp_path: Path, more: dict[str, np.ndarray], pr
         load_records(marked(tmp_path / "one.csv", **more))
 
 
+@pytest.mark.thorough
 def test_estimates_say_which_samples_they_used(tmp_path: Path) -> None:
     path, commands = tmp_path / "one.csv", model_ship_commands(2000)
     write_run(path, MODEL_SHIP_TRUE, commands, **EULER)

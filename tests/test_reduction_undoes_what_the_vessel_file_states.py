@@ -107,6 +107,7 @@ def test_regressions_from_readings_that_are_held_are_right_within_one_per_cent(m
     assert largest_error(batch, vessel, method, Settings()) < 0.01
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("method", ["ls", "iv"])
 def test_regressions_of_continuous_motion_are_as_good_as_without_faults(method: str):
     """The trapezoidal rule leaves an error of its own, which depends on the motion; faults add less than 1 %."""
@@ -268,6 +269,7 @@ def test_terms_of_a_vanes_wind_are_right_on_average_over_its_noise(text: str):
     assert mean == pytest.approx(expression.evaluate(exact, SCALAR), rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_instruments_find_wind_forces_from_a_noisy_vane():
     """On average over trials, which without the correction they do not."""
     vessel, trials = ship(wind_sensor="vane", wind_angle_rad=0.3), 10
@@ -342,6 +344,7 @@ def check_coverage(trials: int) -> None:
     assert faulty.mean() > 0.8
 
 
+@pytest.mark.thorough
 def test_intervals_cover_as_often_as_without_faults():
     check_coverage(8)
 

@@ -106,6 +106,7 @@ def rehearsed(integrator: str, trials: int) -> Rehearsal:
     )
 
 
+@pytest.mark.thorough
 def test_parameters_of_continuous_motion_are_those_estimated_from_it():
     """The yaw damping, 0.35 per sample, is estimated without the 15 % that Euler's map would be off."""
     trials = 30
@@ -117,6 +118,7 @@ def test_parameters_of_continuous_motion_are_those_estimated_from_it():
     assert (np.abs(result.found / result.theory - 1.0) < 0.15 + 2.8 / np.sqrt(2 * trials)).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("trials", [pytest.param(1000, marks=pytest.mark.slow), 30])
 def test_predicted_standard_deviations_are_those_of_simulated_trials(trials):
     rehearsal = rehearsed("euler", trials)
@@ -157,6 +159,7 @@ def ship_30m_rehearsal(trials: int, method: str, designs: tuple[str, ...] = ()) 
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("trials", "designs"), [pytest.param(600, (), marks=pytest.mark.slow), (20, FEW)], ids=["dictionary", "few"]
 )
@@ -176,6 +179,7 @@ def test_headings_of_any_consecutive_runs_are_spread_evenly():
         assert abs(part.sum()) < 1.6
 
 
+@pytest.mark.thorough
 def test_any_number_of_processes_and_any_interruption_give_the_same(monkeypatch):
     monkeypatch.setattr(validation, "CHUNK_TRIALS", 3)
     monkeypatch.setattr(validation, "SINGLE_TRIALS", 2)

@@ -43,6 +43,7 @@ def judged(seed: int, change: str = "", file: RollPendulum = KNOWN, samples: int
         return None
 
 
+@pytest.mark.thorough
 def test_nothing_is_named_where_nothing_changed() -> None:
     """At 1 % a record, two or more of eight have a chance of 0.3 %."""
     told = [judged(seed) for seed in range(9100, 9108)]
@@ -107,6 +108,7 @@ def known_file(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.thorough
 def test_diagnose_names_it_in_page_file_and_vessel(tmp_path: Path) -> None:
     ship = replace(SHIP, pendulum=replace(KNOWN, parameters={**PARAMETERS, **LOST_GM}))
     data = write_csv(tmp_path / "trial.csv", trial(ship, NOMINAL, 9201, samples=1500))
@@ -121,6 +123,7 @@ def test_diagnose_names_it_in_page_file_and_vessel(tmp_path: Path) -> None:
     assert found.parameters["k"] == pytest.approx(LOST_GM["k"], rel=0.02)
 
 
+@pytest.mark.thorough
 def test_estimates_are_those_without_roll_and_say_so(tmp_path: Path) -> None:
     data = write_csv(tmp_path / "trial.csv", trial(loaded(SHIP, HIGH), HIGH, 1, samples=1000))
     plain = tmp_path / "plain.toml"

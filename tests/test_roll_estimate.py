@@ -90,6 +90,7 @@ def all_nine() -> RollEstimate:
     return estimate_roll(ship_problem(three_cases(), free=PARAMETERS))
 
 
+@pytest.mark.thorough
 def test_data_almost_without_noise_give_the_truth() -> None:
     calm = Sea(roll_rate=1e-5, sensed=1e-5, yaw_rate=1e-5)
     found = estimate_roll(ship_problem(ship_cases(THEIR_LOADS, calm, seed=3)))
@@ -152,6 +153,7 @@ def test_cures_name_knowledge_sensor_and_load_and_a_second_load_at_the_same_heig
     assert [rank for what, rank in cures.items() if "near the centre of mass" in what] == [9, 9]
 
 
+@pytest.mark.thorough
 def test_full_scale_data_give_the_full_scale_ship() -> None:
     """All of Froude's law at once: the ship's signals are those of the model, slower, and so is the estimate."""
     scale, cases = 24.0, three_cases()
@@ -179,6 +181,7 @@ def froude_scaled_std(model: RollEstimate, scale: float) -> list[float]:
     return [float(std[PARAMETERS.index(name)]) for name in model.problem.free]
 
 
+@pytest.mark.thorough
 def test_a_slow_rudder_at_full_scale_tells_the_ship() -> None:
     """20 degrees to each side at 6 degrees a second, ten minutes for each load: errors within 4 std."""
     truth, problem = full_scale_problem(6.0, 7e3, np.random.default_rng(24), hold_s=4.0)
@@ -189,6 +192,7 @@ def test_a_slow_rudder_at_full_scale_tells_the_ship() -> None:
     assert one.std["m"] < 0.3 * named(truth)["m"]
 
 
+@pytest.mark.thorough
 def test_few_samples_in_a_period_do_not_bias_what_is_anti_aliased() -> None:
     """13 samples in a period, where the bilinear map by itself is 2 % off: squares of 8 errors over their variances."""
     fine, sections = (
@@ -231,6 +235,7 @@ def entries_over_mean(**moments: float) -> tuple[float, RollEstimate]:
     return float(np.mean(peaks) / np.mean(sizes)), one
 
 
+@pytest.mark.thorough
 def test_what_the_model_misses_shows_at_turn_entries_and_in_the_verdict() -> None:
     """As in the thesis's figure 6.17, about tenfold; residuals of a linear ship have the peaks of noise, about 3."""
     linear, own = entries_over_mean(damping=0.0, cross_flow=0.0, stall=0.0)
@@ -266,6 +271,7 @@ def test_rounds_settle_within_a_few() -> None:
     assert np.abs((rounds[-1] - rounds[-2]) / rounds[-1]).max() < 4e-3
 
 
+@pytest.mark.thorough
 def test_k_stays_where_the_search_began_and_the_mass_does_not_care() -> None:
     found = [estimate_roll(ship_problem(three_cases(), free=PARAMETERS, k=k)).values for k in (8.0, 10.0)]
     assert [one["k"] for one in found] == [8.0, 10.0]
@@ -274,6 +280,7 @@ def test_k_stays_where_the_search_began_and_the_mass_does_not_care() -> None:
     assert np.ptp([one["z_m"] for one in found]) < 1e-3
 
 
+@pytest.mark.thorough
 def test_a_second_known_load_at_another_height_determines_all_nine() -> None:
     loads = [*THEIR_LOADS, Load(mass_kg=4.0, z_m=0.1)]
     report = null_space(estimate_roll(ship_problem(ship_cases(loads, LITTLE, seed=5), free=PARAMETERS)))

@@ -27,6 +27,7 @@ def inside(one: RollEstimate, mass_kg: float) -> bool:
     return one.load_interval[0] <= mass_kg <= one.load_interval[1]
 
 
+@pytest.mark.thorough
 def test_damping_by_the_square_is_estimated_and_costs_no_answer() -> None:
     sea = Sea(quadratic=0.5, run_s=FEW_S)
     one = found(0, sea)
@@ -36,11 +37,13 @@ def test_damping_by_the_square_is_estimated_and_costs_no_answer() -> None:
     assert inside(one, sea.load[0])
 
 
+@pytest.mark.thorough
 def test_a_rudder_set_by_the_clock_does_not_answer_roll() -> None:
     """A helm by the clock foresees itself, and what a model misses follows the rudder; neither is an answer."""
     assert not found(0, Sea(zigzag_s=12.0, quadratic=0.08, run_s=FEW_S)).answering
 
 
+@pytest.mark.thorough
 def test_the_sensors_place_and_tilt_are_found() -> None:
     sea = Sea(quadratic=0.2, forward_m=2.0, tilt_deg=2.0)
     one = found(0, sea)
@@ -60,6 +63,7 @@ def test_a_stated_place_and_tilt_are_those_of_a_level_sensor_at_midships() -> No
     assert np.std(corrected - plain, axis=0)[0] < 0.2 * np.std(moved - plain, axis=0)[0]
 
 
+@pytest.mark.thorough
 def test_a_load_is_positive_and_its_interval_longer_above_than_below_in_waves() -> None:
     """The moments tell mass times height and mass times its square: the smaller the height, the larger the mass."""
     sea = Sea(roll_deg=1.0, run_s=FEW_S)

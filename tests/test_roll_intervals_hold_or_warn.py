@@ -65,6 +65,7 @@ def squared_deviations(runs: int, seed: int, method: str) -> Array:
     return np.array(result)
 
 
+@pytest.mark.thorough
 def test_intervals_hold_under_a_narrow_band_moment_that_makes_least_squares_sure_of_wrong_values() -> None:
     """Mean of squares that are 1 on average, within 3 of its standard deviations if the two were one and the same."""
     runs = 8
@@ -80,6 +81,7 @@ def test_of_many_intervals_under_a_narrow_band_moment_no_fewer_hold_than_they_sa
     assert held > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / runs)
 
 
+@pytest.mark.thorough
 def test_a_moment_that_hides_the_rudder_is_noticed() -> None:
     def weak(moment: float, number: int) -> bool:
         sea = Sea(moment=moment, frequency_hz=1.0, damping=0.1)
@@ -104,6 +106,7 @@ def steered(gain: float, number: int, *, planned: bool = False) -> tuple[RollEst
     return one, (one.theta - MODEL_SHIP_TRUTH)[places] ** 2 / np.diag(one.covariance)
 
 
+@pytest.mark.thorough
 def test_a_rudder_that_answers_roll_is_told_from_one_that_answers_the_course() -> None:
     """Strong damping by the rudder is found in most runs; what only answers heading and yaw in none."""
     answering = [steered(1.0, number)[0] for number in range(6)]
@@ -112,6 +115,7 @@ def test_a_rudder_that_answers_roll_is_told_from_one_that_answers_the_course() -
     assert not any(steered(0.0, number)[0].answering for number in range(6))
 
 
+@pytest.mark.thorough
 def test_orders_are_instruments_where_the_rudder_is_none() -> None:
     """Mean of squares that are 1 on average, within 3 of its standard deviations if all of a run were one."""
     runs = 6

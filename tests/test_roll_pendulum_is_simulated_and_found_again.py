@@ -171,6 +171,7 @@ def test_two_kinds_of_roll_are_refused() -> None:
         replace(SHIP, model=replace(SHIP.model, roll=mode))
 
 
+@pytest.mark.thorough
 def test_three_simulated_loads_give_the_roll_again(tmp_path: Path) -> None:
     """Estimates from a file that is wrong about most, with k known from hydrostatics, are within four deviations."""
     assert SHIP.pendulum is not None

@@ -36,6 +36,7 @@ def harbour(tmp_path_factory):
     return load_area(write_area(tmp_path_factory.mktemp("cell"), CELL), draught_m=DRAUGHT_M)
 
 
+@pytest.mark.thorough
 def test_no_charted_danger_lies_in_the_water(harbour):
     depths, columns = features("SOUNDG", SPLIT_MULTIPOINT="YES", ADD_SOUNDG_DEPTH="YES")
     shoal = shapely.force_2d(depths[columns["DEPTH"] < NEEDED_M])
@@ -72,6 +73,7 @@ def test_edition_updates_and_datum_are_noted(harbour):
     assert any("mean lower low water" in note for note in harbour.notes)
 
 
+@pytest.mark.thorough
 def test_missing_update_files_are_noted_and_a_gap_is_refused(tmp_path):
     cell = Path(shutil.copy(CELL, tmp_path))
     area = load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
@@ -81,6 +83,7 @@ def test_missing_update_files_are_noted_and_a_gap_is_refused(tmp_path):
         load_area(write_area(tmp_path, cell), draught_m=DRAUGHT_M)
 
 
+@pytest.mark.thorough
 def test_tide_opens_water_and_draught_closes_it(tmp_path, harbour):
     high = load_area(write_area(tmp_path, CELL, rest="[depth]\ntide_m = 3.0"), draught_m=DRAUGHT_M)
     deep = load_area(write_area(tmp_path, CELL), draught_m=DRAUGHT_M + 3.0)
@@ -89,6 +92,7 @@ def test_tide_opens_water_and_draught_closes_it(tmp_path, harbour):
     assert "- 3 m tide = 0.5 m" in high.depth_rule
 
 
+@pytest.mark.thorough
 def test_bridges_open_for_ships_that_fit_below(tmp_path, harbour):
     low = load_area(write_area(tmp_path, CELL, "air_draught_m = 6.0"), draught_m=DRAUGHT_M)
     opened = low.water.difference(harbour.water)
@@ -101,6 +105,7 @@ def test_bridges_open_for_ships_that_fit_below(tmp_path, harbour):
     assert opened.difference(crossings.buffer(1.1)).area < 1.0
 
 
+@pytest.mark.thorough
 def test_nowhere_deep_enough_names_the_deepest(tmp_path):
     with pytest.raises(NoPlan, match=r"no charted depth reaches .* = 41 m, the deepest is 15\.6 m"):
         load_area(write_area(tmp_path, CELL), draught_m=40.0)

@@ -40,6 +40,7 @@ def added(asked):
     return manoeuvres_worth_adding(problem, accuracy, FEW)
 
 
+@pytest.mark.thorough
 def test_with_them_the_runs_cost_less_and_the_accuracy_stays_that_of_the_dictionary(asked, added):
     case, problem, accuracy = asked
     wider = _with_additions(case, added)
@@ -58,6 +59,7 @@ def test_with_them_the_runs_cost_less_and_the_accuracy_stays_that_of_the_diction
     assert (barred.most[-len(added) :] == 0).all()
 
 
+@pytest.mark.thorough
 def test_they_keep_to_the_velocities_of_the_dictionary_and_below_the_speed_of_legs(asked, added):
     case, problem, _ = asked
     motion = np.concatenate([item.trajectory.velocity for item in problem.primitives])
@@ -71,6 +73,7 @@ def test_they_keep_to_the_velocities_of_the_dictionary_and_below_the_speed_of_le
         assert (velocity <= high + 1e-6).all()
 
 
+@pytest.mark.thorough
 def test_they_last_as_long_as_the_longest_run_or_a_share_of_that(asked, added):
     _, problem, _ = asked
     longest_s = max(item.duration_s for item in problem.primitives)
@@ -82,6 +85,7 @@ def first_prices_speed(problem):
     return float(np.hypot(*(problem.goal - problem.start)[:2])) / first_prices(problem).way_s
 
 
+@pytest.mark.thorough
 def test_the_same_seed_finds_the_same_of_the_duration_stated(asked):
     _, problem, accuracy = asked
     first, again = (manoeuvres_worth_adding(problem, accuracy, replace(FEW, run_s=50.0)) for _ in range(2))

@@ -47,6 +47,7 @@ def drafted() -> DraftedDay:
     return day.late(drawn_lateness_s(replace(problem, area=draft.area), draft.water, draft.sailed))
 
 
+@pytest.mark.thorough
 def test_a_draft_is_expected_to_take_as_long_as_other_drawn_trials_of_it(drafted):
     draft = drafted.draft
     others = sail_trials(draft.water, draft.sailed, draws=400, rng=np.random.default_rng(5))

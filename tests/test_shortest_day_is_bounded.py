@@ -142,6 +142,7 @@ def test_the_richest_sample_is_found_and_no_sample_passes_its_bound():
         assert values.max() <= 1.05 * found.found <= 1.05 * found.bound
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("mean_subtraction", SUBTRACTIONS)
 def test_no_primitive_and_no_random_motion_needs_less_than_the_bound(mean_subtraction):
     """Whatever is accurate enough has <G, M> of 1 or more, and no sample has more than one over the bound."""
@@ -179,6 +180,7 @@ def telegraph_rows(rng):
     return regressor_rows(AZIMUTHS.model, motion, commands, WIND)[inside]
 
 
+@pytest.mark.thorough
 def test_wider_limits_never_raise_the_bound_and_twice_the_accuracy_doubles_it():
     _, accuracy = dictionary_accuracy("complete")
     twice = replace(accuracy, level=accuracy.level + accuracy.collected.degree * np.log(2.0))

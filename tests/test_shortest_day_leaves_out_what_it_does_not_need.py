@@ -43,6 +43,7 @@ def of_runs(*counts: int) -> SimpleNamespace:
     )
 
 
+@pytest.mark.thorough
 def test_other_runs_and_their_legs_stay_as_they_are():
     vessel = ship()
     problem = PlanProblem(

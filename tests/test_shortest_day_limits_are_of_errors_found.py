@@ -54,6 +54,7 @@ def test_what_the_reference_leaves_is_forecast_of_it(reference):
         assert asked.margin_of_track(told, covariance) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_an_outcome_is_as_uncertain_as_errors_along_its_gradient(reference):
     case, design, _, told, covariance = reference
     gradient = outcome_gradients(case.vessel, ("advance_m",), design.problem.parameters).gradients[0]

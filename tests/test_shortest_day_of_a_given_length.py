@@ -29,6 +29,7 @@ def asked():
     return plan_problem(case, information, design, seed=1), accuracy
 
 
+@pytest.mark.thorough
 def test_the_plan_is_no_longer_and_tells_what_it_says(asked, monkeypatch):
     problem, accuracy = asked
     monkeypatch.setattr(alternate, "ROUNDS", 1)

@@ -73,6 +73,7 @@ def log_det_beside_current(vessel, motion, commands, parameters):
     return -np.linalg.slogdet(covariance[np.ix_(chosen, chosen)] / np.outer(scale, scale))[1]
 
 
+@pytest.mark.thorough
 def test_the_track_holds_what_was_asked_for(day):
     folder, scenario, _ = day
     case = load_scenario(Path(scenario))
@@ -147,6 +148,7 @@ def test_two_processes_find_the_same_day(day, tmp_path):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("undrawn_here")
 def test_a_draft_is_one_day_of_a_smaller_search_with_what_it_tells(day, tmp_path):
     folder, scenario, _ = day

@@ -42,6 +42,7 @@ def estimated(files: Path, data: str, vessel: str, *methods: str) -> dict[str, d
     return json.loads((out / "estimate.json").read_text("utf-8"))
 
 
+@pytest.mark.thorough
 def test_estimates_hold_the_truth_whatever_the_record_holds(files: Path):
     found = {holds: estimated(files, str(number), "stated", "ls", "oe") for number, holds in enumerate(HOLDS)}
     for holds, by_method in found.items():
@@ -55,6 +56,7 @@ def test_estimates_hold_the_truth_whatever_the_record_holds(files: Path):
         assert content["parameters"]["N_ud"]["value"] < 0.7 * TRUTH["N_ud"], method
 
 
+@pytest.mark.thorough
 def test_positions_under_the_name_of_orders_are_not_slewed_again(files: Path):
     """Read at the samples and held from there, they come half a sample late, and nothing more."""
     write(files / "held.csv", sail(trial()), rudder1_rad="", reached="rudder1_rad")
@@ -80,11 +82,13 @@ def diagnosed(files: Path, data: str, vessel: str) -> list[dict]:
     return json.loads((out / "diagnosis.json").read_text("utf-8"))["findings"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("data", [ORDERS, POSITIONS])
 def test_the_true_ship_has_no_faults(files: Path, data: str):
     assert not diagnosed(files, data, "stated")
 
 
+@pytest.mark.thorough
 def test_a_wrong_rate_is_named_and_the_right_one_written(files: Path):
     assert diagnosed(files, ORDERS, "slow")[0]["cause"] == "actuator_slew"
     text = (files / f"found-{ORDERS}-slow" / "vessel-extended.toml").read_text("utf-8")
@@ -92,6 +96,7 @@ def test_a_wrong_rate_is_named_and_the_right_one_written(files: Path):
     assert written == pytest.approx(0.05, rel=0.04)
 
 
+@pytest.mark.thorough
 def test_a_watch_on_orders_is_silent_for_the_same_ship_and_finds_less_thrust(files: Path):
     seas = {"known": (1, {}), "same": (2, {}), "weaker": (3, {"X_nn": 0.92 * TRUTH["X_nn"]})}
     for name, (seed, truth) in seas.items():

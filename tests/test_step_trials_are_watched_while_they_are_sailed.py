@@ -38,6 +38,7 @@ def sailed(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.thorough
 def test_a_crew_that_does_as_it_is_told_sails_every_step_once_and_where_it_is_steady() -> None:
     for seed in range(10):
         crew = Crew(watch_setup(), seed)
@@ -109,6 +110,7 @@ def test_the_state_goes_through_a_file_to_the_last_bit() -> None:
     assert saved(after(crew.rows[half:], broken)) == saved(once)
 
 
+@pytest.mark.thorough
 def test_a_stream_tells_what_a_file_does_and_a_broken_off_watch_goes_on(
     sailed: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

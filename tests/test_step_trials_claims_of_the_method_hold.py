@@ -102,6 +102,7 @@ def test_play_and_a_biased_rudder_are_found_with_their_size(kind: str, wrong: di
     assert np.mean(sizes) == pytest.approx(0.02, rel=0.25)
 
 
+@pytest.mark.thorough
 def test_without_them_findings_are_as_rare_as_stated() -> None:
     seeds = 200
     for kind in ("hysteresis", "asymmetry"):

@@ -39,6 +39,7 @@ def test_with_little_noise_first_order_dead_times_are_wrong_and_the_shared_shape
     assert std < 0.05
 
 
+@pytest.mark.thorough
 def test_its_standard_error_holds_in_noise() -> None:
     seeds = 8
     found = np.array([shared_delay(hull_steps(seed, std=0.05), most_s=3.0) for seed in range(100, 100 + seeds)])

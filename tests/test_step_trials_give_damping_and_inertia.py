@@ -67,6 +67,7 @@ def test_a_wrong_plateau_spoils_the_inertia_as_published(wrong: float, ratio: fl
     assert fit.time_constant_s / constant_s / wrong == pytest.approx(ratio, rel=0.12)
 
 
+@pytest.mark.thorough
 def test_dead_time_and_constant_are_found_in_noise_with_their_standard_errors() -> None:
     time_s = np.arange(0.0, 40.0, 0.2)
     scores = []
@@ -177,6 +178,7 @@ def test_left_out_errors_of_ridge_are_those_of_leaving_out() -> None:
     assert ridge(samples, (0.0,)).held_out == pytest.approx(float(np.sqrt(np.mean(np.square(errors)))), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_symmetric_bases_predict_no_worse_than_a_full_one_and_are_symmetric() -> None:
     better = 0
     full = (*EVEN, *ODD)

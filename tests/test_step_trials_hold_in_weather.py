@@ -36,6 +36,7 @@ def test_intervals_of_means_of_correlated_noise_hold(correlation: float) -> None
     assert 0.91 < np.mean(inside) < 0.985
 
 
+@pytest.mark.thorough
 def test_intervals_of_steady_states_hold_in_gusts_and_in_a_current() -> None:
     """Before, three quarters of those of a calm day held."""
     for craft in (Craft(gusts_mps=0.08), Craft(current_mps=0.3, hold_s=80.0)):
@@ -62,6 +63,7 @@ def test_a_current_is_found_and_taken_off_where_the_heading_is_known() -> None:
     assert identified(0, Craft(gusts_mps=0.08)).currents == (None,)
 
 
+@pytest.mark.thorough
 def test_holds_astern_are_left_out_by_name_and_the_rest_is_as_without_them() -> None:
     trial, plain = identified(1, Craft(steps=ROUND + ASTERN)), identified(1, Craft(steps=ROUND))
     gone = [one for one in trial.samples if one.hold.astern]
@@ -71,6 +73,7 @@ def test_holds_astern_are_left_out_by_name_and_the_rest_is_as_without_them() -> 
     assert all(one.least > 0 for one in trial.model.damping if one is not None)
 
 
+@pytest.mark.thorough
 def test_hysteresis_at_one_level_is_found_and_none_where_there_is_none() -> None:
     def p_value(craft: Craft) -> float:
         return next(one.p_value for one in identified(3, craft).found if one.kind == "hysteresis")

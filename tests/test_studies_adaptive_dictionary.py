@@ -17,6 +17,7 @@ def comparison() -> Comparison:
     return compare("small", settings, runs=200)
 
 
+@pytest.mark.thorough
 def test_the_grown_design_is_worth_two_and_a_half_times_the_first_by_the_nominal_model(comparison: Comparison):
     assert comparison.nominal > 2.5
     assert comparison.nominal == pytest.approx(comparison.growth.rounds[-1].efficiency, rel=1e-9)

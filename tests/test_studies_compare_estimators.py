@@ -1,6 +1,7 @@
 """Comparisons of estimators on subsets of runs and on fewer samples count what they say."""
 
 import numpy as np
+import pytest
 
 from fit_by_samples import fits_by_samples
 from manoeuvring import SEVERE
@@ -33,6 +34,7 @@ def test_unstable_subsets_lose_and_are_counted() -> None:
     assert "-2 ± 1.4" in lines[-1]
 
 
+@pytest.mark.thorough
 def test_measured_wind_saves_the_fit_of_surge_in_severe_wind() -> None:
     """Figure 6.3 of F. Ljungberg's doctoral thesis, by the order of the two lines, from 3000 samples."""
     found = fits_by_samples(SEVERE, runs=3, sets=1, sizes=(3000,), estimators=("IV1", "IV3"))

@@ -116,6 +116,7 @@ def fake(case: Case, design: str, *, runs: int, seed: int) -> DesignErrors:
     )
 
 
+@pytest.mark.thorough
 def test_page_and_numbers_are_written_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(design_value, "try_design", fake)
     assert design_value.main(["--runs", "8", "--out", str(tmp_path)]) == 0

@@ -35,6 +35,7 @@ def test_scalar_system_full(case: scalar_system.Case) -> None:
     check_scalar(case, 500)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("offset", [0.0, 2.0, 10.0])
 def test_operating_points_help_the_complete_mean_only(offset: float) -> None:
     """Example 7.1: variances against (7.25) and (7.29), within their own chance error."""

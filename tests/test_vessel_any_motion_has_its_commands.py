@@ -127,6 +127,7 @@ def specifications(kind: str) -> list[PrimitiveSpec]:
     return made
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_family_sails_with_every_kind_of_ship(kind: str) -> None:
     """And where a ship is pushed everywhere, and at once, she follows slow motions."""

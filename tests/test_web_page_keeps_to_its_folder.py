@@ -147,6 +147,7 @@ def test_values_are_put_where_tables_are_missing_and_taken_away() -> None:
     assert tables == {"a": {}, "b": {"c": {"y": 2}}, "list": [{"n": 1}, {"n": 2}]}
 
 
+@pytest.mark.thorough
 def test_commands_run_report_and_stop(tmp_path: Path) -> None:
     async def work() -> None:
         jobs = Jobs(tmp_path)

@@ -43,6 +43,7 @@ def shorten(path: Path, *, digits: int) -> None:
     path.write_text("\n".join([header, *short]) + "\n", encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_estimates_and_their_run_check_are_of_the_ship_not_of_her_instruments(tmp_path: Path):
     ship = stating(TUG_TRUE, tmp_path / "ship.toml")
     data = write_run(tmp_path / "one.csv", ship, tug_commands(500), velocity=(1.7, 0.7, 0.0))

@@ -60,6 +60,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.thorough
 def test_instruments_find_the_truth_and_least_squares_does_not(trial: Path) -> None:
     found = estimates(trial)
     assert list(found) == ["ls", "iv"]
@@ -67,6 +68,7 @@ def test_instruments_find_the_truth_and_least_squares_does_not(trial: Path) -> N
     assert np.abs(errors_in_deviations(found["ls"], TRUTH)).max() > 8
 
 
+@pytest.mark.thorough
 def test_a_trial_without_noise_gives_the_parameters_exactly(tmp_path: Path) -> None:
     path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(1500), **EULER)
     workflows.estimate([path], tmp_path / "out", vessel=MODEL_SHIP, motion="euler")
@@ -94,6 +96,7 @@ def test_eulers_map_has_the_decay_that_samples_show_and_the_motion_its_own(tmp_p
     assert abs(motion - TRUTH["N_r"]) < 4 * motion_std
 
 
+@pytest.mark.thorough
 def test_without_noise_the_trapezoid_leaves_its_own_error_and_output_error_none(tmp_path: Path) -> None:
     """A decay a per sample shows as 2 tanh(a / 2) under the trapezoidal rule, 1 - exp(-a) under Euler's."""
     path = write_run(tmp_path / "one.csv", quiet(MODEL_SHIP_TRUE), model_ship_commands(1000), substeps=8)
@@ -109,6 +112,7 @@ def test_white_velocity_noise_leaves_residuals_with_correlation_minus_a_half(tri
     assert list(correlation.values()) == pytest.approx([-0.5] * 3, abs=0.08)
 
 
+@pytest.mark.thorough
 def test_runs_kept_apart_are_simulated_but_not_used(trial: Path, tmp_path: Path) -> None:
     found = estimates(trial)["iv"]
     assert list(found["fit"]["estimation"]) == ["one.csv"]
@@ -149,6 +153,7 @@ def test_what_is_held_fixed_stays_and_has_no_deviation(trial: Path, tmp_path: Pa
     assert {name: after.parameter_std[after.names.index(name)] for name in held} == {"X_u": 0, "N_mu": 0}
 
 
+@pytest.mark.thorough
 def test_generalised_forces_say_the_same_as_the_thrusters_they_come_from(tmp_path: Path) -> None:
     commands = tug_commands(600)
     path = write_run(tmp_path / "thrusters.csv", TUG_TRUE, commands, velocity=(1.7, 0.7, 0.0), **EULER)
@@ -179,6 +184,7 @@ def test_the_true_model_in_the_measured_wind_repeats_the_run(tmp_path: Path) -> 
     assert still.fit_percent.min() < 90
 
 
+@pytest.mark.thorough
 def test_wind_is_used_where_it_is_measured_and_modelled(tmp_path: Path) -> None:
     path = write_run(
         tmp_path / "one.csv", TUG_TRUE, tug_commands(600), velocity=(1.7, 0.7, 0), environment=WIND, **EULER
@@ -239,6 +245,7 @@ def test_shares_of_progress_never_fall(tmp_path: Path) -> None:
     assert told[-1] == 1.0
 
 
+@pytest.mark.thorough
 def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -> None:
     current = Environment(current_to=np.array([0.2, -0.2]))
     path = write_run(
@@ -260,6 +267,7 @@ def test_the_mean_current_is_read_out_of_an_augmented_estimate(tmp_path: Path) -
     assert "Current and wind" in (tmp_path / "out" / "estimate.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
 def test_blocks_asked_for_are_blocks_used(trial: Path, tmp_path: Path) -> None:
     """Every run a block of its own: the estimate is that of the library, and differs from one block for all."""
     files, ship = [trial.parent / f"{name}.csv" for name in ("one", "two")], load_vessel(MODEL_SHIP)
@@ -289,6 +297,7 @@ def test_a_vessel_file_without_values_starts_from_least_squares(trial: Path, tmp
         assert abs(item["value"] - usual["parameters"][name]["value"]) < 0.1 * item["std"]
 
 
+@pytest.mark.thorough
 def test_an_unstable_estimate_does_not_get_into_the_vessel_file(trial: Path) -> None:
     """Of two estimates by instruments the first is spoilt: the second is chosen, and least squares where both are."""
     ship = load_vessel(MODEL_SHIP)

@@ -44,6 +44,7 @@ def results(made_once: Callable[[str, Callable[[Path], object]], tuple[Path, obj
     return folder / "out"
 
 
+@pytest.mark.thorough
 def test_the_craft_is_recovered_with_its_delays(results: Path) -> None:
     found = json.loads((results / "step-model.json").read_text())
     for command in ("throttle", "rudder"):
@@ -54,6 +55,7 @@ def test_the_craft_is_recovered_with_its_delays(results: Path) -> None:
     assert sum(not step["problems"] for step in found["steps"]) >= 0.7 * len(found["steps"])
 
 
+@pytest.mark.thorough
 def test_the_vessel_file_holds_what_the_steps_tell_and_keeps_what_they_do_not(results: Path) -> None:
     before, after = load_vessel(GUESS).model, load_vessel(results / "vessel-steps.toml").model
     truth = load_vessel(TRUTH).model
@@ -67,6 +69,7 @@ def test_the_vessel_file_holds_what_the_steps_tell_and_keeps_what_they_do_not(re
     assert all(0.2 < response.delay_s < 1.0 for response in responses)
 
 
+@pytest.mark.thorough
 def test_the_page_and_the_summary_speak_of_the_same_steps(results: Path) -> None:
     page = (results / "step-trial.html").read_text()
     found = json.loads((results / "step-model.json").read_text())
@@ -74,6 +77,7 @@ def test_the_page_and_the_summary_speak_of_the_same_steps(results: Path) -> None
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
+@pytest.mark.thorough
 def test_a_trial_is_designed_on_top_of_what_the_steps_told(results: Path, tmp_path: Path) -> None:
     """More is known in the end than from a guess, and the same minutes add less to it."""
     known, added = {}, {}
@@ -99,6 +103,7 @@ def trial() -> StepTrial:
     return identify_steps(craft_record(3), CONTROLS)
 
 
+@pytest.mark.thorough
 def test_a_mirrored_trial_gives_the_same_model(trial: StepTrial) -> None:
     one, other = trial, identify_steps(mirrored(craft_record(3)), CONTROLS)
     assert [a.inertia for a in one.samples] == pytest.approx([b.inertia for b in other.samples], nan_ok=True, rel=1e-6)
@@ -194,6 +199,7 @@ def test_records_without_steps_have_no_answer(tmp_path: Path, capsys: pytest.Cap
     assert (status, "throttle" in told) == (3, True)
 
 
+@pytest.mark.thorough
 def test_a_signal_that_is_not_there_and_a_vessel_that_is_known_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -51,6 +51,7 @@ def found(case, monkeypatch):
     return added[0]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("settings", [{"clearance_m": 35.0}, {"confidence": 0.8}])
 def test_other_settings_of_the_plan_take_over_the_search(tmp_path, monkeypatch, evaluated, settings):
     with remembering(Memory(tmp_path)):
@@ -78,6 +79,7 @@ def test_a_draft_looks_at_fewer_candidates_and_says_so(monkeypatch, evaluated):
     assert notes[1] == ""
 
 
+@pytest.mark.thorough
 def test_another_speed_of_legs_is_another_search(tmp_path, monkeypatch, evaluated):
     with remembering(Memory(tmp_path)):
         found(asking(), monkeypatch)
@@ -87,6 +89,7 @@ def test_another_speed_of_legs_is_another_search(tmp_path, monkeypatch, evaluate
     assert sum(evaluated) > 0
 
 
+@pytest.mark.thorough
 def test_another_accuracy_searches_among_the_same_candidates(tmp_path, monkeypatch, evaluated):
     longer = asking()
     longer = replace(longer, design=replace(longer.design, total_s=2 * longer.design.total_s))

@@ -59,6 +59,7 @@ def mined(folder: Path, ship: Path, out: Path, *more: str) -> int:
     return main(["mine", str(folder), "--vessel", str(ship), "--labels", "file", "--out", str(out), "-q", *more])
 
 
+@pytest.mark.thorough
 def test_information_of_labels_is_that_of_the_known_regressors(tmp_path: Path):
     """X = Y' of the terms at the recorded motion, by a path that knows neither files nor instruments."""
     ship = tmp_path / "true.toml"
@@ -88,6 +89,7 @@ def test_information_of_labels_is_that_of_the_known_regressors(tmp_path: Path):
         np.testing.assert_allclose(np.array(entry["Z"]) / size[:, None], mean / size[:, None], atol=2e-5)
 
 
+@pytest.mark.thorough
 def test_shares_are_optimal_and_the_guarantee_holds(noisy: Path, nominal: Path, tmp_path: Path):
     """|det B| at the shares told is the value told, at least what is guaranteed, and no mixture near it is better."""
     out = tmp_path / "out"
@@ -170,6 +172,7 @@ def test_without_noise_subsets_of_three_kinds_give_the_truth_and_simulate_withou
     assert np.isinf(alone.norm).all()
 
 
+@pytest.mark.thorough
 def test_optimised_subsets_are_degenerate_less_often_than_random_ones(noisy: Path, nominal: Path, tmp_path: Path):
     """By rate over draws: of 200 random ones about a fifth is degenerate, with a standard error of 3 %."""
     assert mined(noisy, nominal, tmp_path, "--piece", "37", "--keep", "3", "--draws", "200", "--seed", "1") == 0

@@ -45,6 +45,7 @@ def ten_digits(content: object) -> object:
     return json.loads(json.dumps(content), parse_float=lambda text: f"{float(text):.10g}")
 
 
+@pytest.mark.thorough
 def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path, voyages["same"], voyages["changed"], "--reference", voyages["reference"])
     assert told["judged_h"] == pytest.approx(1.75, abs=0.05)
@@ -79,6 +80,7 @@ def told_in(folder: Path) -> dict[str, object]:
     return content
 
 
+@pytest.mark.thorough
 def test_a_ship_as_in_the_reference_raises_no_alarm(watched: Path) -> None:
     told = told_in(watched)
     assert told["alarms"] == []
@@ -100,6 +102,7 @@ def test_turns_tell_yaw_sooner_than_a_steady_course_and_the_budget_counts_every_
     assert "Which manoeuvres reveal which change" in (watched / "monitor.html").read_text()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_a_watch_that_is_resumed_loses_nothing_and_counts_nothing_twice(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
@@ -148,6 +151,7 @@ def streamed(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *words: o
     return main(["monitor", "-", *map(str, words), "--vessel", str(TENDER), "--out", str(folder), "--quiet"])
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 @pytest.mark.parametrize("lines", [1999])
 @pytest.mark.parametrize("learning", [False, True])
@@ -187,6 +191,7 @@ def test_a_killed_watch_leaves_a_state_to_go_on_from(voyages: dict[str, Path], t
     assert told["judged_h"] > 1.0
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_a_file_that_grows_is_read_on_from_where_it_ended(
     voyages: dict[str, Path], watched: Path, tmp_path: Path
@@ -202,6 +207,7 @@ def test_a_file_that_grows_is_read_on_from_where_it_ended(
     assert "log.csv: its first 3600 rows had been watched before" in again["notes"]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_results_do_not_depend_on_the_number_of_processes(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -213,6 +219,7 @@ def test_results_do_not_depend_on_the_number_of_processes(
     assert table[0] == table[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_a_stream_is_watched_as_its_file_is(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -224,6 +231,7 @@ def test_a_stream_is_watched_as_its_file_is(
     assert stream["judged_h"] == whole["judged_h"]
 
 
+@pytest.mark.thorough
 def test_the_example_of_the_readme_finds_the_change(
     voyages: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -240,6 +248,7 @@ def test_the_example_of_the_readme_finds_the_change(
     assert alarm["effect"] == "theta:N_r"
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
@@ -256,6 +265,7 @@ def test_gaps_and_rows_without_numbers_are_left_out(voyages: dict[str, Path], tm
     assert told["alarms"] == []
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_no_more_hours_are_judged_than_there_are(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
@@ -269,6 +279,7 @@ def test_no_more_hours_are_judged_than_there_are(voyages: dict[str, Path], tmp_p
     assert told["history"][-1]["time_s"] <= len(rows)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_a_stream_resumed_from_its_own_log_judges_nothing_twice(
     voyages: dict[str, Path], watched: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -284,6 +295,7 @@ def test_a_stream_resumed_from_its_own_log_judges_nothing_twice(
         assert one["history"][-1]["time_s"] <= HOUR
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_times_are_those_of_the_datas_clock(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["changed"].read_text().splitlines(keepends=True)
@@ -348,12 +360,14 @@ def test_the_state_of_another_program_is_refused(voyages: dict[str, Path], tmp_p
     )
 
 
+@pytest.mark.thorough
 def test_the_reference_may_be_the_beginning_of_the_data(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path / "out", voyages["reference"], "--learn-h", 1.1)
     assert 1.1 * HOUR <= told["reference"]["until_s"] <= 1.1 * HOUR + 60
     assert told["judged_h"] == pytest.approx(0.4, abs=0.05)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path], tmp_path: Path) -> None:
     told = monitored(tmp_path, voyages["same"], voyages["reference"], "--reference", voyages["reference"])
@@ -362,6 +376,7 @@ def test_files_whose_times_begin_again_follow_each_other(voyages: dict[str, Path
     assert told["history"][-1]["time_s"] > 3.4 * HOUR
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[str, Path], tmp_path: Path) -> None:
     path = voyage_csv(tmp_path / "half.csv", tender(X_mu=0.5, Y_mu=0.5, N_mu=0.5), HOUR // 2, seed=9)
@@ -371,6 +386,7 @@ def test_a_loss_of_half_the_thrust_is_a_change_and_not_left_out(voyages: dict[st
     assert alarm["value"] == pytest.approx(-0.5, abs=max(5 * alarm["std"], 0.02))
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_data_unlike_the_reference_are_not_called_the_same_ship(voyages: dict[str, Path], tmp_path: Path) -> None:
     header, *rows = voyages["same"].read_text().splitlines(keepends=True)
@@ -396,6 +412,7 @@ def heavier(factor: float) -> Vessel:
     return tender(**{name: 1.0 / factor for name in names if name not in ("X_vr", "Y_ur")})
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[str, Path], tmp_path: Path) -> None:
     loaded = voyage_csv(tmp_path / "loaded.csv", heavier(1.15), HOUR, seed=7, begin_s=9.0 * HOUR)
@@ -410,6 +427,7 @@ def test_another_load_after_a_port_call_is_a_remark_and_no_alarm(voyages: dict[s
     assert monitored(tmp_path / "none", *both, "--port-h", "inf")["alarms"]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("no_page")
 @pytest.mark.parametrize("correction_s", [-2.0, -0.4, 0.4])
 def test_a_small_correction_of_the_clock_is_survived(

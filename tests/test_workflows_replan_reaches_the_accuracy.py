@@ -51,6 +51,7 @@ def test_else_it_lacks_what_the_data_do_not_tell_of_the_same_accuracy(tmp_path: 
     assert lacking.margin(enough - lacking.prior) == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("key", ["day_s", "most_s"])
 def test_lengths_of_the_day_count_from_its_start(tmp_path: Path, key: str) -> None:
     case, _ = rest_of(shortest_day_so_far(tmp_path, **{key: 500.0}))

@@ -114,6 +114,7 @@ def test_what_late_actuators_deliver_stands_as_the_rest_begins():
 # how much is left
 
 
+@pytest.mark.thorough
 def test_what_is_left_is_the_whole_less_the_data_unless_it_is_said(tmp_path):
     measured(tmp_path / "a.csv")
     counted = present_state(STORY, [tmp_path / "a.csv"])
@@ -211,6 +212,7 @@ def test_manoeuvres_that_the_ship_can_no_longer_do_are_left_out_and_named(tmp_pa
     assert all(any(name in note for note in notes) for name in left)
 
 
+@pytest.mark.thorough
 def test_the_rest_can_be_made_best_for_one_parameter(tmp_path):
     measured(tmp_path / "a.csv")
     state = present_state(STORY, [tmp_path / "a.csv"], remaining_s=360.0)
@@ -330,6 +332,7 @@ def test_too_little_time_for_any_run_has_no_answer(tmp_path, capsys):
     assert "no whole run fits in the 20 s left" in error
 
 
+@pytest.mark.thorough
 def test_an_interruption_leaves_nothing(tmp_path):
     measured(tmp_path / "a.csv")
 

@@ -35,6 +35,7 @@ def test_three_files_give_the_load_and_say_what_they_do_not_tell(tmp_path: Path)
     assert "measure how far the accelerometer is from the rotation axis" in page
 
 
+@pytest.mark.thorough
 def test_with_k_known_all_else_is_found_of_the_model_and_by_froude_s_law_of_the_ship(tmp_path: Path) -> None:
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
     outcome = roll(three(tmp_path), tmp_path / "out", loads=loads, scale=24.0)
@@ -63,6 +64,7 @@ def _told_by_froude(out: Path) -> None:
     assert f"{24.0**3 * found['parameters']['m']['value']:.4g}" in page
 
 
+@pytest.mark.thorough
 def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
     files, loads = three(tmp_path), stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
     for path in files:
@@ -77,6 +79,7 @@ def test_a_wrong_sign_of_the_accelerometer_is_named(tmp_path: Path) -> None:
     assert "wrong sign" in (tmp_path / "out" / "roll.html").read_text()
 
 
+@pytest.mark.thorough
 def test_planned_rudders_are_instruments_and_said_to_be(tmp_path: Path) -> None:
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
     files = three(tmp_path)
@@ -99,6 +102,7 @@ def test_planned_rudders_are_instruments_and_said_to_be(tmp_path: Path) -> None:
     assert any("Samples are marked as steered" in note for note in told["notes"])
 
 
+@pytest.mark.thorough
 def test_a_parameter_at_a_bound_of_the_search_is_named_on_page_and_in_file(tmp_path: Path) -> None:
     far = K_KNOWN.replace("9.0", "40.0")
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + far)
@@ -112,6 +116,7 @@ def test_a_parameter_at_a_bound_of_the_search_is_named_on_page_and_in_file(tmp_p
     assert "The 95 % intervals are not to be trusted" in page
 
 
+@pytest.mark.thorough
 def test_one_file_gives_five_parameters_and_two_give_seven(tmp_path: Path) -> None:
     text = f"\n[known]\nK_vd = {truth('K_vd')}\nz_f = {truth('z_f')}\n"
     files = three(tmp_path)

@@ -156,6 +156,7 @@ def test_same_seed_same_files_another_seed_another_measurement(result, tmp_path)
     assert texts[0] == texts[1] != texts[2]
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("undrawn_here")
 @pytest.mark.parametrize("result", ["story"], indirect=True)
 def test_a_plan_follows_edited_durations_and_is_the_same_by_any_number_of_processes(result, tmp_path):

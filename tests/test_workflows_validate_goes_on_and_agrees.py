@@ -31,6 +31,7 @@ def whole(made_once) -> dict[str, Path]:
     return {name: folder / name for name in names}
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("undrawn_here")
 def test_an_interrupted_call_goes_on_and_gives_the_same(tmp_path, whole):
 

@@ -38,6 +38,7 @@ def test_the_example_variants_change_what_they_say(path):
     assert found.scenario.area.name == load_scenario(HOUR).area.name
 
 
+@pytest.mark.thorough
 def test_twice_the_time_is_twice_the_information_and_the_same_files_give_no_difference(tmp_path):
     base = load_scenario(MODEL_SHIP).design.total_s
     twice = variant(tmp_path, "twice", f"[design]\ntotal_s = {2 * base}\n")
@@ -155,6 +156,7 @@ def case_of(name, *, track, day_s, legs_count=False):
     )
 
 
+@pytest.mark.thorough
 def test_days_are_compared_by_what_their_whole_tracks_tell():
     first, half, unknown = (
         case_of(name, track=track, day_s=day_s)
@@ -185,6 +187,7 @@ def test_where_legs_count_whole_days_are_compared_and_not_runs():
     assert "Legs count in its accuracy, so whole days are compared." in document_html(whatif_document(content))
 
 
+@pytest.mark.thorough
 def test_what_a_case_does_not_use_is_said_of_it_and_of_all_only_once(tmp_path, capsys):
     calm = variant(tmp_path, "windy", "[environment]\nwind_to = {north_mps = 5.0, east_mps = 0.0}\n")
     assert main(["whatif", str(MODEL_SHIP), str(calm), "--jobs", "1", "--out", str(tmp_path / "out")]) == 0
