@@ -77,7 +77,6 @@ def test_every_hidden_effect_is_named_by_uncertain_parameters(case):
 SMALL, WHOLE = {"batches": 2, "samples": 80}, {"batches": 6, "samples": 300}
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("trials", "most", "size"), [(6, 2, SMALL), pytest.param(20, 3, WHOLE, marks=pytest.mark.slow)]
 )

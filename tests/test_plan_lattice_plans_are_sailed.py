@@ -129,7 +129,6 @@ def test_the_sailed_plan_takes_about_as_long_as_the_lattice_says(harbour):
     assert plan["reposition_s"] == pytest.approx(plan["lattice"]["cost_s"], rel=0.15)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("planner", [pytest.param("beam", marks=pytest.mark.slow), "lattice"])
 def test_both_planners_give_verified_plans_of_the_same_runs(planner, tmp_path):
     summary = workflows.plan(small(tmp_path, planner), tmp_path / "out").summary
