@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from expdesign.lazy import load_on_use
 
 if TYPE_CHECKING:
-    from expdesign.workflows.asked import carry_out
     from expdesign.workflows.commands.diagnose import diagnose
     from expdesign.workflows.commands.durations import durations
     from expdesign.workflows.commands.estimate import estimate
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from expdesign.workflows.commands.validate import validate_design
     from expdesign.workflows.commands.watch_steps import watch_steps
     from expdesign.workflows.commands.whatif import whatif
-    from expdesign.workflows.outcome import Outcome
+    from expdesign.workflows.outcome import Outcome, carry_out
     from expdesign.workflows.steps.design_problem import designed, duration_problem
     from expdesign.workflows.steps.measured import measured
     from expdesign.workflows.steps.planned import plan_problem, planned
