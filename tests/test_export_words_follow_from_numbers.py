@@ -53,6 +53,10 @@ def test_counts_and_times_are_in_the_right_number(count: int) -> None:
     assert words.times(count) == {1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
+def test_times_are_counted_with_their_fractions():
+    assert [words.counted(days, "day") for days in (0.5, 1.0, 30.0)] == ["0.5 days", "1 day", "30 days"]
+
+
 @given(st.floats(1e6, 4e9), st.booleans())
 def test_times_since_1970_are_dates_and_others_hours(time_s: float, late: bool) -> None:
     time_s = time_s if late else time_s / 1e3

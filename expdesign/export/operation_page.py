@@ -60,7 +60,7 @@ def _sentences_operation(found: OperationForesight) -> Iterator[str]:
     yield (
         f"Of {words.counted(found.nominal, 'voyage')} of {words.duration(found.voyage_s)} without a change, "
         f"{found.false_alarms or 'none'} raised an alarm (95 % interval of the share: {100 * low:.0f} to "
-        f"{100 * high:.0f} %). The threshold allows one in {found.false_alarm_days:g} days at most."
+        f"{100 * high:.0f} %). The threshold allows one in {words.counted(found.false_alarm_days, 'day')} at most."
     )
     for change in dict.fromkeys(item.change for item in found.rows):
         own = sorted((item for item in found.rows if item.change == change), key=lambda item: item.size)

@@ -164,9 +164,10 @@ def _degrees_minutes(degrees: float, width: int, decimals: int) -> str:
     return f"{whole:0{width}d}\N{DEGREE SIGN}{minutes}\N{PRIME}"
 
 
-def counted(count: int, one: str) -> str:
-    """1 run, 3 runs."""
-    return f"{count} {one}{'' if count == 1 else 's'}"
+def counted(count: float, one: str) -> str:
+    """1 run, 3 runs, 0.5 days."""
+    number = count if isinstance(count, int) else f"{count:g}"
+    return f"{number} {one}{'' if count == 1 else 's'}"
 
 
 IN_NAMES = {

@@ -96,7 +96,7 @@ def sentences(content: MonitorContent) -> tuple[str, ...]:
 
 def _sentences(content: MonitorContent) -> Iterator[str]:
     state, found = content.state, content.found
-    rate = f"with at most one false alarm in {content.false_alarm_days:g} days on average"
+    rate = f"with at most one false alarm in {counted(content.false_alarm_days, 'day')} on average"
     left_out = state.left_out_s / max(state.judged_s + state.left_out_s, 1e-300)
     if left_out > HALF and state.shoal_s > HALF * state.left_out_s:
         yield _shoal(content)

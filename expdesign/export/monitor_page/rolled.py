@@ -7,7 +7,7 @@ from typing import Any
 
 from expdesign.export.files import finite
 from expdesign.export.roll_words import change_words, stability_words
-from expdesign.export.words import HOUR, hours, when
+from expdesign.export.words import HOUR, counted, hours, when
 from expdesign.monitoring import RollEvent, RollWatch
 
 SHOWN = 5
@@ -27,7 +27,7 @@ def _sentences_roll(watch: RollWatch, days: float) -> Iterator[str]:
         same = "No alarm of roll" if watch.events else "She rolls as in the reference,"
         yield (
             f"{same} in {hours(watch.judged_s)} that were judged, with at most one false alarm of any kind in "
-            f"{days:g} days on average."
+            f"{counted(days, 'day')} on average."
         )
     yield from (_event(event) for event in watch.events[-SHOWN:])
     if watch.left_out_s > watch.judged_s:
