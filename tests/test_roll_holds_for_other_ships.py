@@ -64,6 +64,18 @@ def test_a_stated_place_and_tilt_are_those_of_a_level_sensor_at_midships() -> No
 
 
 @pytest.mark.thorough
+def test_a_tilt_that_nobody_measured_is_found_in_waves_or_takes_the_trust_in_what_it_moves() -> None:
+    """In waves a level sensor fits nearly as well as a tilted one, with another added mass."""
+    sea = Sea(roll_deg=1.0, forward_m=2.0, tilt_deg=2.0, run_s=FEW_S)
+    one = found(0, sea)
+    if "tilt" in one.effects:
+        value, std = one.effects["tilt"]
+        assert abs(value - np.radians(sea.tilt_deg)) < 4 * std
+    else:
+        assert one.by_tilt == ("K_r", "K_vd") or not one.trusted
+
+
+@pytest.mark.thorough
 def test_a_load_is_positive_and_its_interval_longer_above_than_below_in_waves() -> None:
     """The moments tell mass times height and mass times its square: the smaller the height, the larger the mass."""
     sea = Sea(roll_deg=1.0, run_s=FEW_S)
@@ -93,3 +105,12 @@ def test_nothing_to_be_trusted_is_said_first() -> None:
     assert roll_sentences(content)[0] == f"None of these estimates is to be trusted: {headline(content)}."
     assert all("none to be trusted" in row[3] for row in parameter_rows(content) if row[3] != "given")
     assert set(one.effects) <= set(EFFECTS)
+
+
+def test_what_an_unknown_tilt_moves_is_not_trusted_and_the_rest_is() -> None:
+    one = replace(found(0, Sea(quadratic=0.5, run_s=FEW_S)), tilt_told=False)
+    blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
+    content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="", version="")
+    assert one.trusted
+    assert any(text.startswith("K_r and K_vd are not to be trusted") for text in roll_sentences(content))
+    assert [row[0] for row in parameter_rows(content) if "none to be trusted" in row[3]] == ["K_r", "K_vd"]

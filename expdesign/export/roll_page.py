@@ -68,7 +68,7 @@ def _interval(content: RollContent, name: str, factor: float = 1.0) -> str:
     low, high = (factor * end for end in interval(content, name))
     only = f" for {' and '.join(estimate.held)} as held" if name in content.report.undetermined else ""
     shown = f"{low:.4g} to {high:.4g}{only}" if high < float("inf") else f"{low:.4g} or more{only}"
-    return shown if estimate.trusted else f"none to be trusted ({shown})"
+    return shown if estimate.trusted and name not in estimate.by_tilt else f"none to be trusted ({shown})"
 
 
 def interval(content: RollContent, name: str) -> tuple[float, float]:
@@ -142,6 +142,12 @@ def _sentences(content: RollContent) -> Iterator[str]:
             f"does by chance in {_chance(estimate.unanswered)} of trials. Estimates then lean towards what the "
             "helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
         )
+    if estimate.trusted and estimate.by_tilt:
+        yield (
+            f"{' and '.join(estimate.by_tilt)} are not to be trusted, as nothing tells how the sensor is tilted: other "
+            "tilts fit as well, with other values of these. The load and metacentric heights hardly mind. Measure the "
+            "tilt and state sensor_tilt_deg."
+        )
     for name in estimate.reached:
         yield (
             f"{name} stands at a bound of the search, {estimate.values[name]:.4g} {UNITS[name]}: it is no estimate; "
@@ -201,10 +207,11 @@ def _effects(content: RollContent) -> Iterator[str]:
                 f"the axis of yaw, not {body.forward_m:g} m as stated; this is estimated, too. State sensor_forward_m."
             )
         else:
-            tilt, error = np.degrees(body.tilt_rad + value), np.degrees(std)
+            stated = "not level" if body.tilt_rad is None else f"not {np.degrees(body.tilt_rad):g} as stated"
+            tilt, error = np.degrees((body.tilt_rad or 0.0) + value), np.degrees(std)
             yield (
                 f"The gyros read as if the sensor were tilted by {tilt:.3g} {apart} {error:.2g} degrees, bow end up, "
-                f"not {np.degrees(body.tilt_rad):g} as stated; this is estimated, too. State sensor_tilt_deg."
+                f"{stated}; this is estimated, too. State sensor_tilt_deg."
             )
 
 
@@ -276,6 +283,7 @@ def roll_json(content: RollContent) -> str:
             "chance_that_the_rudder_answers_nothing": finite(estimate.unanswered),
             "reached_bounds": list(estimate.reached),
             "intervals_trusted": estimate.trusted,
+            "not_trusted_for_tilt": list(estimate.by_tilt),
             "remarks": list(roll_sentences(content)),
             "notes": list(content.notes),
         }

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
-from expdesign.roll.instruments import Weighted
+from expdesign.roll.instruments import Weighted, spread_of
 from expdesign.roll.model import PARAMETERS
-from expdesign.roll.problem import RollProblem, sampled, surprise_of
+from expdesign.roll.problem import Moments, RollProblem, moments_of, sampled, surprise_of
 from expdesign.roll.runs import EFFECTS, Run
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array
@@ -56,9 +57,19 @@ def most_effects(problem: RollProblem) -> Array:
 
 
 def by_effects(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
-    """(q, 3) derivatives of the weighted residuals by the effects."""
-    by = zip(weighted, sampled(problem, theta), strict=True)
-    return np.concatenate([part.effects[:, :, 0] - part.effects[:, :, 1:] @ values for part, values in by])
+    """(q, 3) derivatives of the weighted residuals by the effects, less the part that goes with them by chance."""
+    by = zip(weighted, sampled(problem, theta), moments_of(problem, weighted, theta), strict=True)
+    return np.concatenate([_by_effects(part, np.concatenate([[1.0], -values]), own) for part, values, own in by])
+
+
+def _by_effects(part: Weighted, by: Array, own: Moments) -> Array:
+    slopes = scipy.linalg.solve_triangular(own.root, part.effects @ by, lower=True)
+    if not part.follows:
+        return np.asarray(slopes)
+    noise = [one.reshape(len(one), 4, 6) @ by for one in part.hidden]  # of the residuals, and of what each effect adds
+    inverse = np.linalg.inv(own.root)
+    with_left = inverse @ spread_of(part.basis, noise)[1:, 0] @ inverse.T
+    return np.asarray(slopes - (with_left @ own.residuals).T)
 
 
 def missing_sizes(

@@ -4,11 +4,16 @@
 
 c are the sampled coefficients. An autoregression whitens equation and instruments; S is the spectrum of what colour is
 left, and the instruments Z, which come from the rudder, pass 1 / S. The sum over frequencies is the covariance of Z' e
-for any stationary noise e that the instruments do not depend on, narrow-band waves too, so that the inverse of the
-curvature is the covariance of the estimate, but for the errors of S.
+for any stationary noise e that the instruments do not depend on, narrow-band waves too.
+
+Waves are in the regressors X, too. With V as at earlier parameters the estimate leans towards those of least squares,
+which hide waves best, and more with each V from a new estimate. So V follows the parameters in the search, by the
+spectra of what instruments do not explain of y and X, once the model fits: what it misses is no noise.
 
 Source: doctoral thesis on grey-box identification of roll with few sensors, approach 5.3 and algorithm 5.1; L. P.
-Hansen, Econometrica 50 (1982), 1029-1054, for weights and covariance.
+Hansen, Econometrica 50 (1982), 1029-1054, for weights; L. P. Hansen, J. Heaton and A. Yaron, J. Business and Economic
+Statistics 14 (1996), 262-280, for weights that follow; W. K. Newey and F. Windmeijer, Econometrica 77 (2009), 687-719,
+for the covariance with weak instruments.
 """
 
 from __future__ import annotations
@@ -18,9 +23,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy
 
-from expdesign.errors import InputError, NotInformative
+from expdesign.errors import InputError
 from expdesign.roll.effects import (
     EFFECT_NAMES,
     MOST_TRIES,
@@ -34,19 +38,30 @@ from expdesign.roll.effects import (
 )
 from expdesign.roll.instruments import Weighted, chance_of_answers, folds, weighted_equations
 from expdesign.roll.model import PARAMETERS, discrete, named, relative_sensitivity, roll_frequency, stiffness
-from expdesign.roll.problem import RollProblem, noise_of, residuals_of, sampled, slopes_of, surprise_of
+from expdesign.roll.problem import (
+    RollProblem,
+    moments_of,
+    noise_of,
+    residuals_of,
+    sampled,
+    slopes_of,
+    solved,
+    surprise_of,
+)
 from expdesign.roll.profile import load_interval
-from expdesign.roll.regression import cross_spectrum, flat_spectrum, spectrum
+from expdesign.roll.regression import flat_spectrum, spectrum
+from expdesign.roll.tilt import TILT, tilts_of
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
 from expdesign.vessel.roll import G_MPS2, Load
 
 AT_BOUND = 1e-4  # share of the range of the search, within which of its end a parameter stands at the bound
-MOST_ROUNDS = 12  # of instruments and noise models
+MOST_ROUNDS = 8  # of instruments and noise models
 SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
 LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
 LEAST_ROUNDS = 3  # before effects are looked for
+SMALL_DEVIATION = 1e-2  # of second derivatives, in standard deviations that a parameter alone would have
 SMALL_STEP = 1e-6  # of derivatives, in typical sizes of the parameters
 UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
 
@@ -67,7 +82,7 @@ class RollEstimate:
     rounds: Array  # (r, 9) parameters after each round of spectra
     settled: bool  # whether the last round changed little
     # of the instruments: their information about the least certain combination of parameters over what noise alone
-    # would give; nan for least squares
+    # would seem to give, zero where they tell nothing; nan for least squares
     strength: float
     # least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over
     surprise: float
@@ -78,6 +93,7 @@ class RollEstimate:
 
     # effect of `EFFECTS` -> value and standard deviation, of those that the data show
     effects: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    tilt_told: bool = True  # whether the sensor's tilt was measured, or the data tell it
     load_interval: tuple[float, float] | None = None  # of m, 95 % by its profile [kg]; None where it is not sought
 
     def __post_init__(self) -> None:
@@ -108,6 +124,11 @@ class RollEstimate:
         return self.method == "iv" and fits and not self.weak and not self.answering
 
     @property
+    def by_tilt(self) -> tuple[str, ...]:
+        """Free parameters that may be far off, as nothing tells how the sensor is tilted, while the others are not."""
+        return () if self.tilt_told else tuple(name for name in ("K_r", "K_vd") if name in self.problem.free)
+
+    @property
     def weak(self) -> bool:
         """Whether noise hides what the rudder does, so that the estimate leans towards least squares."""
         return self.strength < TUNING.least_strength
@@ -135,15 +156,27 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         values = [*sampled(problem, theta)]
     added: list[int] = []
     unseen_before: list[int] = []
+    unmeasured = method == "iv" and problem.body.tilt_rad is None and "K_vd" in problem.free
+    scans, fits = 0, False  # what a model misses is no noise, and would be taken for some
     while True:
         parts = zip(problem.cases, instruments, values, strict=True)
-        weighted = [weighted_equations(case, own, one) for case, own, one in parts]
-        before, (theta, sensed, left) = theta, _solved(problem, weighted, theta, held)
+        weighted = [weighted_equations(case, own, one, follows=fits) for case, own, one in parts]
+        before, (theta, sensed, left) = theta, solved(problem, weighted, theta, held)
         history.append(theta)
-        settled = len(history) > 1 and _little(problem, theta - before, sensed)
+        weighed = method == "iv" and values[0] is not None
+        fits = weighed and not surprise_of(left, len(problem.free)) > TUNING.most_surprise
+        settled = len(history) > 1 and _little(problem, theta - before, sensed) and fits == weighted[0].follows
         more, std = missing_sizes(problem, weighted, theta, sensed, left, added)
         settled = settled and bool((np.abs(more) <= 2 * SETTLED * std).all())
-        if method == "iv" and values[0] is not None and len(history) >= LEAST_ROUNDS:
+        if unmeasured and TILT not in added and (len(history) == LEAST_ROUNDS or settled) and scans < MOST_TRIES:
+            scans += 1
+            tilts = tilts_of(problem, weighted, theta, held)
+            if tilts.other:
+                added, theta = [TILT], tilts.theta
+                problem = with_effects(problem, added, np.array([tilts.best_rad]))
+                values, settled = [*sampled(problem, theta)], False
+                continue
+        if weighed and len(history) >= LEAST_ROUNDS:
             unseen = unseen_effects(problem, added, std)
             problem, unseen_before = without_effects(problem, unseen), [*unseen_before, *unseen]
             added = [place for place in added if place not in unseen]
@@ -164,7 +197,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
     sensed, left = sensed - gone @ (gone.T @ sensed), left - gone @ (gone.T @ left)
     settled = settled and bool((np.abs(problem.cases[0].runs[0].effects) < 0.999 * most_effects(problem)).all())
     surprise = surprise_of(left, len(problem.free) - len(held) + len(added))
-    covariance = _covariance(problem, weighted, theta, sensed, held, method)
+    covariance = _covariance(problem, weighted, theta, sensed, held, gone)
     return RollEstimate(
         problem=problem,
         method=method,
@@ -174,11 +207,12 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         sensed=sensed,
         rounds=np.array(history),
         settled=settled,
-        strength=_strength(problem, weighted, theta, sensed, covariance) if method == "iv" else float("nan"),
+        strength=_strength(problem, weighted, theta, covariance, gone) if method == "iv" else float("nan"),
         surprise=surprise,
         unanswered=_unanswered(problem, weighted, theta, sensed, surprise) if method == "iv" else float("nan"),
         freedom=min(spectrum(residuals).freedom for residuals in noise_of(problem, weighted, theta)),
         effects=effects,
+        tilt_told=not unmeasured or tilts_of(problem, weighted, theta, held).told,
         load_interval=load_interval(problem, weighted, theta, sensed, covariance, held, gone),
     )
 
@@ -219,82 +253,76 @@ def _held(problem: RollProblem) -> tuple[str, ...]:
     return tuple(name for name in problem.free if name not in kept)
 
 
-def _solved(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str]
-) -> tuple[Array, Array, Array]:
-    """Parameters (9,), derivatives (q, p) of the weighted residuals by the free ones, and these residuals (q,)."""
-    places = [PARAMETERS.index(name) for name in problem.free if name not in held]
-    equations = sum(len(part.top) for part in weighted)
-    if equations < len(places):
-        raise NotInformative(
-            f"the data give {equations} equations for {len(places)} roll parameters, expected a rudder that moves the "
-            "ship, and more load cases or fewer parameters"
-        )
-
-    def full(values: Array) -> Array:
-        result = np.array(theta)
-        result[places] = values
-        return result
-
-    low, high = problem.bounds
-    found = scipy.optimize.least_squares(
-        lambda values: residuals_of(problem, weighted, full(values)), np.clip(theta, low, high)[places],
-        lambda values: slopes_of(problem, weighted, full(values))[:, places], bounds=(low[places], high[places]),
-        x_scale=problem.scale[places], xtol=1e-12, ftol=1e-12, gtol=1e-12,
-    )  # fmt: skip
-    return full(found.x), slopes_of(problem, weighted, full(found.x))[:, problem.places], np.asarray(found.fun)
-
-
 def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
     """Whether a change of the parameters moves no weighted residual by more than a small part of its deviation."""
     return bool(np.linalg.norm(sensed @ change[problem.places]) <= SETTLED * np.sqrt(len(problem.free)))
 
 
 def _covariance(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, held: Sequence[str], method: str
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, held: Sequence[str], gone: Array
 ) -> Array:
-    """(p, p) covariance from the spectra of the last residuals, flat ones for least squares; zero for what is held.
+    """(p, p) covariance from the spectra of the noise at the estimate; zero for what is held.
 
-    The same residuals give the spectrum and are weighed by it. With 2 K degrees of freedom at each frequency the
-    inverse of the curvature comes out too small by (K - 1) / K, and the variance is larger by K / (K - 1) than with the
-    true spectrum: so it is for chi-square powers that count among the K they are divided by.
+    By noise in the regressors the slopes have more information than the curvature of the sum of squares, which counts
+    what the rudder does: the errors of weak instruments are as large as both together say. The same data give spectra
+    and moments. With 2 K degrees of freedom at each frequency the variance is larger by K / (K - 1) than with the true
+    spectrum, and the inverse of the curvature smaller by (K - 1) / K: so it is for chi-square powers that count among
+    the K they are divided by.
     """
     scale = problem.scale[problem.places] * [name not in held for name in problem.free]
-    inverse = np.linalg.pinv(sensed * scale, rcond=1e-12)
-    first, middle = 0, np.zeros((len(scale),) * 2)
-    for part, residuals in zip(weighted, noise_of(problem, weighted, theta), strict=True):
-        last = first + len(part.top)
-        change = inverse[:, first:last]
-        noise = spectrum(residuals) if method == "iv" else flat_spectrum(residuals)
-        middle += change @ noise.covariance(part.basis) @ change.T / (1.0 - 2.0 / noise.freedom) ** 2
-        first = last
+    if weighted[0].spread is None:
+        inverse = np.linalg.pinv(sensed * scale, rcond=1e-12)
+        first, middle = 0, np.zeros((len(scale),) * 2)
+        for part, residuals in zip(weighted, noise_of(problem, weighted, theta), strict=True):
+            last = first + len(part.top)
+            change = inverse[:, first:last]
+            middle += change @ flat_spectrum(residuals).covariance(part.basis) @ change.T
+            first = last
+        return np.asarray(middle * np.outer(scale, scale))
+    inverse = np.linalg.pinv(_curvature(problem, weighted, theta, gone) * np.outer(scale, scale), rcond=1e-10)
+    freedom = min(spectrum(residuals).freedom for residuals in noise_of(problem, weighted, theta))
+    middle = inverse @ (sensed * scale).T @ (sensed * scale) @ inverse / (1.0 - 2.0 / freedom) ** 2
     return np.asarray(middle * np.outer(scale, scale))
 
 
-def _strength(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, covariance: Array
-) -> float:
-    """Least ratio, over combinations of the free parameters, of what they move to what noise alone would seem to.
+def _curvature(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, gone: Array) -> Array:
+    """(p, p) half the second derivatives of the sum of squares by the free parameters, beside effects (q, e)."""
 
-    That is the smallest F statistic of a regression of the regressors on the instruments. Noise is what their plain
-    regression on the instruments leaves.
+    def gradient(at: Array) -> Array:
+        rows = slopes_of(problem, weighted, at)[:, problem.places]
+        return np.asarray(rows.T @ residuals_of(problem, weighted, at))
+
+    seen = np.linalg.norm(slopes_of(problem, weighted, theta)[:, problem.places], axis=0)
+    steps = SMALL_DEVIATION / np.maximum(seen, 1e-3 / problem.scale[problem.places])
+    changes = np.zeros((len(steps), len(PARAMETERS)))
+    changes[np.arange(len(steps)), problem.places] = steps
+    rows = np.array([gradient(theta + change) - gradient(theta - change) for change in changes])
+    rows /= 2.0 * steps[:, None]
+    along = gone.T @ slopes_of(problem, weighted, theta)[:, problem.places]
+    return np.asarray((rows + rows.T) / 2.0 - along.T @ along)
+
+
+def _strength(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, covariance: Array, gone: Array
+) -> float:
+    """Least ratio, over combinations of the free parameters, of what the rudder tells to what noise alone seems to.
+
+    That is the smallest F statistic of a regression of the regressors on the instruments, less one.
 
     Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240, with spectra in place of variances;
     D. Staiger and J. H. Stock, Econometrica 65 (1997), 557-586, for what weak instruments do.
     """
     std = np.sqrt(np.diag(covariance))
-    found = std > 0
-    noise = np.zeros((len(std),) * 2)
-    for case, part in zip(problem.cases, weighted, strict=True):
-        columns = [[hidden[:, j] for hidden in part.hidden] for j in range(5)]
-        power = flat_spectrum(columns[0]).power(part.basis)
-        by = np.array([[cross_spectrum(one, other).real @ power for other in columns] for one in columns])
-        jacobian = discrete(theta, problem.body, case.load, problem.step_s).jacobian[:, problem.places]
-        noise += jacobian.T @ by @ jacobian
-    size = np.outer(std[found], std[found])
-    information, seeming = ((both[np.ix_(found, found)]) * size for both in (sensed.T @ sensed, noise))
-    regular = seeming + 1e-12 * np.trace(seeming) * np.eye(len(seeming))
-    return float(scipy.linalg.eigh(information, regular, eigvals_only=True)[0])
+    kept = np.flatnonzero(std > 0)
+    places = np.array(problem.places)[kept]
+    noise = np.sum([one.slopes_noise for one in moments_of(problem, weighted, theta)], axis=0)[np.ix_(places, places)]
+    size = np.outer(std[kept], std[kept])
+    information = _curvature(problem, weighted, theta, gone)[np.ix_(kept, kept)] * size
+    powers, axes = np.linalg.eigh(noise * size)
+    if not powers[-1] > 0:
+        return math.inf
+    by = axes / np.sqrt(np.maximum(powers, 1e-12 * powers[-1]))
+    return float(np.linalg.eigvalsh(by.T @ information @ by)[0])
 
 
 def metacentric_height(estimate: RollEstimate, load: Load | None) -> tuple[float, float]:

@@ -41,11 +41,13 @@ from expdesign.roll.regression import (
     Spectrum,
     bent,
     build_rows,
+    cross_spectra,
     delayed,
     difference,
     flat_spectrum,
     inside,
     noise_model,
+    shares_of,
     spectrum,
     without_start,
 )
@@ -165,11 +167,16 @@ class Weighted:
     slope: Array
     effects: Array  # (q, 3, 6) the same with what effects change of y and X
     noise: NoiseModel  # that whitened the rows
-    # (n, 5) of each run, what a regression of X on the instruments leaves; nothing for least squares
-    hidden: tuple[Array, ...]
+    # (6, 6, q, q) covariances of the sums of products with the noise in y and X, which is what a regression on the
+    # instruments leaves of them; None where the noise is taken as given
+    spread: Array | None
+    hidden: tuple[Array, ...]  # (n, 24) what instruments do not explain of y, X and `effects` of each run
+    follows: bool  # whether the covariance of the residuals follows the coefficients, or is as at those of the weights
 
 
-def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None) -> Weighted:
+def weighted_equations(
+    case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None, *, follows: bool = False
+) -> Weighted:
     """Equations for sampled coefficients (5,), weighted by the noise at given ones, or as if it were white."""
     plain = tuple(build_rows(run, WHITE) for run in case.runs)
     if values is None:
@@ -183,6 +190,7 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
     by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
     basis = _basis(by, left)
     parts = list(zip(basis, rows, strict=True))
+    hidden = () if instruments is None or values is None else _hidden(rows, instruments, model)
     return Weighted(
         rows,
         basis,
@@ -190,19 +198,36 @@ def weighted_equations(case: Case, instruments: Sequence[Sequence[Fold]] | None,
         np.sum([B.T @ one.X for B, one in parts], axis=0),
         np.sum([np.einsum("nq,nij->qij", B, one.effects) for B, one in parts], axis=0),
         model,
-        () if instruments is None else _hidden(rows, instruments, model),
+        None if not hidden else spread_of(basis, [one[:, :6] for one in hidden]),
+        hidden,
+        follows,
     )
 
 
 def _hidden(rows: Sequence[Rows], instruments: Sequence[Sequence[Fold]], noise: NoiseModel) -> tuple[Array, ...]:
-    """(n, 5) parts of the regressors of each run that instruments do not explain."""
+    """(n, 24) parts of y, the regressors and effects of each run that instruments do not explain."""
     first = LEFT_OUT_SAMPLES
     found = []
     for own in instruments:
         parts = [(fold.part, noise.whitened(fold.columns)[first:]) for fold in own]
         found.append(without_start(_stitched(parts, first), noise))
-    gains = np.linalg.lstsq(np.concatenate(found), np.concatenate([one.X for one in rows]), rcond=1e-10)[0]
-    return tuple(one.X - Z @ gains for one, Z in zip(rows, found, strict=True))
+    tables = [np.column_stack([one.y, one.X, one.effects.reshape(len(one.y), -1)]) for one in rows]
+    gains = np.linalg.lstsq(np.concatenate(found), np.concatenate(tables), rcond=1e-10)[0]
+    return tuple(table - Z @ gains for table, Z in zip(tables, found, strict=True))
+
+
+def spread_of(basis: Sequence[Array], hidden: Sequence[Array]) -> Array:
+    """(c, c, q, q) covariances of the sums of products of the basis with noise (n, c) of each run."""
+    power, length = cross_spectra(hidden)
+    count, q = power.shape[-1], basis[0].shape[1]
+    seen = [np.fft.rfft(B, length, axis=0) for B in basis]
+    shares = shares_of(len(power), length)
+    found = np.empty((count, count, q, q))
+    for i in range(count):
+        for j in range(i, count):
+            found[i, j] = sum((F.conj().T @ ((shares * power[:, i, j])[:, None] * F)).real for F in seen)
+            found[j, i] = found[i, j].T
+    return found
 
 
 def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:

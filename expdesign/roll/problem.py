@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
-from expdesign.errors import InputError
+from expdesign.errors import InputError, NotInformative
 from expdesign.roll.instruments import Weighted
 from expdesign.roll.model import PARAMETERS, discrete, parameters
 from expdesign.roll.runs import Case
@@ -109,15 +110,80 @@ def noise_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -
 
 def residuals_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
     """(q,) weighted residuals."""
-    return np.concatenate(
-        [part.top - part.slope @ c for part, c in zip(weighted, sampled(problem, theta), strict=True)]
-    )
+    return np.concatenate([one.residuals for one in moments_of(problem, weighted, theta)])
 
 
 def slopes_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
-    """(q, 9) derivatives of the residuals."""
-    by = [discrete(theta, problem.body, case.load, problem.step_s).jacobian for case in problem.cases]
-    return -np.concatenate([part.slope @ rows for part, rows in zip(weighted, by, strict=True)])
+    """(q, 9) derivatives of the residuals, less the part that goes with them by chance.
+
+    With the residuals they give the gradient of the sum of squares, in which the covariance of the moments follows the
+    parameters. Regressors have the noise of the equation in them, and fixed weights favour parameters that hide it.
+
+    Source: L. P. Hansen, J. Heaton and A. Yaron, J. Business and Economic Statistics 14 (1996), 262-280.
+    """
+    return np.concatenate([one.slopes for one in moments_of(problem, weighted, theta)])
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Products of the instruments with the residuals of one case, in their standard deviations at the parameters."""
+
+    residuals: Array  # (q,)
+    slopes: Array  # (q, 9) as of `slopes_of`
+    root: Array  # (q, q) lower, by which the products were divided
+    slopes_noise: Array  # (9, 9) expected sum of products of the slopes where instruments tell nothing
+
+
+def moments_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> list[Moments]:
+    """Those of each case."""
+    found = []
+    for part, case in zip(weighted, problem.cases, strict=True):
+        one = discrete(theta, problem.body, case.load, problem.step_s)
+        left, slopes = part.top - part.slope @ one.values, -part.slope @ one.jacobian
+        if part.spread is None:
+            found.append(Moments(left, slopes, np.eye(len(left)), np.zeros((len(theta),) * 2)))
+            continue
+        by = np.concatenate([[1.0], -one.values])
+        across = np.einsum("ijkl,j->ikl", part.spread, by)  # covariance of each column's products with the residuals
+        root = np.linalg.cholesky(np.einsum("ikl,i->kl", across, by)) if part.follows else np.eye(len(left))
+        left, slopes = (scipy.linalg.solve_triangular(root, both, lower=True) for both in (left, slopes))
+        inverse = np.linalg.inv(root)
+        with_left = inverse @ across[1:] @ inverse.T  # (5, q, q)
+        if part.follows:
+            slopes = slopes + np.einsum("ikl,l->ki", with_left, left) @ one.jacobian
+        alone = np.einsum("kl,ijlm,km->ij", inverse, part.spread[1:, 1:], inverse, optimize=True)
+        alone -= np.einsum("ikl,jkl->ij", with_left, with_left)
+        found.append(Moments(left, slopes, root, one.jacobian.T @ alone @ one.jacobian))
+    return found
+
+
+def solved(
+    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str], *, within: float = 1e-12
+) -> tuple[Array, Array, Array]:
+    """Parameters (9,), derivatives (q, p) of the weighted residuals by the free ones, and these residuals (q,).
+
+    The search ends within a share of the sum of squares.
+    """
+    places = [PARAMETERS.index(name) for name in problem.free if name not in held]
+    equations = sum(len(part.top) for part in weighted)
+    if equations < len(places):
+        raise NotInformative(
+            f"the data give {equations} equations for {len(places)} roll parameters, expected a rudder that moves the "
+            "ship, and more load cases or fewer parameters"
+        )
+
+    def full(values: Array) -> Array:
+        result = np.array(theta)
+        result[places] = values
+        return result
+
+    low, high = problem.bounds
+    found = scipy.optimize.least_squares(
+        lambda values: residuals_of(problem, weighted, full(values)), np.clip(theta, low, high)[places],
+        lambda values: slopes_of(problem, weighted, full(values))[:, places], bounds=(low[places], high[places]),
+        x_scale=problem.scale[places], xtol=within, ftol=within, gtol=within,
+    )  # fmt: skip
+    return full(found.x), slopes_of(problem, weighted, full(found.x))[:, problem.places], np.asarray(found.fun)
 
 
 def surprise_of(left: Array, fitted: int) -> float:

@@ -43,13 +43,17 @@ def load_interval(
     others = [PARAMETERS.index(name) for name in problem.free if name not in (*held, "m")]
     low, high = problem.bounds
     enough = CHI2_95 * (std / least) ** 2
-    best, found = _cost(problem, weighted, theta, gone), np.array(theta)
+    best = _cost(problem, weighted, theta, gone)
+    found = {float(theta[place]): np.array(theta)}
+    known: dict[float, float] = {float(theta[place]): -enough}
 
     def excess(mass: float) -> float:
-        nonlocal found
+        if mass in known:  # a second search, begun elsewhere, may end elsewhere
+            return known[mass]
+        nearest = found[min(found, key=lambda other: abs(other - mass))]
 
         def full(values: Array) -> Array:
-            result = np.array(found)
+            result = np.array(nearest)
             result[others], result[place] = values, mass
             return result
 
@@ -61,16 +65,16 @@ def load_interval(
             rows = slopes_of(problem, weighted, full(values))[:, others]
             return np.asarray(rows - gone @ (gone.T @ rows))
 
-        begin = np.clip(found[others], low[others], high[others])
+        begin = np.clip(nearest[others], low[others], high[others])
         one = scipy.optimize.least_squares(
             apart, begin, slopes, bounds=(low[others], high[others]), x_scale=problem.scale[others]
         )
-        found = full(one.x)
-        return float(2.0 * one.cost - best - enough)
+        found[mass], known[mass] = full(one.x), float(2.0 * one.cost - best - enough)
+        return known[mass]
 
     ends = []
     for side, bound in ((-1.0, float(low[place])), (1.0, float(high[place]))):
-        found, near, far = np.array(theta), float(theta[place]), float(theta[place])
+        near = far = float(theta[place])
         for factor in (1.0, 2.0, 4.0, 8.0, 16.0):
             far = float(np.clip(theta[place] + side * factor * std, low[place], high[place]))
             if far == bound or excess(far) > 0:

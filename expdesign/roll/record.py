@@ -50,7 +50,8 @@ def missing_columns(batch: Batch) -> tuple[str, ...]:
 
 def levelled(signals: Array, body: Body, step_s: float) -> Array:
     """(k, 4) signals of a run as a sensor above the axis of yaw would read them, that stands level."""
-    cos, sin = np.cos(body.tilt_rad), np.sin(body.tilt_rad)
+    tilt_rad = body.tilt_rad or 0.0
+    cos, sin = np.cos(tilt_rad), np.sin(tilt_rad)
     rate, sensed, turn, rudder = signals.T
     rolls, turns = cos * rate + sin * turn, cos * turn - sin * rate
     return np.column_stack([rolls, sensed + body.forward_m * np.gradient(turns, step_s), turns, rudder])

@@ -145,17 +145,13 @@ class Spectrum:
     def covariance(self, columns: Sequence[Array]) -> Array:
         """(q, q) covariance of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
         seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
-        return np.asarray(sum((F.conj().T @ ((self.shares * self.density)[:, None] * F)).real for F in seen))
+        weights = (shares_of(len(self.density), self.length) * self.density)[:, None]
+        return np.asarray(sum((F.conj().T @ (weights * F)).real for F in seen))
 
-    def power(self, columns: Sequence[Array]) -> Array:
-        """(f,) power of all columns (k, q) of each run; its product with a density sums to a trace of covariances."""
-        seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
-        return np.asarray(self.shares * sum((np.abs(F) ** 2).sum(axis=1) for F in seen))
 
-    @property
-    def shares(self) -> Array:
-        """(f,) share of each frequency and its negative among all n."""
-        return np.asarray(np.r_[1.0, np.full(len(self.density) - 2, 2.0), 1.0] / self.length)
+def shares_of(frequencies: int, length: int) -> Array:
+    """(f,) share of each frequency of a real transform of even length, and its negative, among all."""
+    return np.asarray(np.r_[1.0, np.full(frequencies - 2, 2.0), 1.0] / length)
 
 
 def flat_spectrum(residuals: Sequence[Array]) -> Spectrum:
@@ -174,23 +170,28 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     Source: P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967), 70-73; R. B. Blackman and J. W. Tukey, The
     Measurement of Power Spectra (1958), for whitening before.
     """
-    density = cross_spectrum(residuals, residuals).real
-    steps = _segments(residuals)
+    found, length = cross_spectra([one[:, None] for one in residuals])
+    density, steps = found[:, 0, 0].real, _segments(residuals)
     return Spectrum(
         density=np.maximum(density, max(LEAST_DENSITY * float(density.max()), 1e-100)),
-        length=_transform_length(residuals),
+        length=length,
         freedom=sum(_freedom(len(e) // (n // 2) - 1) for e, n in zip(residuals, steps, strict=True)),
     )
 
 
-def cross_spectrum(first: Sequence[Array], second: Sequence[Array]) -> Array:
-    """(f,) cross spectrum of two signals (k,) of each run, at the frequencies of `spectrum`."""
-    length, total = _transform_length(first), sum(map(len, first))
-    parts = [
-        len(a) / total * scipy.signal.csd(a, b, nperseg=n, nfft=length, return_onesided=False)[1]
-        for a, b, n in zip(first, second, _segments(first), strict=True)
-    ]
-    return np.asarray(np.sum(parts, axis=0)[: length // 2 + 1])
+def cross_spectra(signals: Sequence[Array]) -> tuple[Array, int]:
+    """(f, c, c) cross spectra of signals (k, c) of each run, by the segments of `spectrum`, and the transform length.
+
+    Of a conjugate of the second with the first, so that all of one frequency are the covariance of their transforms.
+    """
+    length, total, count = _transform_length(signals), sum(map(len, signals)), signals[0].shape[1]
+    found = np.zeros((length // 2 + 1, count, count), dtype=complex)
+    for one, n in zip(signals, _segments(signals), strict=True):
+        window = scipy.signal.windows.hann(n, sym=False)
+        parts = np.lib.stride_tricks.sliding_window_view(one, n, axis=0)[:: n - n // 2]  # (s, c, n)
+        seen = np.fft.rfft((parts - parts.mean(axis=2, keepdims=True)) * window, length).transpose(2, 1, 0)
+        found += seen @ seen.conj().transpose(0, 2, 1) * (len(one) / total / seen.shape[2] / (window @ window))
+    return found, length
 
 
 def _segments(signals: Sequence[Array]) -> list[int]:

@@ -30,7 +30,9 @@ class ShipTable(Table):
     sensor_forward_m: Number = Field(
         default=0.0, description="the place of the sensor before midships, about which she turns [m]"
     )
-    sensor_tilt_deg: Number = Field(default=0.0, description="the tilt of the sensor, its bow end up [deg]")
+    sensor_tilt_deg: Number | None = Field(
+        default=None, description="the tilt of the sensor, its bow end up, where it was measured [deg]"
+    )
     beam_m: Positive = Field(description="her beam [m], from which a search begins")
     period_s: Positive = Field(description="her roll period [s], roughly; a filter must pass it")
 
@@ -112,7 +114,7 @@ def _body(ship: ShipTable) -> Body:
     return Body(
         mass_kg=ship.mass_kg, z_g=-ship.mass_height_m, z_s=-ship.sensor_height_m,
         sensor_from_axis=ship.sensor_above_axis, forward_m=ship.sensor_forward_m,
-        tilt_rad=math.radians(ship.sensor_tilt_deg),
+        tilt_rad=None if ship.sensor_tilt_deg is None else math.radians(ship.sensor_tilt_deg),
     )  # fmt: skip
 
 

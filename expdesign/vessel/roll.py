@@ -65,13 +65,14 @@ class Body:
     z_s: float  # of the accelerometer, down [m]: from the body origin, or from the rotation axis
     sensor_from_axis: bool = False  # z_s is counted from the rotation axis, which somebody has located
     forward_m: float = 0.0  # the sensor before the axis of yaw, whose yaw acceleration it reads
-    tilt_rad: float = 0.0  # of the sensor, its bow end up: its gyros mix roll and yaw
+    # of the sensor, its bow end up: its gyros mix roll and yaw; None where nobody measured it, and it counts as level
+    tilt_rad: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.mass_kg < math.inf:
             raise InputError(f"body.mass_kg is {self.mass_kg:g}, expected more than 0")
         for name in ("z_g", "z_s", "forward_m", "tilt_rad"):
-            if not math.isfinite(getattr(self, name)):
+            if not math.isfinite(getattr(self, name) or 0.0):
                 raise InputError(f"body.{name} is {getattr(self, name):g}, expected a finite place")
 
     def sensor(self, z_f: float) -> float:

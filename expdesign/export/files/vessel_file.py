@@ -161,7 +161,7 @@ def _pendulum(pendulum: RollPendulum) -> Iterator[str]:
         heights["heel_max_deg"] = math.degrees(pendulum.heel_max_rad)
     if body.forward_m:
         heights["sensor_forward_m"] = body.forward_m
-    if body.tilt_rad:
+    if body.tilt_rad is not None:
         heights["sensor_tilt_deg"] = math.degrees(body.tilt_rad)
     yield from ("", *_table("[roll]", heights))
     if body.sensor_from_axis:

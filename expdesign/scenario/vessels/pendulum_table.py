@@ -88,7 +88,9 @@ class PendulumTable(Table):
     sensor_forward_m: Number = Field(
         default=0.0, description="the place of the sensor before midships, about which she turns [m]"
     )
-    sensor_tilt_deg: Number = Field(default=0.0, description="the tilt of the sensor, its bow end up [deg]")
+    sensor_tilt_deg: Number | None = Field(
+        default=None, description="the tilt of the sensor, its bow end up, where it was measured [deg]"
+    )
     metacentric_height_m: Positive | None = Field(
         default=None, description="the metacentric height of the ship without load [m], in place of parameters.k"
     )
@@ -131,7 +133,7 @@ def build_pendulum(table: PendulumTable, entry: Entry) -> RollPendulum:
     body = Body(
         mass_kg=table.mass_kg, z_g=-table.mass_height_m, z_s=-table.sensor_height_m,
         sensor_from_axis=table.sensor_above_axis, forward_m=table.sensor_forward_m,
-        tilt_rad=math.radians(table.sensor_tilt_deg),
+        tilt_rad=None if table.sensor_tilt_deg is None else math.radians(table.sensor_tilt_deg),
     )  # fmt: skip
     try:
         return RollPendulum(
