@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.model import SENSOR, TERMS, ExtendedModel, acts_on
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import (
     parts_of_step,
     propagated,
@@ -28,6 +28,7 @@ from expdesign.diagnosis.motion.equations_of_motion import (
 )
 from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
 from expdesign.values import Array
+from expdesign.vessel.quantities import SENSOR, TERMS, acts_on
 
 LARGEST_SPEED = 60.0  # state beyond which a simulation has diverged [m/s, rad/s]
 NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
