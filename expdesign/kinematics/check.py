@@ -43,7 +43,7 @@ from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Sensors, Vessel, VesselModel, column_name
-from expdesign.vessel.quantities import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG
 
 FASTER = 1.2  # multiple of a stated rate above which an input moves faster than stated
 RAMP, FEWEST_RAMPS = 3, 3  # samples of an even movement, and how many of them tell
@@ -195,17 +195,16 @@ SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velociti
            "wind": "winds"}  # fmt: skip
 
 
-SCALES = {
-    **{row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain},
-    "surge_scale": (0,),
-    "sway_scale": (1,),
-}
+SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain}
 """Findings that are undone -> columns of the velocity that are divided by them."""
 OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}
 """Findings that are undone -> columns of the velocity that they are taken off."""
 LATE = "velocity_delay_s"
 """A finding that is undone where it is positive: then one instrument is late by two others."""
-OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m")[1:]
+OF_LOG = (
+    *(row.key for row in GAINS_AND_OFFSETS if row.shown_by == LOG),
+    *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m"),
+)
 """Findings of the same comparison, which one that stands may imitate."""
 
 

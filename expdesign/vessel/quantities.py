@@ -267,6 +267,13 @@ class Sensors:
             unseen="surge and sway are not measured by a log, or positions beside them tell its scale without a model",
         ),
     )  # fmt: skip
+    # surge_scale, sway_scale: of one axis, beside that of both; positions tell it, no diagnosis looks for it
+    surge_scale: float = _gain(
+        ("u",), "surge speed", "velocity", LOG, effects=("log_surge",), low=-0.5, high=0.5, matters=0.05
+    )
+    sway_scale: float = _gain(
+        ("v",), "sway speed", "velocity", LOG, effects=("log_sway",), low=-0.5, high=0.5, matters=0.05
+    )
     yaw_rate_scale: float = _gain(
         ("r",), "yaw rate", "yaw_rate", GYRO, effects=("gyro",), low=-0.5, high=0.5, matters=0.05,
         fault=Fault(
