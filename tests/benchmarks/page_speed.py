@@ -2,7 +2,7 @@
 
 ``python tests/benchmarks/page_speed.py``: a browser without a screen, 1366 by 900 pixels. The plan is that of the small
 craft, there and back until eight hours are full; the chart has 300 islets of 100 corners around her bay. Times between
-frames are divided by those of the same page left alone; an empty page of the same server stands beside the first screen.
+frames are divided by those of the same page left alone; an empty page stands beside the first screen.
 """
 
 from __future__ import annotations
@@ -24,8 +24,13 @@ from expdesign.cli import main
 
 HOURS, SPEEDS, FRAMES = 8.0, (1, 10, 100), 120
 ISLETS, CORNERS, LAT, LON = 300, 100, 58.0, 11.0
-BETWEEN = """n => new Promise(done => { const all = []; let last = performance.now();
-    requestAnimationFrame(function next(now) { all.push(now - last); last = now; all.length < n ? requestAnimationFrame(next) : done(all.slice(2)); }); })"""
+BETWEEN = """n => new Promise(done => {
+    const all = []; let last = performance.now();
+    requestAnimationFrame(function next(now) {
+        all.push(now - last); last = now;
+        all.length < n ? requestAnimationFrame(next) : done(all.slice(2));
+    });
+})"""
 
 
 def repeated(plan: Path, out: Path) -> None:
