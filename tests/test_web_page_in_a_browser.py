@@ -15,7 +15,6 @@ import pytest
 
 pytestmark = pytest.mark.browser
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 LONG_MS = 180_000
 WIDTHS = (768, 1366)
@@ -56,17 +55,6 @@ def address(folder: Path) -> Iterator[str]:
     server, where = started(folder)
     yield where
     assert ended(server) == 0
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from playwright.sync_api import sync_playwright
-
-    assert CHROMIUM, "no Chromium is installed"
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield found
-        found.close()
 
 
 @pytest.fixture
