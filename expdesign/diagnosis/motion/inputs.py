@@ -1,9 +1,4 @@
-"""Inputs of an extended model: actuators, water, air, depth and time.
-
-Inputs as the actuators of an extended model deliver them.
-
-Slew rate, dead band, dead time, lag, offset and scale, in this order.
-"""
+"""Inputs of an extended model: actuators, water, air, depth and time."""
 
 from __future__ import annotations
 
@@ -33,6 +28,8 @@ ACTUATOR_SUBSTEPS = 4
 
 
 # Inputs as the actuators of an extended model deliver them.
+#
+# Slew rate, dead band, dead time, lag, offset and scale, in this order.
 
 
 def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tuple[Array, int]:
