@@ -42,8 +42,8 @@ from expdesign.kinematics.relation import CERTAIN, relation
 from expdesign.reduction import at_reference_point, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Mounting, Sensors, Vessel, VesselModel, column_name
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel import Actuator, Sensors, Vessel, VesselModel, column_name
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG
 
 FASTER = 1.2  # multiple of a stated rate above which an input moves faster than stated
 RAMP, FEWEST_RAMPS = 3, 3  # samples of an even movement, and how many of them tell
@@ -195,17 +195,16 @@ SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velociti
            "wind": "winds"}  # fmt: skip
 
 
-SCALES = {
-    **{fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if fault.is_gain},
-    "surge_scale": (0,),
-    "sway_scale": (1,),
-}
+SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain}
 """Findings that are undone -> columns of the velocity that are divided by them."""
-OFFSETS = {fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if not fault.is_gain}
+OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}
 """Findings that are undone -> columns of the velocity that they are taken off."""
 LATE = "velocity_delay_s"
 """A finding that is undone where it is positive: then one instrument is late by two others."""
-OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m")[1:]
+OF_LOG = (
+    *(row.key for row in GAINS_AND_OFFSETS if row.shown_by == LOG),
+    *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m"),
+)
 """Findings of the same comparison, which one that stands may imitate."""
 
 
@@ -255,7 +254,7 @@ def _undone(record: Record, found: Sequence[Finding], sensors: Sensors, *, smoot
     record = replace(record, batches=tuple(_corrected(batch, found) for batch in record.batches))
     if not late:
         return record
-    like = Sensors(heading_rad=sensors.heading_rad, velocity=Mounting(delay_s=late))
+    like = Sensors(heading_rad=sensors.heading_rad, velocity_delay_s=late)
     return replace(record, batches=at_reference_point(record, like, smoothed=smoothed).batches)
 
 
@@ -271,11 +270,10 @@ def _corrected(batch: Batch, found: Sequence[Finding]) -> Batch:
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:
     """The record with signals read at the stated intervals of their sensors, for models that know no intervals."""
-    intervals = {name: Mounting(interval_s=getattr(sensors, name).interval_s) for name in SIGNALS}
-    if not any(place.interval_s for place in intervals.values()):
+    intervals: dict[str, Any] = {key: getattr(sensors, key) for key in (f"{name}_interval_s" for name in SIGNALS)}
+    if not any(intervals.values()):
         return record
-    like: dict[str, Any] = {name: place for name, place in intervals.items() if place.interval_s}
-    own = replace(Sensors(heading_rad=sensors.heading_rad), **like)
+    own = Sensors(heading_rad=sensors.heading_rad, **intervals)
     read = at_reference_point(record, own)
     return replace(read, batches=tuple(map(_where_pose_is_known, read.batches)))
 
@@ -285,7 +283,7 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
     found = {
         name: how
         for name, values in _signals(batch).items()
-        if not getattr(sensors, name).interval_s and (how := held(values)) is not None
+        if not sensors.timing(name)[1] and (how := held(values)) is not None
     }
     notes = [_how_held(name, how, batch.sample_time_s) for name, how in found.items()]
     undone = {name: how for name, how in found.items() if how.even}
@@ -293,9 +291,9 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
         return batch, notes
     lines = {name: knots_held(_signals(batch)[name], how) for name, how in undone.items() if how.interpolated}
     intervals: dict[str, Any] = {
-        name: Mounting(interval_s=how.interval * batch.sample_time_s) for name, how in undone.items()
+        f"{name}_interval_s": how.interval * batch.sample_time_s for name, how in undone.items()
     }
-    like = replace(Sensors(heading_rad=sensors.heading_rad), **intervals)
+    like = Sensors(heading_rad=sensors.heading_rad, **intervals)
     (read,) = at_reference_point(Record(batches=(_with(batch, lines),)), like, smoothed=smoothed).batches
     return _where_pose_is_known(read), notes
 

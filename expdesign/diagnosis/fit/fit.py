@@ -28,9 +28,10 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.model import TIME, ExtendedModel, acts_on, effect_kind, resisting, term_factors
+from expdesign.diagnosis.model import ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
+from expdesign.vessel.quantities import TIME, acts_on, effect_row
 
 STEPS = 8  # Gauss-Newton steps of a fit, at most
 SMALLEST_FACTOR_CHANGE = -0.8  # factors of inertia, thrust, log and gyro stay above one plus this
@@ -261,7 +262,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
             before, ratio = ship.get(key), LARGEST_RATIO
             least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
             value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
-        elif effect_kind(key).neutral == 1.0 and not acts_on(key, TIME):
+        elif effect_row(key).neutral == 1.0 and not acts_on(key, TIME):
             value = max(value, SMALLEST_FACTOR_CHANGE)
         result[key] = value
     return result

@@ -14,10 +14,8 @@ import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import (
-    ACTUATORS,
     RESPONSES,
     ExtendedModel,
-    acts_on,
     group_columns,
     mean_wind,
     response_effect,
@@ -27,6 +25,7 @@ from expdesign.simulation.motion import to_body
 from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Response, generalised_force
+from expdesign.vessel.quantities import ACTUATORS, acts_on
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 # parts of an integrator step in which moving actuators are followed, at least; forces are not linear in angles

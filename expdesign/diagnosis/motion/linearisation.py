@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.model import SENSOR, TERMS, ExtendedModel, acts_on
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import (
     parts_of_step,
     propagated,
@@ -28,6 +28,7 @@ from expdesign.diagnosis.motion.equations_of_motion import (
 )
 from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
 from expdesign.values import Array
+from expdesign.vessel.quantities import SENSOR, TERMS, acts_on
 
 LARGEST_SPEED = 60.0  # state beyond which a simulation has diverged [m/s, rad/s]
 NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
@@ -127,7 +128,7 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
     if not from_position:
         u, v = _with_faults(ship, "u", u), _with_faults(ship, "v", v)
     if from_position and ship.get("late:psi"):
-        u, v = _rotated(u, v, r * ship.get("late:psi"))
+        u, v = _rotated(u, v, _turn(ship.get("late:psi"), r, headings, windows))
     channels = {"u": u, "v": v, "r": _with_faults(ship, "r", r), "psi_rate": simpson_mean(r, finer)}
     if headings is not None and finer == 1:
         channels["psi_rate"] = heading_differences(headings, channels["psi_rate"], windows)
@@ -139,7 +140,8 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
         if delay:
             channels[name] = _shifted(channels[name], delay / windows.sample_s)
     if from_position and ship.get("late:position"):
-        channels["u"], channels["v"] = _rotated(channels["u"], channels["v"], -r * ship.get("late:position"))
+        turn = _turn(ship.get("late:position"), r, headings, windows)
+        channels["u"], channels["v"] = _rotated(channels["u"], channels["v"], -turn)
     return np.stack(list(channels.values()), axis=-1)
 
 
@@ -194,6 +196,15 @@ def simpson_mean_of_track(u: Array, v: Array, heading: Array, finer: int = 1) ->
     c, s = np.cos(heading), np.sin(heading)
     north, east = simpson_mean(u * c - v * s, finer), simpson_mean(u * s + v * c, finer)
     return north * c + east * s, east * c - north * s
+
+
+def _turn(delay_s: float, r: Array, headings: Array | None, windows: Windows) -> Array:
+    """(w, s) turn of the ship since as long ago as a delay; at the present rate where no heading tells it [rad]."""
+    if headings is None:
+        return r * delay_s
+    then = np.arange(headings.shape[1]) - delay_s / windows.sample_s
+    known = (then >= 0) & (then <= headings.shape[1] - 1)
+    return np.where(known, headings - _shifted(headings, delay_s / windows.sample_s), r * delay_s)
 
 
 def _shifted(values: Array, samples: float) -> Array:
