@@ -13,6 +13,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import (
+    SAMPLES_AT_ONCE,
     parts_of_step,
     propagated,
     rates_by_term,
@@ -354,9 +355,11 @@ def _shown(motion: Motion, moved: Array) -> Array:
     if any(acts_on(key, SENSOR) for key in motion.ship.effects):
         size = 1e-4
         still = sensor_outputs(motion.ship, motion.states, windows)
-        for index in range(count):
-            states = motion.states + size * moved[..., index]
-            result[index] = (sensor_outputs(motion.ship, states, windows) - still) / size
+        at_once = max(1, SAMPLES_AT_ONCE // motion.states[..., 0].size)
+        for low in range(0, count, at_once):
+            states = motion.states + size * np.moveaxis(moved[..., low : low + at_once], -1, 0)
+            seen = sensor_outputs(motion.ship, states.reshape(-1, *states.shape[2:]), windows)
+            result[low : low + at_once] = (seen.reshape(-1, *still.shape) - still) / size
         return result
     for channel, name in enumerate("uvr"):
         result[..., channel] = np.moveaxis(moved[:, :: windows.steps_per_sample, channel], -1, 0)
