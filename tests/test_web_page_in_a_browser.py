@@ -121,6 +121,7 @@ def test_a_zone_is_drawn_named_and_undone_and_the_start_is_moved_and_turned(page
         page.mouse.up()
         page.wait_for_timeout(100)
     eventually(page, lambda: "no_go" in tables(area), "the zone is in the area file")
+    page.get_by_text("+ [[no_go]]").wait_for()
     polygon = tables(area)["no_go"][0]["polygon"]
     assert len(polygon) == 4
     assert all(57 < lat < 59 and 10 < lon < 12 for lat, lon in polygon)
@@ -149,6 +150,32 @@ def test_a_zone_is_drawn_named_and_undone_and_the_start_is_moved_and_turned(page
         eventually(page, lambda before=count: len(list(folder.joinpath(".expdesign").rglob("0*"))) < before, "undone")
     assert "no_go" not in tables(area)
     assert "north_m" in tables(scenario)["start"]
+
+
+def test_a_finger_draws_a_zone_and_then_moves_the_start(browser, address: str, folder: Path) -> None:
+    area, scenario = folder / "craft/area.toml", folder / "craft/scenario.toml"
+    context = browser.new_context(viewport={"width": 768, "height": 1024}, base_url=address, has_touch=True)
+    tablet = context.new_page()
+    tablet.goto("/sea")
+    box = chart(tablet)
+    tablet.get_by_role("button", name="Draw a no-go zone").tap()
+    corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
+    for right, down in [*corners, corners[0]]:
+        tablet.touchscreen.tap(box["x"] + right * box["width"], box["y"] + down * box["height"])
+        tablet.wait_for_timeout(300)
+    eventually(tablet, lambda: "no_go" in tables(area), "the zone is in the area file")
+    tablet.wait_for_timeout(500)
+    finger = context.new_cdp_session(tablet)
+    mark = tablet.get_by_title("start", exact=True).bounding_box()
+    for step in range(9):
+        at = {"x": mark["x"] + 14 + 4 * step, "y": mark["y"] + 14 - 3 * step}
+        kind = "touchMove" if step else "touchStart"
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    eventually(tablet, lambda: "lat_deg" in tables(scenario)["start"], "the start is moved")
+    moved = tablet.get_by_title("start", exact=True).bounding_box()
+    assert (moved["x"] - mark["x"], moved["y"] - mark["y"]) == pytest.approx((32.0, -24.0), abs=2.0)
+    context.close()
 
 
 def test_manoeuvres_answer_within_a_second_and_stay_in_the_file(page, folder: Path) -> None:

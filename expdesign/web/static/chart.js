@@ -63,7 +63,11 @@
   function pen(id) {
     const map = mapOf(id);
     map.off("draw:created");
-    map.on("draw:created", (event) => emitEvent("zone_drawn", event.layer.getLatLngs()[0].map(plain)));
+    map.on("draw:created", (event) => {
+      emitEvent("zone_drawn", event.layer.getLatLngs()[0].map(plain));
+      // The last corner goes away under the finger, whose lifting the map then never sees: it would follow the next touch.
+      setTimeout(() => { map.dragging.disable(); map.dragging.enable(); });
+    });
     new L.Draw.Polygon(map, { allowIntersection: false, shapeOptions: { color: "#a3261c" } }).enable();
   }
 
