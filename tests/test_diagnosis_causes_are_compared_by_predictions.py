@@ -18,13 +18,13 @@ from expdesign.diagnosis.fit import AHEAD_S, FitOptions, HeldOut, counting_stret
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import stable_windows
 from expdesign.diagnosis.prediction_comparison import (
+    MUCH,
     Compared,
     compare_predictions,
     fitted_to_all,
     signed_rank_p_values,
 )
 from expdesign.diagnosis.select import Selection, Step
-from expdesign.diagnosis.select.tuning import TUNING
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.progress import silent
 from expdesign.signals import Record
@@ -68,29 +68,31 @@ def test_where_nothing_is_hidden_nothing_is_certain():
 
 
 def test_a_current_that_wanders_gains_and_is_no_certain_cause():
-    """Nothing is hidden but weather: a steady current predicts these runs better for certain, by five points not."""
-    record = hidden_record("tug", seed=103, batches=3, samples=240)
+    """Nothing is hidden but weather: of a steady current the gain has to be large for certain, whatever is left."""
+    record = hidden_record("tug", seed=233, batches=3, samples=240)
     ship = extended_model(vessel_of("tug", relative_std=0.1), record)
     found = compare_predictions(ship, cut_windows(ship.model, record, longest_s=AHEAD_S), 0, silent)
     assert found is not None
     first = found.causes[0]
     assert first.cause == "current"
     assert first.gain_interval[0] > 0.0
-    assert first.gain_interval[0] < TUNING.much_better_points
     assert not first.is_certain
-    much = TUNING.much_better_points + np.array([0.1, 20.0])
-    assert replace(first, gain=10.0, gain_interval=tuple(much), p_value=0.001).is_certain
-    assert not replace(first, gain=10.0, gain_interval=tuple(much - 0.2), p_value=0.001).is_certain
+    for left in (10.0, 60.0):  # of a tank, and of a lake
+        much = left * (MUCH + np.array([0.01, 0.4]))
+        gains = replace(first, gain=0.3 * left, gain_interval=tuple(much), left=left, p_value=0.001)
+        assert gains.is_certain
+        assert not replace(gains, gain_interval=tuple(much - 0.02 * left)).is_certain
 
 
 def errors(squared: np.ndarray) -> HeldOut:
     return HeldOut(squared_error=squared, squared_deviation=np.ones_like(squared))
 
 
-def of(cause: str, error: float, *, certain: bool = True, weather: bool = False) -> SimpleNamespace:
+def of(cause: str, error: float, *, certain: bool = True, weather: bool = False, gains: bool = True) -> SimpleNamespace:
     """A compared cause with this squared error in each of ten stretches."""
     return SimpleNamespace(
         cause=cause, held=errors(np.full((10, 3), error)), is_certain=certain, is_slow_weather=weather, p_value=0.001,
+        may_be_weather=weather and gains, gain=1.0 - error,
         fit=SimpleNamespace(ship=cause), point=SimpleNamespace(test=SimpleNamespace(candidate=Candidate(cause=cause,
         free={}))),
     )  # fmt: skip
@@ -147,6 +149,9 @@ def test_what_slow_weather_predicts_as_well_is_no_certain_cause(monkeypatch):
         (),
     )
     assert judged(monkeypatch, of("current", 0.3, weather=True), bias, found=None) == ("current", ("heading_bias",))
+    # which may gain nothing itself
+    small = of("current", 0.3, certain=False, weather=True, gains=False)
+    assert judged(monkeypatch, bias, small, found=None) == ("heading_bias", ("current",))
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
 from expdesign.vessel import NUMPY, Limit
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 EFFECTS = {
     "parameters": {"theta:Y_v": -0.01},
@@ -47,7 +47,7 @@ EFFECTS = {
     "heading_bias": {"heading_bias": 0.03},
     "lever_arm": {"lever:forward": 4.0},
     "sensor_delay": {"late:r": 1.0},
-    **{fault.cause: {fault.effect: fault.matters} for fault in GAINS_AND_OFFSETS},
+    **{row.fault.name: {row.effects[0]: row.matters} for row in GAINS_AND_OFFSETS if row.fault},
     "shallow_water": {"shallow:damping": 0.8, "shallow:inertia": 0.4},
     "roll_coupling": {"roll:sway": 0.1, "roll:yaw": 0.01, "roll:period": 8.0, "roll:damping": 0.08},
     "change_point": {"change:time": 300.0, "change:gain": -0.2},

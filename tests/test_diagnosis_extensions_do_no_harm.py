@@ -14,12 +14,12 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.fit.fit import best_step, nearest_possible, step_bounds
 from expdesign.diagnosis.fit.output_error import fit_output_error
 from expdesign.diagnosis.judgement import harms, without_harm
-from expdesign.diagnosis.model import EFFECTS
 from expdesign.diagnosis.model.terms import resisting
 from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import improves_held_out
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.vessel import Term
+from expdesign.vessel.quantities import EFFECTS
 from held_out_cases import errors, steps_of
 
 

@@ -19,8 +19,8 @@ from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.records import load_records
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, measure, simulate
-from expdesign.vessel import Mounting, Sensors
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel import Sensors
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 BIAS = 0.06
 SHIP = vessel_of("barge")
@@ -43,8 +43,8 @@ def trial(folder, sensors: Sensors, *, pose_only: bool):
 FAULTS = {
     "compass": (Sensors(heading_bias_rad=-BIAS), True),
     "velocity sensor": (Sensors(velocity_angle_rad=-BIAS), False),
-    "antenna": (Sensors(position=Mounting(forward_m=4.0, starboard_m=-1.0)), True),
-    "place of the velocity sensor": (Sensors(velocity=Mounting(forward_m=4.0, starboard_m=-1.0)), False),
+    "antenna": (Sensors(position_forward_m=4.0, position_starboard_m=-1.0), True),
+    "place of the velocity sensor": (Sensors(velocity_forward_m=4.0, velocity_starboard_m=-1.0), False),
 }
 
 
@@ -98,7 +98,7 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
         "heading_bias": 0.04, "lever:forward": 2.0, "lever:starboard": -1.0, "late:psi": 0.5, "current:north": 0.2,
         "current:east": -0.1, **({"late:position": 0.6} if pose_only else {"late:r": 0.7}),
     }  # fmt: skip
-    effects |= {} if pose_only else {fault.effect: -fault.matters for fault in GAINS_AND_OFFSETS}
+    effects |= {} if pose_only else {fault.effects[0]: -fault.matters for fault in GAINS_AND_OFFSETS}
     driven = SHIP.model.inputs[0]
     effects |= {f"{kind}:{driven}": value for kind, value in {"offset": 0.03, "lag": 2.0, "delay": 1.0}.items()}
     found = extended_model(SHIP, record).with_effects(effects)
@@ -107,10 +107,10 @@ def test_every_number_of_the_results_is_the_vessel_files_by_name_and_sign(pose_o
     sensors, response = ship.sensors, ship.responses[0]
     written = {
         "heading_bias": sensors.heading_bias_rad if pose_only else sensors.velocity_angle_rad,
-        "lever:forward": getattr(sensors, place).forward_m, "lever:starboard": getattr(sensors, place).starboard_m,
-        "late:psi": sensors.heading.delay_s, "late:position": sensors.position.delay_s,
-        "late:r": sensors.yaw_rate.delay_s,
-        **{fault.effect: getattr(sensors, fault.key) for fault in GAINS_AND_OFFSETS},
+        **dict(zip(("lever:forward", "lever:starboard"), sensors.place(place), strict=True)),
+        "late:psi": sensors.heading_delay_s, "late:position": sensors.position_delay_s,
+        "late:r": sensors.yaw_rate_delay_s,
+        **{fault.effects[0]: getattr(sensors, fault.key) for fault in GAINS_AND_OFFSETS},
         "current:north": ship.environment.current_to[0], "current:east": ship.environment.current_to[1],
         f"offset:{driven}": response.offset, f"lag:{driven}": response.lag_s,
         f"delay:{driven}": response.delay_s,

@@ -6,7 +6,7 @@ import pytest
 from diagnosis_case import hidden_record, vessel_of
 from expdesign.diagnosis import diagnose
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.held_out import HeldOut, prediction_gain
+from expdesign.diagnosis.fit.held_out import HeldOut, prediction_gain, prediction_p_value
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -52,6 +52,9 @@ def test_predictions_gain_by_the_true_model_and_lose_as_much_without_it():
     loss, _ = prediction_gain(right, without, windows, noise)
     assert (1.0 - gain) * (1.0 - loss) == pytest.approx(1.0)
     assert prediction_gain(right, right, windows, noise) == (0.0, (0.0, 0.0))
+    assert prediction_p_value(without, right, windows, noise) < 0.001
+    assert prediction_p_value(right, without, windows, noise) > 0.999
+    assert prediction_p_value(right, right, windows, noise) == pytest.approx(0.5)
 
 
 def test_small_effects_that_are_not_there_gain_no_predictions():

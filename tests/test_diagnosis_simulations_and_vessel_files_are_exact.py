@@ -19,7 +19,7 @@ from expdesign.diagnosis.motion.simulation import (
 )
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 SMALL = {"theta:X_u": 1e-5, "current:north": 1e-4, "gain": 1e-4, "inertia:v": 1e-4, "heading_bias": 1e-4}
 
@@ -102,7 +102,7 @@ def test_shorter_windows_hold_the_same_data():
 
 
 SENSED = {"lag:n": 2.0, "heading_bias": 0.02, "lever:forward": 1.0, "current:north": 0.1} | {
-    fault.effect: -fault.matters for fault in GAINS_AND_OFFSETS
+    fault.effects[0]: -fault.matters for fault in GAINS_AND_OFFSETS
 }
 
 

@@ -24,9 +24,10 @@ from expdesign.diagnosis.fit.between_runs import (
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.linear_model import Sensitivities, gram_matrices, marginalised
 from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.select.score_tests import score_tests
-from expdesign.diagnosis.select.selection import _equivalent
+from expdesign.diagnosis.select.selection import Selection, Step, _equivalent
 from expdesign.diagnosis.select.selection_round import _alternatives, open_candidates
 from expdesign.diagnosis.select.shortlist import _shortlist
 from expdesign.diagnosis.vessel_file.reading import extended_model
@@ -217,3 +218,22 @@ def test_candidates_are_equivalent_by_a_margin_that_grows_with_the_spread_betwee
     rivals = _alternatives(ahead, fitted)  # type: ignore[arg-type]
     for ratio, named in ((1.0, ["asymmetry"]), (5.0, ["asymmetry", "theta:N_0"])):
         assert [item.ship for item in _equivalent(rivals, Dispersion(ratio=ratio, freedom=10.0))] == named
+
+
+@pytest.mark.parametrize(
+    ("runs", "cause", "share", "told"),
+    [(2, "delay", 0.5, True), (3, "delay", 0.5, False), (1, "delay", 0.5, False), (2, "delay", 0.04, False),
+     (2, "change_point", 0.5, False)],
+)  # fmt: skip
+def test_held_out_parts_tell_of_two_runs_what_one_degree_of_freedom_cannot(monkeypatch, runs, cause, share, told):
+    """Of causes that may show in predictions, by enough to be a finding; among as many tests as before."""
+    chosen = SimpleNamespace(
+        candidate=Candidate(cause=cause, free={}), is_block=False, multiplicity=10.0, fit=SimpleNamespace(noise=None)
+    )
+    step = Step(chosen=chosen, p_value=0.11, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
+    found = Selection(steps=(step,), first=None, last=None, last_tests=())  # type: ignore[arg-type]
+    monkeypatch.setattr(backward_elimination, "prediction_gain", lambda *_: (share, (0.1, 0.9)))
+    monkeypatch.setattr(backward_elimination, "prediction_p_value", lambda *_: 1e-4)
+    windows = SimpleNamespace(batch=np.repeat(np.arange(float(runs)), 4))
+    (after,) = backward_elimination.two_runs_by_predictions(found, (None, None), windows).steps  # type: ignore[arg-type]
+    assert after.p_value == pytest.approx(1e-3 if told else 0.11, rel=0.01)

@@ -190,7 +190,7 @@ def test_a_signal_before_its_time_is_called_early_and_the_file_says_that_it_lack
     record = hidden_record("barge", seed=1, batches=1, samples=120)
     ship = extended_model(vessel_of("barge"), Record(batches=tuple(from_pose(batch) for batch in record.batches)))
     vessel, missing = extend(vessel_of("barge"), ship.with_effects({"late:position": delay_s}), {})
-    assert vessel.sensors.position.delay_s == max(delay_s, 0.0)
+    assert vessel.sensors.position_delay_s == max(delay_s, 0.0)
     assert any("below zero" in text for text in missing) == left_out
     (cause,) = (cause for cause in CAUSES if cause.name == "sensor_delay")
     assert f"2.000 ± 0.050 s {word}" in cause.explain({"late:position": (delay_s, 0.05)}, ship)

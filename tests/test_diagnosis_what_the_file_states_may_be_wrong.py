@@ -20,7 +20,7 @@ from expdesign.diagnosis.select.score_tests import score_tests
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.signals import Record
-from expdesign.vessel import Mounting, Response, Vessel
+from expdesign.vessel import Response, Vessel
 
 EVERYTHING = {"current:north", "current:east", "lag:n", "delay:a", "deadband:a", "offset:a", "heading_bias", "gyro",
               "gyro_bias", "lever:forward", "late:r"}  # fmt: skip
@@ -37,9 +37,8 @@ def stating_everything() -> Vessel:
     responses = Response(lag_s=2.0), Response(delay_s=1.0, deadband=0.05, offset=0.03)
     actuators = tuple(replace(one, responses=responses) for one in vessel.model.actuators)
     sensors = replace(
-        vessel.sensors, velocity=Mounting(forward_m=2.0), velocity_angle_rad=-0.02, yaw_rate_scale=1.04,
-        yaw_rate_bias_radps=0.003,
-        yaw_rate=replace(vessel.sensors.yaw_rate, delay_s=1.0),
+        vessel.sensors, velocity_forward_m=2.0, velocity_angle_rad=-0.02, yaw_rate_scale=1.04,
+        yaw_rate_bias_radps=0.003, yaw_rate_delay_s=1.0,
     )  # fmt: skip
     return replace(vessel, model=replace(vessel.model, actuators=actuators), sensors=sensors)
 
@@ -141,7 +140,7 @@ def test_a_cause_with_little_gain_alone_is_judged_again_beside_later_ones():
     batches = hidden_record("barge", seed=6, batches=6, samples=150, faults=faults).batches
     record = Record(batches=tuple(from_pose(batch) for batch in batches))
     barge = vessel_of("barge")
-    stated = replace(barge.sensors, heading_bias_rad=0.03, position=Mounting(forward_m=-1.0))
+    stated = replace(barge.sensors, heading_bias_rad=0.03, position_forward_m=-1.0)
     found = diagnose(replace(barge, sensors=stated), record)
     estimates = {item.cause: item.estimates[0] for item in found.findings}
     for cause, truth in (("lever_arm", 3.0), ("heading_bias", -0.05)):

@@ -17,7 +17,7 @@ from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.errors import FileError, UnknownName
 from expdesign.export import vessel_toml
 from expdesign.scenario import load_vessel
-from expdesign.vessel import Mounting, Response, Vessel
+from expdesign.vessel import Response, Vessel
 from measured_trials import prompt
 from short_examples import SCENARIOS
 
@@ -96,7 +96,7 @@ def test_other_candidates_remain_beside_what_is_uncertain():
     """A lag that is stated with a standard deviation is no finding, so lags of others are still tested."""
     vessel = vessel_of("tug")
     actuators = tuple(replace(one, responses=(Response(lag_s=2.0), Response())) for one in vessel.model.actuators)
-    sensors = replace(vessel.sensors, velocity=Mounting(forward_m=1.0))
+    sensors = replace(vessel.sensors, velocity_forward_m=1.0)
     vessel = replace(
         vessel, model=replace(vessel.model, actuators=actuators), sensors=sensors,
         std={"n1_lag_s": 0.2, "n2_lag_s": 0.2, "velocity_forward_m": 0.1},

@@ -173,8 +173,8 @@ def test_keys_say_which_signal_responds_how(tmp_path: Path) -> None:
     assert (speed.lag_s, speed.delay_s, speed.deadband, speed.offset) == (4.0, 0.0, 0.2, 0.0)
     assert (angle.lag_s, angle.delay_s, angle.deadband, angle.offset) == (0.0, 0.7, 0.0, 0.03)
     assert (rudder.lag_s, rudder.deadband, rudder.offset) == (2.0, 0.01, -0.02)
-    assert vessel.sensors.position.interval_s == 5.0
-    assert (vessel.sensors.wind.forward_m, vessel.sensors.wind_sensor) == (9.0, "vane")
+    assert vessel.sensors.position_interval_s == 5.0
+    assert (vessel.sensors.wind_forward_m, vessel.sensors.wind_sensor) == (9.0, "vane")
     assert vessel.environment.wind_variation.correlation_s == 30.0
     assert vessel.environment.current_std_mps == 0.05
 

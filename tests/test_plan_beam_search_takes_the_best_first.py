@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.chart import GoalDistance
-from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
+from expdesign.plan.local_planner import Departure, PartialPlans, SearchSpace, Successors
 from expdesign.plan.search import place_runs
 from expdesign.plan.search.beam import SORTED_AT_ONCE, _in_order
 from expdesign.plan.search.local_search import clear_successors, runs_clear
@@ -47,14 +47,16 @@ def test_order_is_that_of_a_stable_sort_whatever_is_checked_at_once():
 def test_paths_are_looked_up_once_for_each_run(space, monkeypatch):
     asked, paths = [], GoalDistance.paths
     monkeypatch.setattr(GoalDistance, "paths", lambda self, points: asked.append(len(points)) or paths(self, points))
-    assert len(place_runs(space, [3], start=START, width=20)) == 3
+    assert len(place_runs(space, [3], Departure(pose=START), width=20)) == 3
     assert len(asked) == 3
     assert max(asked) <= 20
 
 
 def test_each_run_and_each_order_is_told(space):
     told = []
-    runs = place_runs(space, [5], start=START, width=20, progress=lambda what, share: told.append((what, share)))
+    runs = place_runs(
+        space, [5], Departure(pose=START), width=20, progress=lambda what, share: told.append((what, share))
+    )
     assert [what for what, _ in told] == [
         *(f"placing run {number} of {len(runs)}" for number in range(1, 6)), "moving runs closer to each other"
     ]  # fmt: skip

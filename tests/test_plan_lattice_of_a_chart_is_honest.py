@@ -6,11 +6,11 @@ import shapely
 
 from expdesign.errors import NoPlan
 from expdesign.plan.chart.goal_distance import build_goal_distance
-from expdesign.plan.local_planner import LegEnds, SearchSpace, local_planner
+from expdesign.plan.local_planner import Departure, LegEnds, SearchSpace, local_planner
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import search_lattice
-from expdesign.plan.search.lattice_moves import Departure, Lattice, build_lattice
-from expdesign.plan.search.planners import LatticeSearch
+from expdesign.plan.search.lattice_moves import Lattice, build_lattice
+from expdesign.plan.search.planners import placed_on_lattice
 from plan_case import leg_water
 
 SPACING_M = 60.0
@@ -139,7 +139,7 @@ def test_a_current_helps_and_hinders():
 def test_runs_begin_only_where_their_discs_have_room():
     water = OPEN.difference(shapely.box(-200, 200, 500, 500))
     case = space(water, (900, 900, 0), run("ahead", (240, 0, 0), room_m=80.0))
-    found = LatticeSearch(spacing_m=SPACING_M).place(case, (2,), start=np.array([-500.0, -500.0, 0.0]))
+    found = placed_on_lattice(case, (2,), Departure(pose=np.array([-500.0, -500.0, 0.0])), spacing_m=SPACING_M)
     begun = [placement.pose for placement in found.runs]
     assert len(begun) == 2
     for pose in begun:
@@ -151,9 +151,9 @@ def test_runs_begin_only_where_their_discs_have_room():
 def test_no_run_begins_again_where_one_has_failed_and_legs_after_get_longer():
     case = space(OPEN, (700, 800, 2.0), run("ahead", (240, 0, 0)))
     start = np.array([-300.0, -200.0, -1.0])
-    first = LatticeSearch(spacing_m=SPACING_M).place(case, (2,), start=start)
+    first = placed_on_lattice(case, (2,), Departure(pose=start), spacing_m=SPACING_M)
     refusing = case.refusing("ahead", first.runs[1])
-    second = LatticeSearch(spacing_m=SPACING_M).place(refusing, (2,), start=start)
+    second = placed_on_lattice(refusing, (2,), Departure(pose=start), spacing_m=SPACING_M)
     poses = np.array([placement.pose for placement in second.runs])
     assert not refusing.is_refused(poses).any()
     assert second.lattice.cost_s >= first.lattice.lower_bound_s
@@ -164,7 +164,7 @@ def test_no_run_begins_again_where_one_has_failed_and_legs_after_get_longer():
 def test_a_lattice_without_a_plan_says_which_and_what_was_not_tried():
     case = space(shapely.box(-400, -400, 400, 400), (200, 200, 0), run("ahead", (240, 0, 0), room_m=500.0))
     with pytest.raises(NoPlan, match=r"^no room for 'ahead' on a lattice of 60 m; not tried: a plan.lattice_spac"):
-        LatticeSearch(spacing_m=60.0).place(case, (1,), start=np.zeros(3))
+        placed_on_lattice(case, (1,), Departure(pose=np.zeros(3)), spacing_m=60.0)
 
 
 @pytest.mark.thorough

@@ -9,11 +9,10 @@ import pytest
 import shapely
 
 from expdesign.plan.chart.visibility_graph import polyline_length
-from expdesign.plan.local_planner import SearchSpace, TriedTransition, run_ends
+from expdesign.plan.local_planner import Departure, SearchSpace, TriedTransition, run_ends
 from expdesign.plan.search import local_search
 from expdesign.plan.search.local_search import (
     MOST_POSES,
-    ChainEnds,
     _longest_block,
     measured_s,
     polished,
@@ -38,7 +37,7 @@ def space():
 
 
 def test_legs_take_less_time_and_runs_and_paths_stay_in_the_water(space):
-    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    ends = Departure(pose=START)
     found, taken_s = polished(space, ends, [0, 0, 0], POSES)
     assert taken_s == measured_s(space, [0, 0, 0], found, ends) < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
     assert runs_clear(space, np.zeros(3, dtype=int), found).all()
@@ -46,7 +45,7 @@ def test_legs_take_less_time_and_runs_and_paths_stay_in_the_water(space):
 
 
 def test_no_plan_takes_less_than_its_path_at_full_speed(space):
-    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    ends = Departure(pose=START)
     found, taken_s = polished(space, ends, [0, 0, 0], POSES)
     froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])
     ways = [space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
@@ -64,7 +63,7 @@ def test_the_work_of_a_sweep_does_not_grow_with_the_cube_of_the_runs():
 
 
 def test_short_blocks_alone_shorten_legs_of_many_runs(space, monkeypatch):
-    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    ends = Departure(pose=START)
     monkeypatch.setattr(local_search, "MOST_POSES", 3)
     found, taken_s = polished(space, ends, [0, 0, 0], POSES)
     assert runs_clear(space, np.zeros(3, dtype=int), found).all()
@@ -79,7 +78,7 @@ def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
     totals = []
     for water, sign in zip(waters, (np.ones(3), MIRROR), strict=True):
         space = placed_in(water, np.array([0.0, 400.0, 0.0]) * sign)
-        ends = ChainEnds(start=START * sign, exit_mps=0.0, last=-1)
+        ends = Departure(pose=START * sign)
         totals.append(polished(space, ends, [0, 0, 0], POSES * sign)[1])
     assert totals[0] == pytest.approx(totals[1], rel=0.01)
 
@@ -90,6 +89,6 @@ def test_a_transition_that_was_tried_takes_what_it_took(space):
     transition = TriedTransition(step=np.array([7.0, 2.0, 0.3]), seconds=3.0, more_s=0.0)
     known = replace(space, tried={("go", "go"): transition})
     after = end + transition.step  # the run is straight: its end still points north
-    ends = ChainEnds(start=START, exit_mps=0.0, last=-1)
+    ends = Departure(pose=START)
     apart = [measured_s(one, [0, 0], np.stack([pose, after]), ends) for one in (known, space)]
     assert apart[0] < apart[1] - 1.0

@@ -17,14 +17,15 @@ from expdesign.reduction.sensors import readings
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import CALM, Environment, deliver, measure, simulate, simulate_ensemble
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.vessel import SCALAR, SENSORS, Mounting, Response, Sensors, Vessel, response_values, std_keys
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel import SCALAR, Response, Sensors, Vessel, response_values, std_keys
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import parse_expression
 from measured_trials import tug_commands
 
 WIND = Environment(wind_to=np.array([4.0, -3.0]))
 COMMANDS = tug_commands(400)
-TIMED, TWICE = Mounting(delay_s=2.0, interval_s=3.0), Mounting(delay_s=2.0, interval_s=2.0)
+TIMED = {"wind_delay_s": 2.0, "wind_interval_s": 3.0}
+TWICE = {"velocity_delay_s": 2.0, "velocity_interval_s": 2.0}
 
 
 def ship(*responses: Response, **sensors: object) -> Vessel:
@@ -39,22 +40,21 @@ FAULTS = {
     "lag": ship(*LAG),
     "dead time": ship(Response(delay_s=2.0), Response(delay_s=1.3)),
     "dead band and offset": ship(Response(), Response(deadband=0.5, offset=0.05)),
-    "place of the log": ship(velocity=Mounting(forward_m=6.0, starboard_m=2.0)),
+    "place of the log": ship(velocity_forward_m=6.0, velocity_starboard_m=2.0),
     "axes of the log": ship(velocity_angle_rad=0.05),
     "scale and bias": ship(yaw_rate_scale=1.1, heading_bias_rad=0.1),
-    "scale of the log": ship(velocity_scale=0.9, velocity_angle_rad=0.05, velocity=Mounting(forward_m=6.0)),
+    "scale of the log": ship(velocity_scale=0.9, velocity_angle_rad=0.05, velocity_forward_m=6.0),
     **{fault.key: ship(**{fault.key: fault.neutral + 5 * fault.matters}) for fault in GAINS_AND_OFFSETS},
-    "late log": ship(velocity=Mounting(delay_s=2.0)),
-    "late gyro": ship(yaw_rate=Mounting(delay_s=1.0), velocity=Mounting(forward_m=6.0)),
-    "wind": ship(wind=replace(TIMED, forward_m=8.0, starboard_m=-1.0), heading=Mounting(delay_s=1.0)),
+    "late log": ship(velocity_delay_s=2.0),
+    "late gyro": ship(yaw_rate_delay_s=1.0, velocity_forward_m=6.0),
+    "wind": ship(wind_forward_m=8.0, wind_starboard_m=-1.0, heading_delay_s=1.0, **TIMED),
 }
-HELD = ship(*LAG, velocity=TWICE, yaw_rate=Mounting(interval_s=2.0))
+HELD = ship(*LAG, yaw_rate_interval_s=2.0, **TWICE)
 ALL = ship(
     Response(rate=0.5, lag_s=3.0, delay_s=1.0), Response(rate=0.1, lag_s=2.0, deadband=0.3, offset=0.03),
     heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1, yaw_rate_bias_radps=0.01,
-    position=Mounting(forward_m=5.0, starboard_m=-1.5, delay_s=1.0), heading=Mounting(delay_s=1.0),
-    velocity=replace(TWICE, forward_m=6.0, starboard_m=2.0),
-    yaw_rate=Mounting(delay_s=1.0), wind=replace(TIMED, forward_m=8.0),
+    position_forward_m=5.0, position_starboard_m=-1.5, position_delay_s=1.0, heading_delay_s=1.0,
+    velocity_forward_m=6.0, velocity_starboard_m=2.0, yaw_rate_delay_s=1.0, wind_forward_m=8.0, **TIMED, **TWICE,
 )  # fmt: skip
 
 
@@ -144,10 +144,6 @@ def states(vessel: Vessel, name: str) -> bool:
     plain, own = ship(), response_values(vessel.actuators)
     if name in own:
         return own[name] != response_values(plain.actuators)[name]
-    mountings = {one: getattr(vessel.sensors, one) for one in SENSORS}
-    found = max((one for one in mountings if name.startswith(one + "_")), key=len, default="")
-    if found and hasattr(mountings[found], name.removeprefix(found + "_")):
-        return getattr(mountings[found], name.removeprefix(found + "_")) != 0.0
     return getattr(vessel.sensors, name) != getattr(plain.sensors, name)
 
 
@@ -168,9 +164,7 @@ def test_a_signal_between_readings_is_within_the_stated_error():
         taken = np.arange(400.0) - delay
         if interval:
             taken = np.floor(taken / interval + 1e-9) * interval
-        found, as_stated = readings(
-            np.sin(omega * taken)[:, None], Mounting(delay_s=delay, interval_s=interval), sample_time_s=1.0
-        )
+        found, as_stated = readings(np.sin(omega * taken)[:, None], (delay, interval), sample_time_s=1.0)
         assert as_stated
         grid = np.arange(10.0, 390.0)
         bound = 3 / 128 * (omega * max(interval, 1.0)) ** 4
@@ -183,21 +177,21 @@ def test_a_signal_between_readings_is_within_the_stated_error():
 def test_the_time_of_the_readings_is_found_wherever_the_data_begin(first: int):
     time = np.arange(first, 200.0)
     shown = np.floor((time - 1.0) / 5.0) * 5.0  # taken every 5 samples, 1 late
-    found, as_stated = readings(np.cos(0.01 * shown)[:, None], Mounting(delay_s=1.0, interval_s=5.0), sample_time_s=1.0)
+    found, as_stated = readings(np.cos(0.01 * shown)[:, None], (1.0, 5.0), sample_time_s=1.0)
     assert as_stated
     np.testing.assert_allclose(found.values[:, 0], np.cos(0.01 * (first + found.times)), atol=1e-12)
 
 
 def test_a_signal_that_is_not_held_as_stated_counts_as_read_at_every_sample():
     values = np.random.default_rng(0).standard_normal((100, 1))
-    found, as_stated = readings(values, Mounting(interval_s=4.0), sample_time_s=1.0)
+    found, as_stated = readings(values, (0.0, 4.0), sample_time_s=1.0)
     assert not as_stated
     np.testing.assert_array_equal(found.at(np.arange(100.0)), values)
 
 
 def test_velocities_from_the_pose_are_of_the_reference_point():
     """Differences of the antenna's pose, turned by a compass with a bias, against differences of the ship's own."""
-    faulty = ship(position=Mounting(forward_m=5.0, delay_s=2.0), heading=Mounting(delay_s=2.0), heading_bias_rad=0.1)
+    faulty = ship(position_forward_m=5.0, position_delay_s=2.0, heading_delay_s=2.0, heading_bias_rad=0.1)
     one, other = (from_pose(sailed(vessel)) for vessel in (faulty, ship()))
     seen = reduced(Record(batches=(one,)), faulty).batches[0]
     np.testing.assert_allclose(seen.velocity, other.velocity[1 : 1 + len(seen)], atol=1e-9)
@@ -227,7 +221,8 @@ def from_pose(batch: Batch) -> Batch:
 
 
 def test_winds_for_a_diagnosis_give_the_air_over_ground():
-    vessel = replace(ALL, sensors=replace(ALL.sensors, velocity=Mounting(forward_m=6.0, delay_s=1.0)))
+    log = {"velocity_starboard_m": 0.0, "velocity_delay_s": 1.0, "velocity_interval_s": 0.0}
+    vessel = replace(ALL, sensors=replace(ALL.sensors, **log))
     batch = sailed(vessel, weather=WIND)
     seen = with_reduced_wind(Record(batches=(batch,)), vessel.sensors).batches[0]
     np.testing.assert_array_equal(seen.velocity, batch.velocity)
@@ -249,7 +244,7 @@ def test_remarks_say_what_was_undone():
 
 
 def test_delays_longer_than_the_data_are_refused():
-    late = Sensors(velocity=Mounting(delay_s=500.0))
+    late = Sensors(velocity_delay_s=500.0)
     with pytest.raises(InputError, match="no batch is longer than the delays"):
         at_reference_point(Record(batches=(sailed(TRUE),)), late)
 

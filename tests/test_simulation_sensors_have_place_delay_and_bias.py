@@ -11,7 +11,7 @@ from expdesign.errors import InputError
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, Environment, measure, simulate_ensemble
 from expdesign.values import Array
-from expdesign.vessel import Mounting, Sensors
+from expdesign.vessel import SENSORS, Sensors
 
 SHIP = vessel("azimuth-30m-true")
 COUNT, STEP_S = 200, 0.5
@@ -40,7 +40,7 @@ TURN = steady_turn()
 
 
 def test_a_velocity_sensor_forward_sees_the_yaw_rate_as_sway():
-    told = seen(Sensors(velocity=Mounting(forward_m=8.0, starboard_m=-3.0)), TURN)
+    told = seen(Sensors(velocity_forward_m=8.0, velocity_starboard_m=-3.0), TURN)
     np.testing.assert_allclose(told["v_mps"], V + R * 8.0, rtol=1e-12)
     np.testing.assert_allclose(told["u_mps"], U + R * 3.0, rtol=1e-12)
     np.testing.assert_allclose(told["r_radps"], R)
@@ -48,7 +48,7 @@ def test_a_velocity_sensor_forward_sees_the_yaw_rate_as_sway():
 
 def test_an_antenna_moves_with_the_velocity_of_its_place():
     """Differences of the antenna's position are its velocity: that of the origin and the yaw rate times the arm."""
-    told = seen(Sensors(position=Mounting(forward_m=8.0, starboard_m=-3.0)), TURN)
+    told = seen(Sensors(position_forward_m=8.0, position_starboard_m=-3.0), TURN)
     north, east = np.gradient(told["north_m"], STEP_S), np.gradient(told["east_m"], STEP_S)
     heading = TURN.pose[:-1, 2]
     ahead, side = north * np.cos(heading) + east * np.sin(heading), east * np.cos(heading) - north * np.sin(heading)
@@ -59,7 +59,7 @@ def test_an_antenna_moves_with_the_velocity_of_its_place():
 
 def test_an_anemometer_off_the_centre_feels_the_turn():
     central, off = (
-        seen(Sensors(wind=place), TURN, WIND) for place in (Mounting(), Mounting(forward_m=10.0, starboard_m=2.0))
+        seen(sensors, TURN, WIND) for sensors in (Sensors(), Sensors(wind_forward_m=10.0, wind_starboard_m=2.0))
     )
     np.testing.assert_allclose(off["wind_u_mps"] - central["wind_u_mps"], -R * 2.0, rtol=1e-9)
     np.testing.assert_allclose(off["wind_v_mps"] - central["wind_v_mps"], R * 10.0, rtol=1e-9)
@@ -75,8 +75,7 @@ def test_bias_and_scale_are_what_they_say():
 
 @pytest.mark.parametrize("delay_s", [0.5, 0.7, 3.0, 1e6])
 def test_delays_shift_what_was_so(delay_s: float):
-    late = Mounting(delay_s=delay_s)
-    told = seen(Sensors(position=late, heading=late, velocity=late, yaw_rate=late, wind=late), ramp(), WIND)
+    told = seen(Sensors(**{f"{sensor}_delay_s": delay_s for sensor in SENSORS}), ramp(), WIND)
     then = np.maximum(TIME_S[:-1] - delay_s, 0.0)
     np.testing.assert_allclose(told["u_mps"], 0.1 * then, atol=1e-12)
     np.testing.assert_allclose(told["r_radps"], 0.01 * then, atol=1e-12)
@@ -96,14 +95,14 @@ def ramp() -> Trajectory:
 
 @pytest.mark.parametrize(("interval_s", "delay_s"), [(2.0, 0.0), (2.0, 0.5), (1.2, 0.0), (3.0, 7.0)])
 def test_slow_sensors_repeat_their_last_reading(interval_s: float, delay_s: float):
-    told = seen(Sensors(position=Mounting(interval_s=interval_s, delay_s=delay_s)), ramp())
+    told = seen(Sensors(position_interval_s=interval_s, position_delay_s=delay_s), ramp())
     reading = np.maximum(np.floor((TIME_S[:-1] - delay_s) / interval_s + 1e-9), 0.0) * interval_s
     np.testing.assert_allclose(told["north_m"], 2.0 * reading, atol=1e-9)
 
 
 def test_a_repeated_reading_repeats_its_noise_and_new_ones_are_independent():
     still = Trajectory(sample_time_s=STEP_S, pose=np.zeros((COUNT + 1, 3)), velocity=np.zeros((COUNT + 1, 3)))
-    told = seen(Sensors(position_m=1.0, position=Mounting(interval_s=2.0)), still)["north_m"].reshape(-1, 4)
+    told = seen(Sensors(position_m=1.0, position_interval_s=2.0), still)["north_m"].reshape(-1, 4)
     np.testing.assert_array_equal(told, np.repeat(told[:, :1], 4, axis=1))
     readings = told[:, 0]
     assert abs(readings.std() - 1.0) < 5 / np.sqrt(2 * len(readings))
@@ -132,11 +131,12 @@ def test_a_vane_shrinks_the_wind_by_the_mean_cosine_of_its_error():
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize("kind", ["cartesian", "vane"])
 def test_many_runs_are_measured_as_single_ones(late: bool, kind: str):
-    timing = {"delay_s": 1.3, "interval_s": 2.5} if late else {}
+    timing = {
+        f"{sensor}_{key}": time_s for sensor in SENSORS for key, time_s in (("delay_s", 1.3), ("interval_s", 2.5))
+    }
     sensors = Sensors(
-        heading_bias_rad=0.05, yaw_rate_scale=1.1, wind_sensor=kind, position=Mounting(forward_m=3.0, **timing),
-        velocity=Mounting(forward_m=4.0, starboard_m=1.0, **timing), wind=Mounting(forward_m=-6.0, **timing),
-        heading=Mounting(**timing), yaw_rate=Mounting(**timing),
+        heading_bias_rad=0.05, yaw_rate_scale=1.1, wind_sensor=kind, position_forward_m=3.0, velocity_forward_m=4.0,
+        velocity_starboard_m=1.0, wind_forward_m=-6.0, **(timing if late else {}),
     )  # fmt: skip
     ship = replace(SHIP, sensors=sensors)
     values = np.random.default_rng(0).uniform(0, 6, (70, 2, 4))
@@ -161,7 +161,7 @@ def test_many_runs_are_measured_as_single_ones(late: bool, kind: str):
 def test_sensors_that_cannot_be_are_refused():
     with pytest.raises(InputError, match="unknown wind sensor 'vanes', did you mean 'vane'"):
         Sensors(wind_sensor="vanes")
-    with pytest.raises(InputError, match=r"mounting\.delay_s is -1"):
-        Mounting(delay_s=-1.0)
+    with pytest.raises(InputError, match=r"sensors\.wind_delay_s is -1, expected 0 or more"):
+        Sensors(wind_delay_s=-1.0)
     with pytest.raises(InputError, match="yaw_rate_scale is 0"):
         Sensors(yaw_rate_scale=0.0)

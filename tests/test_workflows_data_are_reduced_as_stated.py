@@ -11,7 +11,7 @@ from expdesign import workflows
 from expdesign.export import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
-from expdesign.vessel import Mounting, Response, Sensors, Vessel
+from expdesign.vessel import Response, Sensors, Vessel
 from expdesign.workflows.steps.present import present_state
 from measured_trials import TUG_TRUE, tug_commands, write_run
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 STORY, TENDER = SCENARIOS / "story.toml", load_vessel(SCENARIOS / "vessels/tender-20m.toml")
 FAULTS = Sensors(
-    velocity=Mounting(forward_m=6.0, delay_s=2.0), position=Mounting(forward_m=6.0), yaw_rate_scale=1.1,
+    velocity_forward_m=6.0, velocity_delay_s=2.0, position_forward_m=6.0, yaw_rate_scale=1.1,
     heading_bias_rad=0.1,
 )  # fmt: skip
 

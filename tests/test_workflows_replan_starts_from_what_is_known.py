@@ -15,7 +15,7 @@ from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.scenario import load_scenario
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, simulate
-from expdesign.vessel import Mounting, Response
+from expdesign.vessel import Response
 from expdesign.workflows.steps.known import combined, expected_std, purchases
 from expdesign.workflows.steps.present import (
     _at_end,
@@ -64,7 +64,7 @@ def test_antenna_and_compass_errors_that_the_vessel_file_states_are_taken_off(tm
     heading = last[2] - 0.1
     c, s = np.cos(heading), np.sin(heading)
     antenna = state.pose[:2] + np.array([5.0 * c + 2.0 * s, 5.0 * s - 2.0 * c])
-    assert state.ship.sensors.position == Mounting(forward_m=5.0, starboard_m=-2.0)
+    assert state.ship.sensors.place("position") == (5.0, -2.0)
     assert np.abs(antenna - last[:2]).max() < 1e-9
     assert state.pose[2] == pytest.approx(heading)
 

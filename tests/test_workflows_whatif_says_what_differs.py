@@ -74,6 +74,15 @@ def test_a_complete_scenario_is_a_variant_too_and_relative_files_are_found(tmp_p
     assert found.scenario.vessel.name == alone.vessel.name
 
 
+def test_a_complete_scenario_takes_nothing_from_its_base_and_what_it_leaves_out_is_said():
+    shortest = SCENARIOS / "helsinki.toml"
+    assert load_scenario(shortest).design.accuracy is not None
+    found = load_variant(shortest, HOUR)
+    assert found.scenario.design.accuracy is None
+    assert any(line.startswith("design.accuracy") and "not given instead of" in line for line in found.changes)
+    assert load_variant(HOUR, HOUR).changes == ()
+
+
 def test_a_position_in_other_keys_replaces_the_first(tmp_path):
     moved = variant(tmp_path, "moved", "[start]\nheading_deg = 10.0\n")
     assert load_variant(MODEL_SHIP, moved).scenario.start[2] == pytest.approx(np.radians(10.0))

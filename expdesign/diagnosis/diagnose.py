@@ -159,7 +159,7 @@ def select_causes(
     little = explains_little(reached, windows) or _imitates(kept)
     if dropped or little:
         short, progress = validation.short_windows(ship), reported.part(COMPARED, CONCLUDED)
-        compared = compare_predictions(begun, short, seed, progress)
+        compared = compare_predictions(begun, short, seed, progress, () if little else dropped)
         by_predictions = compared and found_by_predictions(kept, compared, data, ship, seed)
         if by_predictions and not little and by_predictions[0].steps[0].chosen.candidate.cause not in dropped:
             by_predictions = None  # where much is explained, predictions confirm what likelihoods found, and no more

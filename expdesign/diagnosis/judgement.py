@@ -138,10 +138,10 @@ def found_by_predictions(
     """The cause that gains most for certain in predictions, and errors on held-out data without and with it.
 
     None where no cause does with which the data are simulated no worse than by the model in use, or where slow weather
-    that nobody measured predicts about as well. Where a search found causes, one has to predict better than the model
-    with all of them, to take their place. Beside the parameters of the file, it has to predict on average no worse than
-    all of these re-estimated without it, which are many more numbers, and an alternative unless they do worse for
-    certain.
+    that nobody measured gains, too, and predicts about as well; weather that may gain nothing is an alternative. Where
+    a search found causes, one has to predict better than the model with all of them, to take their place. Beside the
+    parameters of the file, it has to predict on average no worse than all of these re-estimated without it, which are
+    many more numbers, and an alternative unless they do worse for certain.
 
     Args:
         kept: the causes that the search found.
@@ -154,7 +154,7 @@ def found_by_predictions(
     """
     windows, record = data
     first = kept.first if re_estimated is None else compared.without_in(windows)
-    weather = [other.held for other in compared.causes if other.is_slow_weather]
+    weather = [other.held for other in compared.causes if other.may_be_weather]
     known = [compared.of(kept.last)] if kept.steps else []
     for item in _certain_besides(kept, compared):
         if re_estimated is not None and item.held.mean_fit < re_estimated.mean_fit:
@@ -165,7 +165,11 @@ def found_by_predictions(
         chosen = None if harms(ship, item.fit.ship, record) else fitted_to_all(item, first, windows)
         if chosen is None:
             continue
-        others = [other for other in compared.causes if other is not item and other.is_certain]
+        others = [
+            other
+            for other in compared.causes
+            if other is not item and (other.is_certain or (other.is_slow_weather and other.gain > 0.0))
+        ]
         step = Step(
             chosen=chosen,
             p_value=item.p_value,

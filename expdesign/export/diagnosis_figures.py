@@ -17,7 +17,7 @@ from expdesign.export.estimate_figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, column_name, generalised_force
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, SHOAL, parse_expression
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ RATES = {
 FORCES = ("term", "theta", "gain", "asymmetry", "deadband", "offset", "scale", "shallow")
 """Kinds of effects that are forces."""
 SHOWN_BY = {"late:psi": "r", "late:position": "u", "heading_bias": "u", "lever": "r"} | {
-    fault.effect: fault.signals[0] for fault in GAINS_AND_OFFSETS
+    row.effects[0]: row.signals[0] for row in GAINS_AND_OFFSETS
 }
 """Effect, or kind of effect, of a sensor -> the velocity that it depends on."""
 

@@ -30,7 +30,7 @@ from expdesign.export.diagnosis_results import RollVerdict, roll_sentences
 from expdesign.export.pages import page_template
 from expdesign.export.pages.figures import report_style
 from expdesign.progress import Progress, silent
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 DRAWN_STRETCHES = 4  # stretches of data drawn in a diagnosis
 SMALLEST_P_VALUE = 1e-12  # p-values below are printed as this bound in tables
@@ -52,7 +52,7 @@ NAMES = {
     "velocity_angle_rad": "axis of the velocity sensor, to starboard of the bow",
     "forward_m": "sensor position, forward of amidships",
     "starboard_m": "sensor position, to starboard of amidships",
-    **{fault.key: fault.words for fault in GAINS_AND_OFFSETS if not fault.is_gain},
+    **{row.key: row.words for row in GAINS_AND_OFFSETS if not row.is_gain},
     "factor": "factor (1: as in the model)",
     "time_s": "time of the change",
     "Y_phi": "sway coupling, per side acceleration that holds the roll angle",

@@ -17,7 +17,7 @@ from expdesign.diagnosis.accuracy import squared_sums
 from expdesign.diagnosis.causes import Candidate
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import Fit
-from expdesign.diagnosis.model import ACTUATORS, EFFECTS, ROLL, SENSOR, WEATHER, ExtendedModel, acts_on
+from expdesign.diagnosis.model import ROLL, ExtendedModel
 from expdesign.diagnosis.motion import (
     Disturbance,
     LinearisedMotion,
@@ -36,6 +36,7 @@ from expdesign.progress import Progress, silent
 from expdesign.simulation import Conduct, Environment, simulate, steady_ahead, stopping, turning_circle, zigzag
 from expdesign.values import Array
 from expdesign.vessel import Vessel, stem
+from expdesign.vessel.quantities import ACTUATORS, EFFECTS, SENSOR, WEATHER, acts_on
 
 
 @dataclass(frozen=True, kw_only=True)

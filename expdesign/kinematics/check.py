@@ -39,11 +39,11 @@ from expdesign.kinematics.instruments import (
     stretches,
 )
 from expdesign.kinematics.relation import CERTAIN, relation
-from expdesign.reduction import at_reference_point, with_delivered_inputs
+from expdesign.reduction import at_reference_point, readings_by_sensor, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Mounting, Sensors, Vessel, VesselModel, column_name
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel import Actuator, Sensors, Vessel, VesselModel, column_name
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG, READINGS, SENSORS
 
 FASTER = 1.2  # multiple of a stated rate above which an input moves faster than stated
 RAMP, FEWEST_RAMPS = 3, 3  # samples of an even movement, and how many of them tell
@@ -191,21 +191,16 @@ def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int],
 DRIFTS = 0.2  # that distance of ships, at least, from which the drift is expected
 
 
-SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
-           "wind": "winds"}  # fmt: skip
-
-
-SCALES = {
-    **{fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if fault.is_gain},
-    "surge_scale": (0,),
-    "sway_scale": (1,),
-}
+SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain}
 """Findings that are undone -> columns of the velocity that are divided by them."""
-OFFSETS = {fault.key: tuple(map(OUTPUTS.index, fault.signals)) for fault in GAINS_AND_OFFSETS if not fault.is_gain}
+OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}
 """Findings that are undone -> columns of the velocity that they are taken off."""
 LATE = "velocity_delay_s"
 """A finding that is undone where it is positive: then one instrument is late by two others."""
-OF_LOG = (*SCALES, LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m")[1:]
+OF_LOG = (
+    *(row.key for row in GAINS_AND_OFFSETS if row.shown_by == LOG),
+    *(LATE, "heading_bias_rad", "current_mps", "position_delay_s", "position_forward_m"),
+)
 """Findings of the same comparison, which one that stands may imitate."""
 
 
@@ -255,7 +250,7 @@ def _undone(record: Record, found: Sequence[Finding], sensors: Sensors, *, smoot
     record = replace(record, batches=tuple(_corrected(batch, found) for batch in record.batches))
     if not late:
         return record
-    like = Sensors(heading_rad=sensors.heading_rad, velocity=Mounting(delay_s=late))
+    like = Sensors(heading_rad=sensors.heading_rad, velocity_delay_s=late)
     return replace(record, batches=at_reference_point(record, like, smoothed=smoothed).batches)
 
 
@@ -271,11 +266,10 @@ def _corrected(batch: Batch, found: Sequence[Finding]) -> Batch:
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:
     """The record with signals read at the stated intervals of their sensors, for models that know no intervals."""
-    intervals = {name: Mounting(interval_s=getattr(sensors, name).interval_s) for name in SIGNALS}
-    if not any(place.interval_s for place in intervals.values()):
+    intervals: dict[str, Any] = {key: getattr(sensors, key) for key in (f"{name}_interval_s" for name in SENSORS)}
+    if not any(intervals.values()):
         return record
-    like: dict[str, Any] = {name: place for name, place in intervals.items() if place.interval_s}
-    own = replace(Sensors(heading_rad=sensors.heading_rad), **like)
+    own = Sensors(heading_rad=sensors.heading_rad, **intervals)
     read = at_reference_point(record, own)
     return replace(read, batches=tuple(map(_where_pose_is_known, read.batches)))
 
@@ -284,18 +278,18 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
     """A batch with the signals that its file holds between readings, of sensors without a stated interval."""
     found = {
         name: how
-        for name, values in _signals(batch).items()
-        if not getattr(sensors, name).interval_s and (how := held(values)) is not None
+        for name, values in readings_by_sensor(batch).items()
+        if not sensors.timing(name)[1] and (how := held(values)) is not None
     }
     notes = [_how_held(name, how, batch.sample_time_s) for name, how in found.items()]
     undone = {name: how for name, how in found.items() if how.even}
     if not undone:
         return batch, notes
-    lines = {name: knots_held(_signals(batch)[name], how) for name, how in undone.items() if how.interpolated}
+    lines = {name: knots_held(readings_by_sensor(batch)[name], how) for name, how in undone.items() if how.interpolated}
     intervals: dict[str, Any] = {
-        name: Mounting(interval_s=how.interval * batch.sample_time_s) for name, how in undone.items()
+        f"{name}_interval_s": how.interval * batch.sample_time_s for name, how in undone.items()
     }
-    like = replace(Sensors(heading_rad=sensors.heading_rad), **intervals)
+    like = Sensors(heading_rad=sensors.heading_rad, **intervals)
     (read,) = at_reference_point(Record(batches=(_with(batch, lines),)), like, smoothed=smoothed).batches
     return _where_pose_is_known(read), notes
 
@@ -306,20 +300,6 @@ def _where_pose_is_known(batch: Batch) -> Batch:
         return batch
     known = np.flatnonzero(np.isfinite(batch.pose[:, np.isfinite(batch.pose).any(axis=0)]).all(axis=1))
     return batch.cut(slice(int(known[0]), int(known[-1]) + 1)) if len(known) else batch
-
-
-def _signals(batch: Batch) -> dict[str, Array]:
-    """Sensor -> its measured values (k, c)."""
-    values: dict[str, Array] = {}
-    if batch.pose is not None:
-        values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
-    if not {"u", "v"} & set(batch.derived):
-        values["velocity"] = batch.velocity[:, :2]
-    if "r" not in batch.derived:
-        values["yaw_rate"] = batch.velocity[:, 2:]
-    if batch.wind is not None:
-        values["wind"] = batch.wind
-    return values
 
 
 def _with(batch: Batch, lines: dict[str, Array]) -> Batch:
@@ -336,7 +316,7 @@ def _with(batch: Batch, lines: dict[str, Array]) -> Batch:
 
 
 def _how_held(name: str, how: Held, sample_time_s: float) -> str:
-    seconds, words = how.interval * sample_time_s, SIGNALS[name]
+    seconds, words = how.interval * sample_time_s, READINGS[name]
     between = "a straight line is drawn between readings" if how.interpolated else "the last one is repeated in between"
     if not how.even:
         return (

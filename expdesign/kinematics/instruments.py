@@ -211,7 +211,8 @@ def _log_scale(found: _Log) -> Iterator[Finding]:
             yield Finding(
                 name=f"{axis}_scale", value=value, std=error, rest=whole.rest,
                 text=f"{column} is {plus_minus(value, error)} times the {axis} speed that the positions give: the "
-                "scale of one axis of a log?",
+                f"scale of one axis of a log? Where the positions are right, multiply sensors.{axis}_scale by "
+                f"{value:.4g}.",
             )  # fmt: skip
 
 
@@ -228,7 +229,8 @@ def _one_scale(found: _Log) -> Iterator[Finding]:
     size = plus_minus(scale, std)
     if nearer:
         text = f"u_mps is {size} times the surge speed that the positions give, and perhaps v_mps too (sway is too " \
-            "little to tell): the scale of a log?"  # fmt: skip
+            f"little to tell): the scale of a log? Where the positions are right, multiply sensors.surge_scale by " \
+            f"{scale:.4g}."  # fmt: skip
     else:
         text = f"u_mps and v_mps are {size} times the speed that the positions give" \
             f"{'' if excluded else ', or u_mps alone (sway is too little to tell)'}: the scale of a log? Where the " \

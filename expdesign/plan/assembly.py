@@ -25,6 +25,7 @@ from expdesign.plan.control import Capability, capability
 from expdesign.plan.feasibility import without_room, without_way_out
 from expdesign.plan.legs import LegWater, through_water
 from expdesign.plan.local_planner import (
+    Departure,
     GoAroundTime,
     LocalPlanner,
     RunSpace,
@@ -35,7 +36,7 @@ from expdesign.plan.local_planner import (
 )
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import Footprint, dispersion_m, footprint
-from expdesign.plan.search import path_exceeds_displacement, place_runs, placement_search
+from expdesign.plan.search import path_exceeds_displacement, place_runs
 from expdesign.plan.values import WorkBudget
 from expdesign.progress import Progress, in_phases
 from expdesign.sea_area import SeaArea
@@ -233,6 +234,7 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
     """The space with the transitions optimised that its best plans would use."""
     counts, planner = [problem.repeats[item.name] for item in space.footprints], space.planner
     begin_mps = 0.0 if problem.under_way is None else float(problem.under_way.velocity[0])
+    departure = Departure(pose=problem.start, exit_mps=begin_mps)
     trials = TransitionTrials(
         water=water,
         primitives={item.name: item for item in problem.used},
@@ -244,9 +246,7 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
     for part in in_phases(progress, *FEWER_TRIALS ** np.arange(_most_trials(problem, planner))):
         part("trying transitions between runs", 0.0)
         try:
-            placements = place_runs(
-                space, counts, start=problem.start, exit_mps=begin_mps, width=TRANSITION_BEAM, orders=0
-            )
+            placements = place_runs(space, counts, departure, width=TRANSITION_BEAM, orders=0)
         except NoPlan:  # the main search keeps more, and says what is impossible
             break
         pairs = pairs_of(placements)
@@ -259,10 +259,13 @@ def _with_transitions(problem: PlanProblem, water: LegWater, space: SearchSpace,
 
 
 def _most_trials(problem: PlanProblem, planner: LocalPlanner) -> int:
-    """Plans whose transitions are tried, at most; none in the draft of a day, which has other runs than the day."""
-    if problem.settings.draft and problem.expected:
-        return 0
-    return planner.transition_trials if placement_search(problem.settings).tries_transitions else 0
+    """Plans whose transitions are tried, at most.
+
+    None in the draft of a day, which has other runs than the day, and none on a lattice: legs between runs are long
+    enough there for the rule for leg times.
+    """
+    drafted = problem.settings.draft and problem.expected
+    return 0 if drafted or problem.settings.planner == "lattice" else planner.transition_trials
 
 
 def footprints(problem: PlanProblem, grid: ClearanceField, off_m: Sequence[Array]) -> tuple[Footprint, ...]:

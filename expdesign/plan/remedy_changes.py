@@ -21,7 +21,7 @@ from expdesign.plan.assembly import (
 )
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater
-from expdesign.plan.local_planner import RunSpace, local_planner
+from expdesign.plan.local_planner import Departure, RunSpace, local_planner
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.runs import draws_for
 from expdesign.plan.sailing import sail_all
@@ -136,7 +136,7 @@ def finds_places(problem: PlanProblem) -> bool:
         water = leg_water(problem, ship_on_legs(problem))
         space = search_space(problem, water, local_planner(water, problem.used), strict=True)
         repeats = [problem.repeats[run.name] for run in space.footprints]
-        place_runs(space, repeats, start=problem.start, width=TRANSITION_BEAM, orders=0)
+        place_runs(space, repeats, Departure(pose=problem.start), width=TRANSITION_BEAM, orders=0)
     except NoPlan:
         return False
     return True

@@ -20,10 +20,10 @@ from expdesign.memory import in_order, recalled
 from expdesign.plan.assembly import PlanRoom, phases_of
 from expdesign.plan.feasibility import LEG_S
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, acceptable, last_state, nearest_turns
-from expdesign.plan.local_planner import LocalPlanner, SearchSpace
+from expdesign.plan.local_planner import Departure, LocalPlanner, SearchSpace
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.search import PlacementSearch, placement_search
-from expdesign.plan.values import Leg, Placement, Placements, SailedTrial, WorkBudget
+from expdesign.plan.search import placed_runs
+from expdesign.plan.values import Leg, Placement, Placements, PlanSettings, SailedTrial, WorkBudget
 from expdesign.progress import Progress, silent
 from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
@@ -241,11 +241,11 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
     problem, budget = voyage.problem, voyage.budget
     left, stuck, proof = problem.repeats, "", None
     phases, stretches = phases_of(problem, space.planner, progress), sum(left.values()) + 1
-    search, failures = placement_search(problem.settings), _Failures(problem.settings.time_budget_s)
+    failures = _Failures(problem.settings.time_budget_s)
     while True:
         phases.placing(*failures.placing())
-        # how long another try takes is not known
-        placed = _placed(search, space, left, voyage.line, stuck, silent if failures.tries else phases.placing)
+        told = silent if failures.tries else phases.placing  # how long another try takes is not known
+        placed = _placed(problem.settings, space, left, voyage.line, stuck, told)
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
@@ -266,12 +266,13 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
 
 
 def _placed(
-    search: PlacementSearch, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str, progress: Progress
+    settings: PlanSettings, space: SearchSpace, left: dict[str, int], line: Timeline, stuck: str, progress: Progress
 ) -> Placements:
-    counts = [left[item.name] for item in space.footprints]
+    names = [item.name for item in space.footprints]
+    last = names.index(line.last) if line.last in names else -1
+    departure = Departure(pose=line.state[:3], exit_mps=float(line.state[3]), last=last)
     try:
-        exit_mps = float(line.state[3])
-        return search.place(space, counts, start=line.state[:3], exit_mps=exit_mps, last=line.last, progress=progress)
+        return placed_runs(settings, space, [left[name] for name in names], departure, progress)
     except NoPlan as error:
         if not stuck:
             raise

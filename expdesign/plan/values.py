@@ -69,7 +69,7 @@ class PlanSettings:
     # speed of repositioning legs, or None for nine tenths of what the actuators allow
     transit_speed_mps: float | None = None
     turning_radius_m: float | None = None  # of repositioning legs, or None for what the vessel model allows
-    # name of the search that orders and places the runs, see `expdesign.plan.search.placement_search`
+    # name of the search that orders and places the runs, see `expdesign.plan.search.placed_runs`
     planner: PlannerName = "beam"
     # distance between the cells of the lattice planner, or None for one that suits the ship
     lattice_spacing_m: float | None = None

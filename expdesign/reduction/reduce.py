@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from expdesign.conventions import OUTPUTS
 from expdesign.errors import InputError
 from expdesign.reduction.averaging import SHORTEST_BATCH
-from expdesign.reduction.sensors import Stated, measured, off_centre, prompt, shrinkage, turned, undone
+from expdesign.reduction.sensors import Stated, measured, shrinkage, turned, undone
 from expdesign.reduction.uncertain_times import TIMES, UncertainTime, delivered_with_slopes
 from expdesign.signals import Batch, Delivered, Record
 from expdesign.simulation import acting_response, deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
-from expdesign.vessel import IDEAL, RATE_UNITS, Mounting, Response, Sensors, Vessel, VesselModel, column_name, stem
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS, NOISE, PLACED
+from expdesign.vessel import IDEAL, RATE_UNITS, Response, Sensors, Vessel, VesselModel, column_name, stem
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, NOISE, READINGS
 
 # Remarks on what was undone of the sensors of a batch, and what could not be.
 
@@ -29,63 +29,59 @@ STATED = "As the vessel file states, "
 
 def remarks(stated: Stated) -> Iterator[str]:
     """One sentence for each stated fault of a sensor in the data."""
-    sensors, signals = stated.sensors, _signals(stated)
-    for name, (words, values) in signals.items():
-        mounting: Mounting = getattr(sensors, name)
-        if not prompt(mounting):
-            yield STATED + _timing(words, mounting, as_stated=stated.readings(name, values)[1])
-        if off_centre(mounting) and name in PLACED:
-            yield from _moved(words, mounting, stated)
+    sensors = stated.sensors
+    signals = {name: values for name, values in readings_by_sensor(stated.batch).items() if measured(values)}
+    for name, values in signals.items():
+        timing, place, words = sensors.timing(name), sensors.place(name), READINGS[name]
+        if any(timing):
+            yield STATED + _timing(words, *timing, as_stated=stated.readings(name, values)[1])
+        if any(place):
+            yield from _moved(words, _where(*place), stated)
     if "heading" in signals and sensors.heading_bias_rad:
         yield f"{STATED}{sensors.heading_bias_rad:.4g} rad is taken off the headings."
     if "velocity" in signals and sensors.velocity_angle_rad:
         yield from _along_axes(stated)
-    for fault in GAINS_AND_OFFSETS:
-        value = getattr(sensors, fault.key)
-        if fault.sensor in signals and value != fault.neutral:
-            yield f"{STATED}{fault.undone(value)}."
+    for row in GAINS_AND_OFFSETS:
+        value = getattr(sensors, row.key)
+        if row.sensor in signals and value != row.neutral:
+            yield f"{STATED}{row.undone(value)}."
     if "wind" in signals and (shrunk := shrinkage(sensors)) < 1.0:
         yield f"{STATED}noise on the vane's angle shrinks the wind to {shrunk:.4g}; it is divided by that."
 
 
-WORDS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
-         "wind": "winds"}  # fmt: skip
-
-
-def _signals(stated: Stated) -> dict[str, tuple[str, Array]]:
-    """Sensor -> its words and measured values (k, c), for the sensors that the data come from."""
-    batch = stated.batch
+def readings_by_sensor(batch: Batch) -> dict[str, Array]:
+    """Sensor -> its measured values (k, c), of the sensors that the batch comes from."""
     values: dict[str, Array] = {}
     if batch.pose is not None:
         values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
-    if not {"u", "v"} <= set(batch.derived):
+    if not {"u", "v"} & set(batch.derived):
         values["velocity"] = batch.velocity[:, :2]
     if "r" not in batch.derived:
         values["yaw_rate"] = batch.velocity[:, 2:]
     if batch.wind is not None:
         values["wind"] = batch.wind
-    return {name: (WORDS[name], part) for name, part in values.items() if measured(part)}
+    return values
 
 
-def _timing(words: str, mounting: Mounting, *, as_stated: bool) -> str:
-    late = f"{words} are {mounting.delay_s:g} s late; they are moved to their own time" if mounting.delay_s else ""
-    held = f"{words} are read every {mounting.interval_s:g} s; they are interpolated between readings"
-    if mounting.interval_s and not as_stated:
+def _timing(words: str, delay_s: float, interval_s: float, *, as_stated: bool) -> str:
+    late = f"{words} are {delay_s:g} s late; they are moved to their own time" if delay_s else ""
+    held = f"{words} are read every {interval_s:g} s; they are interpolated between readings"
+    if interval_s and not as_stated:
         held = (
-            f"{words} would be read every {mounting.interval_s:g} s, but change at other samples; every sample counts "
+            f"{words} would be read every {interval_s:g} s, but change at other samples; every sample counts "
             "as a reading"
         )
-    return ", and ".join(filter(None, (late, held if mounting.interval_s else ""))) + "."
+    return ", and ".join(filter(None, (late, held if interval_s else ""))) + "."
 
 
-def _moved(words: str, mounting: Mounting, stated: Stated) -> Iterator[str]:
+def _moved(words: str, where: str, stated: Stated) -> Iterator[str]:
     """What is done about a place off the reference point."""
-    if words != WORDS["position"] and not measured(stated.batch.velocity[:, 2]):
-        yield f"{words.capitalize()} are not moved from {_where(mounting)}, as that needs a yaw rate."
-    elif words == WORDS["position"] and stated.batch.pose is not None and not measured(stated.batch.pose[:, 2]):
-        yield f"{words.capitalize()} are not moved from {_where(mounting)}, as that needs a heading."
+    if words != READINGS["position"] and not measured(stated.batch.velocity[:, 2]):
+        yield f"{words.capitalize()} are not moved from {where}, as that needs a yaw rate."
+    elif words == READINGS["position"] and stated.batch.pose is not None and not measured(stated.batch.pose[:, 2]):
+        yield f"{words.capitalize()} are not moved from {where}, as that needs a heading."
     else:
-        yield f"{STATED}{words} are measured {_where(mounting)}; they are moved to amidships."
+        yield f"{STATED}{words} are measured {where}; they are moved to amidships."
 
 
 def _along_axes(stated: Stated) -> Iterator[str]:
@@ -96,11 +92,11 @@ def _along_axes(stated: Stated) -> Iterator[str]:
         yield f"Velocities are not turned by {angle:.4g} rad to the ship's axes, as that needs surge and sway."
 
 
-def _where(place: Mounting) -> str:
+def _where(forward_m: float, starboard_m: float) -> str:
     """A place in words, e.g. 6 m forward and 1 m to port."""
     parts = (
-        (place.forward_m, f"{abs(place.forward_m):g} m {'forward' if place.forward_m > 0 else 'aft'}"),
-        (place.starboard_m, f"{abs(place.starboard_m):g} m to {'starboard' if place.starboard_m > 0 else 'port'}"),
+        (forward_m, f"{abs(forward_m):g} m {'forward' if forward_m > 0 else 'aft'}"),
+        (starboard_m, f"{abs(starboard_m):g} m to {'starboard' if starboard_m > 0 else 'port'}"),
     )
     return " and ".join(words for size, words in parts if size)
 

@@ -2,19 +2,6 @@
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.39)-(5.50), for wind sensors and the shrinkage of a
 vane's components; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28), for places.
-
-Readings of a sensor at the times at which they were taken, and the signal between them.
-
-A sample shows the last reading that has arrived. Reading n is taken at (phase + n) intervals and arrives `delay_s`
-later; the phase follows from the samples at which the signal changes. Without an interval every sample shows a reading
-of its own.
-
-Between readings the signal is the cubic through the four nearest ones. For a smooth signal x the error is at most
-3/128 h**4 max|d4x/dt4|, h being the time between readings, and at a reading it is zero; in the first and last interval
-it is at most 1/24 of the same. A delay of whole samples is therefore undone exactly.
-
-Source: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions (1964), 25.2.13 to 25.2.15 (Lagrange's
-four-point formula and its remainder).
 """
 
 from __future__ import annotations
@@ -28,7 +15,7 @@ from expdesign.conventions import OUTPUTS
 from expdesign.records import central_difference, smoothed_velocity
 from expdesign.signals import Batch
 from expdesign.values import Array
-from expdesign.vessel import Mounting, Sensors
+from expdesign.vessel import Sensors
 
 ON_TIME = 1e-6  # difference of two times, in samples, below which they count as equal
 HELD_SHARE = 0.9  # share of changes of a signal that a stated interval must explain
@@ -36,6 +23,17 @@ PHASES = 50  # changes from which the time of the readings within an interval is
 
 
 # Readings of a sensor at the times at which they were taken, and the signal between them.
+#
+# A sample shows the last reading that has arrived. Reading n is taken at (phase + n) intervals and arrives `delay_s`
+# later; the phase follows from the samples at which the signal changes. Without an interval every sample shows a
+# reading of its own.
+#
+# Between readings the signal is the cubic through the four nearest ones. For a smooth signal x the error is at most
+# 3/128 h**4 max|d4x/dt4|, h being the time between readings, and at a reading it is zero; in the first and last
+# interval it is at most 1/24 of the same. A delay of whole samples is therefore undone exactly.
+#
+# Source: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions (1964), 25.2.13 to 25.2.15 (Lagrange's
+# four-point formula and its remainder).
 
 NODES = np.arange(4.0)
 
@@ -86,19 +84,19 @@ class Readings:
         return mask
 
 
-def readings(values: Array, mounting: Mounting, *, sample_time_s: float) -> tuple[Readings, bool]:
+def readings(values: Array, timing: tuple[float, float], *, sample_time_s: float) -> tuple[Readings, bool]:
     """The readings behind a measured signal, and whether it repeats them as stated.
 
     Args:
         values: (k, c) as measured, every reading repeated until the next arrives.
-        mounting: delay and interval of the sensor.
+        timing: delay and interval of the sensor [s].
         sample_time_s: time between samples [s].
 
     Returns:
         Readings whose times are not before the batch begins. A signal that changes at other samples than its interval
         says counts as read at every sample, then the second is False.
     """
-    delay, interval = mounting.delay_s / sample_time_s, mounting.interval_s / sample_time_s
+    delay, interval = (time_s / sample_time_s for time_s in timing)
     arrivals = _arrivals(values, delay, interval) if interval > 1.0 else None
     as_stated = interval <= 1.0 or arrivals is not None
     if arrivals is None:
@@ -149,11 +147,11 @@ class Stated:
 
     def readings(self, name: str, values: Array) -> tuple[Readings, bool]:
         """Those of one sensor; see `readings`."""
-        return readings(values, getattr(self.sensors, name), sample_time_s=self.batch.sample_time_s)
+        return readings(values, self.sensors.timing(name), sample_time_s=self.batch.sample_time_s)
 
     def in_time(self, name: str, values: Array) -> tuple[Array, Mask]:
         """(k, c) readings at the samples' own times, and (k,) whether a sample is the nearest to a reading."""
-        if prompt(getattr(self.sensors, name)) or not measured(values):
+        if not (any(self.sensors.timing(name)) and measured(values)):
             return values, np.ones(len(values), dtype=bool)
         found, _ = self.readings(name, values)
         return found.at(self.grid), found.shown(len(self.grid))
@@ -175,16 +173,6 @@ def measured(values: Array) -> bool:
     return bool(np.isfinite(values).any())
 
 
-def prompt(mounting: Mounting) -> bool:
-    """Whether every sample is measured at its own time."""
-    return not (mounting.delay_s or mounting.interval_s)
-
-
-def off_centre(mounting: Mounting) -> bool:
-    """Whether a sensor is not at the reference point."""
-    return bool(mounting.forward_m or mounting.starboard_m)
-
-
 def shrinkage(sensors: Sensors) -> float:
     """E cos(e) = exp(-variance / 2), by which Gaussian noise e on a vane's angle shrinks the wind's components."""
     return float(np.exp(-(sensors.wind_angle_rad**2) / 2.0)) if sensors.wind_sensor == "vane" else 1.0
@@ -193,10 +181,9 @@ def shrinkage(sensors: Sensors) -> float:
 def _pose(stated: Stated, pose: Array) -> Array:
     heading, _ = stated.in_time("heading", pose[:, 2:])
     position, _ = stated.in_time("position", pose[:, :2])
-    psi, place = heading[:, 0] - stated.sensors.heading_bias_rad, stated.sensors.position
-    if off_centre(place):
-        arm = np.broadcast_to((place.forward_m, place.starboard_m), position.shape)
-        position = position - turned(arm, psi)
+    psi, place = heading[:, 0] - stated.sensors.heading_bias_rad, stated.sensors.place("position")
+    if any(place):
+        position = position - turned(np.broadcast_to(place, position.shape), psi)
     return np.column_stack([position, psi])
 
 
@@ -205,17 +192,18 @@ def _velocity(stated: Stated, pose: Array | None) -> tuple[Array, Array]:
     batch, sensors = stated.batch, stated.sensors
     derived = _derived(stated, pose)
     r, r_read = stated.in_time("yaw_rate", batch.velocity[:, 2:])
-    gain, offset = sensors.faults("r")
+    gain, offset = sensors.shown("r")
     r = (r - offset) / gain
     if "r" in batch.derived:
         r, r_read = derived[:, 2:], np.ones(len(batch), dtype=bool)
     uv, uv_read = stated.in_time("velocity", batch.velocity[:, :2])
-    gains, offsets = np.transpose([sensors.faults("u"), sensors.faults("v")])
+    gains, offsets = np.transpose([sensors.shown("u"), sensors.shown("v")])
     uv = (uv - offsets) / gains
     if measured(uv[:, 0]) and measured(uv[:, 1]):
         uv = turned(uv, np.full(len(uv), sensors.velocity_angle_rad))
-    uv = _at_centre(uv, sensors.velocity, r[:, 0])
-    uv_read = uv_read & r_read if off_centre(sensors.velocity) else uv_read
+    place = sensors.place("velocity")
+    uv = _at_centre(uv, place, r[:, 0])
+    uv_read = uv_read & r_read if any(place) else uv_read
     velocity, read = np.column_stack([uv, r]), np.column_stack([uv_read, uv_read, r_read]).astype(float)
     for index, name in enumerate(OUTPUTS[:2]):
         if name in batch.derived:
@@ -246,8 +234,8 @@ def _wind(stated: Stated, wind: Array, velocity: Array, pose: Array | None) -> A
 
     Where no heading is measured, the relative wind is.
     """
-    place, wind = stated.sensors.wind, wind / shrinkage(stated.sensors)
-    if prompt(place) or pose is None or not measured(pose[:, 2]):
+    place, wind = stated.sensors.place("wind"), wind / shrinkage(stated.sensors)
+    if not any(stated.sensors.timing("wind")) or pose is None or not measured(pose[:, 2]):
         return _at_centre(stated.in_time("wind", wind)[0], place, velocity[:, 2])
     found, _ = stated.readings("wind", wind)
     then = Readings(0.0, 1.0, np.column_stack([velocity, pose[:, 2]])).at(found.times)
@@ -256,11 +244,12 @@ def _wind(stated: Stated, wind: Array, velocity: Array, pose: Array | None) -> A
     return np.asarray(velocity[:, :2] - turned(air, -pose[:, 2]))
 
 
-def _at_centre(uv: Array, place: Mounting, r: Array) -> Array:
+def _at_centre(uv: Array, place: tuple[float, float], r: Array) -> Array:
     """Velocities (k, 2) of the reference point, from those of a place; the same where no yaw rate is measured."""
-    if not (off_centre(place) and measured(r)):
+    if not (any(place) and measured(r)):
         return uv
-    return np.stack([uv[:, 0] + r * place.starboard_m, uv[:, 1] - r * place.forward_m], axis=-1)
+    forward, starboard = place
+    return np.stack([uv[:, 0] + r * starboard, uv[:, 1] - r * forward], axis=-1)
 
 
 def turned(vectors: Array, angle: Array) -> Array:

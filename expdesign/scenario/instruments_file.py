@@ -16,8 +16,8 @@ from expdesign.scenario.tables import Entry, Positive, Table, check_table, read_
 from expdesign.scenario.vessels import load_vessel, vessel_of
 from expdesign.scenario.vessels.vessel_tables import SensorsTable
 from expdesign.vessel import Vessel, response_keys, stem
-from expdesign.vessel.actuators import QUANTITIES
-from expdesign.vessel.sensors import NOISE
+from expdesign.vessel.actuators import SIGNALS
+from expdesign.vessel.quantities import NOISE
 
 INSTRUMENTS = "instruments.toml"
 """Its name."""
@@ -50,8 +50,8 @@ def load_instruments(path: Path) -> InstrumentsFile:
     entry = Entry(path)
     file = check_table(InstrumentsFile, read_toml(path), entry)
     for signal, given in file.actuators.items():
-        if stem(signal) not in QUANTITIES:
-            raise entry.at("actuators").unknown(signal, [f"{name}1" for name in QUANTITIES])
+        if stem(signal) not in SIGNALS:
+            raise entry.at("actuators").unknown(signal, [f"{name}1" for name in SIGNALS])
         known = [key for field, key in response_keys(stem(signal)).items() if field in TOLD]
         for key in given:
             if key not in known:

@@ -172,12 +172,18 @@ def load_scenario(path: Path | str, *, vessel: Path | None = None, data: Sequenc
     return build_scenario(content, entry, vessel=vessel, data=data)
 
 
+def _needed(content: Mapping[str, Any]) -> list[bool]:
+    """Which of what a scenario cannot do without is there."""
+    files = content.get("scenario", {})
+    return [
+        *(isinstance(files, Mapping) and name in files for name in FILE_KEYS["scenario"]),
+        *(name in content for name in ("design", "start", "goal")),
+    ]
+
+
 def _is_variant(content: Mapping[str, Any]) -> bool:
     """Whether most of what a scenario cannot do without is missing, and the rest is a scenario's."""
-    files = content.get("scenario", {})
-    needed = [isinstance(files, Mapping) and name in files for name in ("vessel", "dictionary", "area")]
-    needed += [name in content for name in ("design", "start", "goal")]
-    return bool(content) and set(content) <= set(ScenarioFile.model_fields) and sum(needed) <= 2
+    return bool(content) and set(content) <= set(ScenarioFile.model_fields) and sum(_needed(content)) <= 2
 
 
 def build_scenario(
@@ -377,21 +383,23 @@ def load_variant(base: Path | str, variant: Path | str) -> Variant:
 
     Args:
         base: a scenario file.
-        variant: a TOML file with any of a scenario's tables and keys; a complete scenario file is one, too. It is named
-            by its own `scenario.name`, or by its file name.
+        variant: a TOML file with any of a scenario's tables and keys, or a whole scenario file, which takes nothing
+            from the base. It is named by its own `scenario.name`, or by its file name.
 
     Raises:
         FileError, NoPlan: as for `load_scenario`; wrong entries are reported with the variant's path.
     """
     below, entry = Path(base), Entry(Path(variant))
     first, over = read_toml(below), read_toml(entry.path)
-    merged = _merged(_absolute(first, below.parent), _absolute(over, entry.path.parent))
+    merged = _absolute(over, entry.path.parent)
+    if not all(_needed(over)):
+        merged = _merged(_absolute(first, below.parent), merged)
     named = (
         over.get("scenario", {}).get("name", entry.path.stem) if isinstance(over.get("scenario", {}), dict) else None
     )
     if isinstance(merged.get("scenario"), dict):
         merged["scenario"] = {**merged["scenario"], "name": named}
-    return Variant(scenario=build_scenario(merged, entry), changes=tuple(_changes(first, over)))
+    return Variant(scenario=build_scenario(merged, entry), changes=changed_entries(first, over))
 
 
 def _absolute(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -420,17 +428,29 @@ def _merged(first: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]
     return result
 
 
-def _changes(first: Mapping[str, Any], over: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Entries of the second that differ from the first, in the second's order."""
-    lines: list[str] = []
-    for key, value in over.items():
-        name, before = f"{prefix}{key}", first.get(key)
-        if isinstance(value, dict):
-            lines += _changes(before if isinstance(before, dict) else {}, value, f"{name}.")
-        elif value != before and name != "scenario.name":
-            instead = "" if before is None else f" instead of {_spelled(before)}"
-            lines.append(f"{name} = {_spelled(value)}{instead}")
-    return lines
+def changed_entries(first: Mapping[str, Any], over: Mapping[str, Any]) -> tuple[str, ...]:
+    """What a variant changes, a line for each entry, in its order.
+
+    Args:
+        first: tables of a scenario file.
+        over: tables of its variant; a whole scenario takes away what it does not state.
+    """
+    before, after = _entries(first), _entries(over)
+    stated = [
+        f"{name} = {_spelled(value)}" + (f" instead of {_spelled(before[name])}" if name in before else "")
+        for name, value in after.items()
+        if before.get(name) != value and name != "scenario.name"
+    ]
+    left = [f"{name} not given instead of {_spelled(before[name])}" for name in before if name not in after]
+    return (*stated, *(left if all(_needed(over)) else ()))
+
+
+def _entries(tables: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Entries of nested tables by dotted names."""
+    found: dict[str, Any] = {}
+    for key, value in tables.items():
+        found |= _entries(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return found
 
 
 def _spelled(value: object) -> str:

@@ -98,16 +98,17 @@ def euler_step(rates: Rates, state: State, step_s: Any) -> State:
     return tuple(x + step_s * dx for x, dx in zip(state, rates(state), strict=True))
 
 
-def rk4_step(rates: Rates, state: State, step_s: Any) -> State:
-    """One classical Runge-Kutta step of order four."""
+def rk4_step(rates: Rates, state: State, step_s: Any, later: tuple[Rates, Rates] | None = None) -> State:
+    """One classical Runge-Kutta step of order four; `later` are rates at its middle and its end, where they differ."""
+    middle, end = later or (rates, rates)
 
     def ahead(slope: State, fraction: float) -> State:
         return tuple(x + fraction * step_s * dx for x, dx in zip(state, slope, strict=True))
 
     k1 = rates(state)
-    k2 = rates(ahead(k1, 0.5))
-    k3 = rates(ahead(k2, 0.5))
-    k4 = rates(ahead(k3, 1.0))
+    k2 = middle(ahead(k1, 0.5))
+    k3 = middle(ahead(k2, 0.5))
+    k4 = end(ahead(k3, 1.0))
     return tuple(
         x + step_s / 6.0 * (a + 2.0 * b + 2.0 * c + d) for x, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
     )

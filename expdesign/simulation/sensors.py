@@ -11,7 +11,7 @@ from expdesign.signals import AUXILIARY, Commands, Trajectory
 from expdesign.simulation.environment import Environment, WeatherSeries, weather_rows
 from expdesign.simulation.motion import to_body
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, Mounting, Sensors, Vessel, column_name
+from expdesign.vessel import NUMPY, Sensors, Vessel, column_name
 
 ROWS = ("north", "east", "heading", "u", "v", "r", "wind_u", "wind_v")
 """Measured channels, in order; a vane's noise on speed and angle takes the places of wind_u and wind_v."""
@@ -30,7 +30,7 @@ def noise_std(sensors: Sensors) -> Array:
 
 def prompt(sensors: Sensors) -> bool:
     """Whether every sample is measured at its own time: no delays, no repeated readings."""
-    return not any(getattr(sensors, name).delay_s or getattr(sensors, name).interval_s for name in OWNERS)
+    return not any(any(sensors.timing(name)) for name in OWNERS)
 
 
 def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample_time_s: float) -> None:
@@ -55,7 +55,7 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
     the bow; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28) for lever arms.
     """
     for name, rows in OWNERS.items():
-        time, origin = _readings(getattr(sensors, name), len(states), sample_time_s)
+        time, origin = _readings(sensors.timing(name), len(states), sample_time_s)
         for row, signal in zip(rows, _SIGNALS[name](sensors, states, air), strict=True):
             if origin is not None:
                 noise[:, row] = noise[origin, row]
@@ -67,14 +67,11 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
 
 
 def _position(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    place = sensors.position
-    if not (place.forward_m or place.starboard_m):
+    forward, starboard = sensors.place("position")
+    if not (forward or starboard):
         return states[:, 0], states[:, 1]
     c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
-    return (
-        states[:, 0] + c * place.forward_m - s * place.starboard_m,
-        states[:, 1] + s * place.forward_m + c * place.starboard_m,
-    )
+    return states[:, 0] + c * forward - s * starboard, states[:, 1] + s * forward + c * starboard
 
 
 def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
@@ -82,7 +79,7 @@ def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 
 def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    u, v = _moved(sensors.velocity, states[:, 3], states[:, 4], states[:, 5])
+    u, v = _moved(sensors.place("velocity"), states[:, 3], states[:, 4], states[:, 5])
     if sensors.velocity_angle_rad:
         c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)
         u, v = c * u + s * v, c * v - s * u
@@ -94,12 +91,12 @@ def _yaw_rate(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 
 def _shown(sensors: Sensors, signal: str, true: Array) -> Array:
-    gain, offset = sensors.faults(signal)
+    gain, offset = sensors.shown(signal)
     return true if (gain, offset) == (1.0, 0.0) else gain * true + offset
 
 
 def _wind(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    return _moved(sensors.wind, air[:, 0], air[:, 1], states[:, 5])
+    return _moved(sensors.place("wind"), air[:, 0], air[:, 1], states[:, 5])
 
 
 _SIGNALS: dict[str, Any] = {
@@ -111,17 +108,16 @@ _SIGNALS: dict[str, Any] = {
 }
 
 
-def _moved(place: Mounting, u: Array, v: Array, r: Array) -> tuple[Array, Array]:
+def _moved(place: tuple[float, float], u: Array, v: Array, r: Array) -> tuple[Array, Array]:
     """Velocity of a place on the ship, from that of the origin, in the b-frame."""
-    if not (place.forward_m or place.starboard_m):
-        return u, v
-    return u - r * place.starboard_m, v + r * place.forward_m
+    forward, starboard = place
+    return (u - r * starboard, v + r * forward) if forward or starboard else (u, v)
 
 
-def _readings(mounting: Mounting, count: int, sample_time_s: float) -> tuple[Array | None, Any]:
+def _readings(timing: tuple[float, float], count: int, sample_time_s: float) -> tuple[Array | None, Any]:
     """Time of the reading shown at each sample [samples], and the sample that first showed it; None without delay."""
     now = np.arange(count, dtype=float)
-    delay, interval = mounting.delay_s / sample_time_s, mounting.interval_s / sample_time_s
+    delay, interval = (time_s / sample_time_s for time_s in timing)
     if interval <= 1.0:
         return (np.maximum(now - delay, 0.0) if delay > 0 else None), None
     number = np.maximum(np.floor((now - delay) / interval + 1e-9), 0.0)

@@ -6,7 +6,6 @@ from expdesign.vessel.actuators import (
     RATE_UNITS,
     Actuator,
     Limit,
-    Response,
     column_name,
     generalised_force,
     limit_keys,
@@ -26,8 +25,8 @@ from expdesign.vessel.inverse import (
     within_limits,
 )
 from expdesign.vessel.model import NOT_SUPPORTED, UNSTATED_SHARE, Inertia, VesselModel
+from expdesign.vessel.quantities import EXACT, SENSORS, Response, Sensors
 from expdesign.vessel.roll import NOMINAL, NOT_ACTING_BACK, ROLL_PARAMETERS, Body, Load, Roll, RollPendulum
-from expdesign.vessel.sensors import CENTRAL, SENSORS, Mounting, Sensors
 from expdesign.vessel.structures import NUMPY, SCALAR, STRUCTURES, TERMS, Operators, Term, structure_terms
 from expdesign.vessel.vessel import (
     CALM,

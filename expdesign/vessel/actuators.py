@@ -19,6 +19,7 @@ from typing import Any
 
 from expdesign.errors import InputError
 from expdesign.values import frozen_set
+from expdesign.vessel.quantities import Response, rows_of
 from expdesign.vessel.structures import Operators, Signals
 
 KINDS: dict[str, tuple[str, ...]] = {
@@ -37,7 +38,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 UNITS = {"n": "rps", "a": "rad", "rudder": "rad"}
 """Signal stem -> unit in column names; generalised forces have none."""
 
-QUANTITIES = {
+SIGNALS = {
     "n": ("speed", "_rps", "_rps2"),
     "a": ("angle", "_rad", "_radps"),
     "rudder": ("angle", "_rad", "_radps"),
@@ -45,29 +46,23 @@ QUANTITIES = {
     "tau_y": ("y", "", ""),
     "tau_psi": ("psi", "", ""),
 }
-"""Signal stem -> quantity, its unit and the unit of its rate, as endings of keys in vessel files."""
+"""Signal stem -> word for it, its unit and the unit of its rate, as in keys of vessel files."""
 
 
-RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in QUANTITIES.items()}
+RATE_UNITS = {name: unit.strip("_") for name, (_, _, unit) in SIGNALS.items()}
 """Signal stem -> unit of its slew rate."""
 
 
 def limit_keys(stem: str) -> tuple[str, str]:
     """Keys in vessel files of a signal's lower and upper limit."""
-    name, unit, _ = QUANTITIES[stem]
+    name, unit, _ = SIGNALS[stem]
     return f"{name}_min{unit}", f"{name}_max{unit}"
 
 
 def response_keys(stem: str) -> dict[str, str]:
     """Field of `Response` -> key in vessel files, for a signal."""
-    name, unit, rate = QUANTITIES[stem]
-    return {
-        "rate": f"{name}_rate{rate}",
-        "lag_s": f"{name}_lag_s",
-        "delay_s": f"{name}_delay_s",
-        "deadband": f"{name}_deadband{unit}",
-        "offset": f"{name}_offset{unit}",
-    }
+    name, unit, rate = SIGNALS[stem]
+    return {row.key: row.stated_as.format(name=name, unit=unit, rate=rate) for row in rows_of(Response)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,38 +76,6 @@ class Limit:
     def __post_init__(self) -> None:
         if not self.low < self.high:
             raise InputError(f"limits are [{self.low:g}, {self.high:g}], expected low below high")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Response:
-    """How one actuator signal follows its command c(t), in this order.
-
-    The actuator moves towards a command at its slew rate; a position smaller in size than `deadband` counts as zero,
-    others are not shortened; it acts `delay_s` later; what is delivered approaches it as a first-order lag,
-    dx/dt = (c - x) / `lag_s`; a misalignment is added, x + `offset`.
-    """
-
-    # slew rate, the largest change per second [unit of the signal per second], infinite for none
-    rate: float = math.inf
-    lag_s: float = 0.0  # time constant [s], 0 for none
-    delay_s: float = 0.0  # dead time [s]
-    deadband: float = 0.0  # [unit of the signal], not negative
-    # delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not self.rate > 0:
-            raise InputError(f"response.rate is {self.rate:g}, expected more than 0")
-        for name in ("lag_s", "delay_s", "deadband"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(f"response.{name} is {getattr(self, name):g}, expected 0 or more")
-        if not math.isfinite(self.offset):
-            raise InputError(f"response.offset is {self.offset:g}, expected a finite angle")
-
-    @property
-    def follows(self) -> bool:
-        """Whether commands that change no faster than `rate` are delivered unchanged and at once."""
-        return not (self.lag_s or self.delay_s or self.deadband or self.offset)
 
 
 IDEAL = Response()

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
 
 from expdesign.errors import InputError, UnknownName
 from expdesign.values import Array, seal
-from expdesign.vessel.actuators import Actuator, Limit, Response
+from expdesign.vessel.actuators import Actuator, Limit
 from expdesign.vessel.model import VesselModel
+from expdesign.vessel.quantities import EXACT, Response, Sensors, rows_of
 from expdesign.vessel.roll import RollPendulum
-from expdesign.vessel.sensors import EXACT, FAULTS, Sensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,16 +141,17 @@ def disc_points(pose: Array, centres_m: Array) -> Array:
 def std_keys(actuators: Sequence[Actuator]) -> tuple[str, ...]:
     """Names of what may have a standard deviation: the faults of sensors, and e.g. "n1_lag_s" of actuator signals."""
     signals = [signal for actuator in actuators for signal in actuator.signals]
-    return (*FAULTS, *(f"{signal}_{field.name}" for signal in signals for field in fields(Response)))
+    faults = (row.key for row in rows_of(Sensors) if row.is_fault)
+    return (*faults, *(f"{signal}_{row.key}" for signal in signals for row in rows_of(Response)))
 
 
 def response_values(actuators: Sequence[Actuator]) -> dict[str, float]:
     """What actuators state of their responses, by the names of `std_keys`."""
     return {
-        f"{signal}_{field.name}": getattr(response, field.name)
+        f"{signal}_{row.key}": getattr(response, row.key)
         for actuator in actuators
         for signal, response in zip(actuator.signals, actuator.responses, strict=True)
-        for field in fields(Response)
+        for row in rows_of(Response)
     }
 
 
@@ -158,7 +159,7 @@ def with_response_values(actuators: Sequence[Actuator], values: Mapping[str, flo
     """The actuators with other values of their responses, by the names of `std_keys`."""
 
     def changed(signal: str, response: Response) -> Response:
-        own = {field.name: values.get(f"{signal}_{field.name}") for field in fields(Response)}
+        own = {row.key: values.get(f"{signal}_{row.key}") for row in rows_of(Response)}
         return replace(response, **{name: value for name, value in own.items() if value is not None})
 
     return tuple(

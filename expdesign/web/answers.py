@@ -124,7 +124,8 @@ def durations_of(scenario: str) -> Answer:
         aside = [key for key in ("accuracy", "grow") if getattr(case.design, key) is not None]
         case = replace(case, design=replace(case.design, grow=None, accuracy=None))
         information = _scored(case)
-        gains = pool_gains(np.array([bordered(item, case.design.mean_subtraction) for item in information]))
+        matrices = np.array([bordered(item, case.design.mean_subtraction) for item in information])
+        shares = 1.0 + pool_gains(matrices) / matrices.shape[1]
         design = designed(case, information)
     except (InputError, NoAnswer) as error:
         return wrong(error)
@@ -148,10 +149,12 @@ def durations_of(scenario: str) -> Answer:
                 "run_s": item.primitive.duration_s,
                 "duration_s": float(seconds),
                 "repeats": int(repeats),
-                "gain": None if np.isnan(gain) else float(gain),
+                "of_average": None if np.isnan(share) else float(share),  # information per second, in all parameters
                 "track": _sketch(item.primitive.trajectory.pose),
             }
-            for item, seconds, repeats, gain in zip(information, design.durations_s, design.repeats, gains, strict=True)
+            for item, seconds, repeats, share in zip(
+                information, design.durations_s, design.repeats, shares, strict=True
+            )
         ],
     }
 

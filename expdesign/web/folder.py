@@ -5,6 +5,7 @@ A version is the whole text of a file before a change, in `.expdesign/NAME/NUMBE
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import os
 import re
@@ -128,6 +129,15 @@ class Folder:
         """The file of these that was changed last and can be undone; "" where none can."""
         kept = {name: found[-1].stat().st_mtime_ns for name in names if (found := self._versions(self.path(name)))}
         return max(kept, key=kept.__getitem__, default="")
+
+    def last_change(self, name: str) -> str:
+        """The lines that the last change took from a file ("- ") and gave it ("+ ")."""
+        path = self.path(name)
+        kept = self._versions(path)
+        if not kept:
+            return ""
+        before, after = (one.read_text(encoding="utf-8", errors="replace").splitlines() for one in (kept[-1], path))
+        return "\n".join(line for line in difflib.ndiff(before, after) if line[:2] in ("- ", "+ "))
 
     def undo(self, name: str) -> None:
         """Take the newest version of a file back.

@@ -26,10 +26,28 @@ class Form:
     """A form on a part of a TOML file."""
 
     def __init__(
-        self, folder: Folder, name: str, model: type[Table], *, changed: Callable[[], object] = lambda: None
+        self,
+        folder: Folder,
+        name: str,
+        model: type[Table],
+        *,
+        kinds: Mapping[str, Mapping[str, type[Table]]] | None = None,
+        check: Callable[[Mapping[str, Any], Entry], object] | None = None,
+        changed: Callable[[], object] = lambda: None,
     ) -> None:
-        """Of the file `name`, which `model` reads; `changed` is called after each change."""
+        """Of the file `name`, which `model` reads.
+
+        Args:
+            folder: of the page.
+            name: of the file, in the folder.
+            model: of the whole file.
+            kinds: key of a list of tables of several kinds -> kind -> its table.
+            check: reads the tables of the file and raises a FileError where something is wrong; `model` alone when
+                not given.
+            changed: called after each change.
+        """
         self._folder, self._name, self._model, self._changed = folder, name, model, changed
+        self._kinds, self._check = kinds or {}, check or (lambda tables, entry: check_table(model, tables, entry))
         self._tables, self._open = read_toml(folder.path(name)), False
 
     def draw(self, *keys: str, skip: tuple[str, ...] = ()) -> None:
@@ -44,11 +62,15 @@ class Form:
             self._draw_one((key,), field)
 
     def _draw_one(self, path: Path, field: FieldInfo) -> None:
-        inner = _table_of(field.annotation)
-        if inner is None:
+        inner, kinds = _table_of(field.annotation), self._kinds.get(str(path[-1]), {})
+        if kinds:
+            self._draw_list(path, field, kinds)
+        elif inner is None and self._value(path) and _is_numbers(field.annotation):
+            self._draw_numbers(path, field)
+        elif inner is None:
             self._draw_value(path, field)
         elif _is_list(field.annotation):
-            self._draw_list(path, field, inner)
+            self._draw_list(path, field, {"": inner})
         else:
             self._draw_table(path, field, inner)
 
@@ -59,30 +81,55 @@ class Form:
             for key, part in inner.fields().items():
                 self._draw_one((*path, key), part)
 
-    def _draw_list(self, path: Path, field: FieldInfo, inner: type[Table]) -> None:
-        for number in range(len(self._value(path) or ())):
-            with ui.expansion(f"[[{_dotted(path)}]] {number + 1}", caption=field.description).classes("table"):
+    def _draw_numbers(self, path: Path, field: FieldInfo) -> None:
+        """A table of numbers whose keys are the file's own, as the parameters of a model."""
+        shown = ui.expansion(f"[{_dotted(path)}]", caption=field.description).classes("table")
+        with shown:
+            with ui.element("div").classes("entries"):
+                for key in self._value(path):
+                    self._draw_one((*path, key), FieldInfo(annotation=float))
+            ui.button(f"Add to [{_dotted(path)}]", on_click=lambda: self._ask(path, "name = value", path)).props(
+                "flat dense"
+            )
+
+    def _draw_list(self, path: Path, field: FieldInfo, kinds: Mapping[str, type[Table]]) -> None:
+        """Tables of a list; each is of the kind that it states, where there are several."""
+        for number, row in enumerate(self._value(path) or ()):
+            kind = row.get("kind", "") if len(kinds) > 1 else ""
+            inner = kinds.get(kind, next(iter(kinds.values())))
+            title = f"[[{_dotted(path)}]] {number + 1}{kind and f': {kind}'}"
+            with ui.expansion(title, caption=inner.__doc__ if kind else field.description).classes("table"):
                 with ui.element("div").classes("entries"):
                     for key, part in inner.fields().items():
-                        self._draw_one((*path, number, key), part)
+                        if not (kind and key == "kind"):  # another kind has other keys: it is removed and added
+                            self._draw_one((*path, number, key), part)
                 ui.button("Remove", on_click=lambda number=number: self._remove((*path, number))).props("flat dense")
-        ui.button(f"Add to [[{_dotted(path)}]]", on_click=lambda: self._ask(path, inner)).props("flat dense")
+        with ui.row():
+            for kind, inner in kinds.items():
+                needed = [
+                    key for key, part in inner.fields().items() if part.is_required() and not (kind and key == "kind")
+                ]
+                text = "\n".join([f'kind = "{kind}"'] * bool(kind) + [f"{key} = " for key in needed])
+                ui.button(
+                    f"Add {kind}" if kind else f"Add to [[{_dotted(path)}]]",
+                    on_click=lambda text=text: self._ask(path, text, (*path, len(self._value(path) or ()))),
+                ).props("flat dense")
 
-    def _ask(self, path: Path, inner: type[Table]) -> None:
-        """Ask for a whole table, as its keys only make sense together."""
-        needed = [key for key, part in inner.fields().items() if part.is_required()]
+    def _ask(self, path: Path, text: str, at: Path) -> None:
+        """Ask for a table, as its keys only make sense together; what stands `at` that place is kept beside it."""
         with ui.dialog() as dialog, ui.card():
-            ui.label(f"A new [[{_dotted(path)}]], in TOML; needed: {', '.join(needed) or 'nothing'}")
-            text = ui.textarea(value="\n".join(f"{key} = " for key in needed)).classes("toml").props("autogrow")
-            problem = ui.label().classes("wrong")
+            ui.label(f"New in [{_dotted(path)}], in TOML")
+            typed = ui.textarea(value=text).classes("toml").props(f'autogrow aria-label="New in {_dotted(path)}"')
+            problem = ui.label().classes("wrong").props('role="alert"')
 
             def add() -> None:
                 try:
-                    table = tomllib.loads(text.value)
+                    table = tomllib.loads(typed.value)
                 except tomllib.TOMLDecodeError as error:
                     problem.text = str(error)
                     return
-                problem.text = self._set((*path, len(self._value(path) or ())), table)
+                found = self._value(at)
+                problem.text = self._set(at, {**found, **table} if found else table)
                 if not problem.text:
                     ui.navigate.reload()
 
@@ -141,7 +188,7 @@ class Form:
         tables = read_toml(file)
         try:
             put(tables, path, value)
-            check_table(self._model, tables, Entry(file))
+            self._check(tables, Entry(file))
             self._folder.change(self._name, lambda content: put(content, path, value))
         except FileError as error:
             return f"{error.key}: {error.problem}"
@@ -215,6 +262,14 @@ def _table_of(annotation: Any) -> type[Table] | None:
         if isinstance(inner, type) and issubclass(inner, Table):
             return inner
     return None
+
+
+def _is_numbers(annotation: Any) -> bool:
+    """Whether it is a table of numbers by names."""
+    return any(
+        get_origin(part) is dict and not any(get_origin(one) is dict for one in get_args(part))
+        for part in _parts(annotation)
+    )
 
 
 def _is_list(annotation: Any) -> bool:

@@ -110,12 +110,18 @@ class Watched:
         with ui.row().classes("stale").props('role="alert"') as self._bar:
             self._text = ui.label()
             ui.button("Load again", on_click=lambda: ui.navigate.reload()).props("flat dense")
-        self._bar.visible = False
+        with ui.element("div").classes("spelled last").props('role="status"') as self._changed:
+            self._change = ui.label().classes("printed")
+        self._bar.visible = self._changed.visible = False
         ui.timer(LOOK_S, self._look)
 
     def show(self, *names: str) -> None:
-        """Take note of files as they are now, because the page shows them."""
-        self._seen |= {name: self._site.folder.digest(name) for name in names if name}
+        """Take note of files as they are now, because the page shows them; spell out what it has changed in one."""
+        for name in filter(None, names):
+            digest = self._site.folder.digest(name)
+            if self._seen.get(name, digest) != digest and (change := self._site.folder.last_change(name)):
+                self._change.text, self._changed.visible = f"{name}\n{change}", True
+            self._seen[name] = digest
 
     def _look(self) -> None:
         changed = [name for name, digest in self._seen.items() if self._site.folder.digest(name) != digest]

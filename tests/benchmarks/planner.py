@@ -28,8 +28,8 @@ from typing import get_args
 from expdesign import workflows
 from expdesign.errors import NoPlan
 from expdesign.plan.assembly import leg_water, search_space, ship_on_legs
-from expdesign.plan.local_planner import local_planner
-from expdesign.plan.search.planners import LatticeSearch
+from expdesign.plan.local_planner import Departure, local_planner
+from expdesign.plan.search.planners import placed_on_lattice
 from expdesign.plan.values import PathsName
 from expdesign.scenario import load_scenario
 from expdesign.workflows import plan_problem
@@ -92,7 +92,7 @@ def lattice_s(scenario: Path) -> tuple[float, float] | None:
     space = search_space(problem, water, local_planner(water, problem.used))
     counts = [problem.repeats[item.name] for item in space.footprints]
     try:
-        proof = LatticeSearch().place(space, counts, start=problem.start).lattice
+        proof = placed_on_lattice(space, counts, Departure(pose=problem.start)).lattice
     except NoPlan:
         return None
     return None if proof is None else (proof.cost_s, proof.lower_bound_s)

@@ -6,7 +6,7 @@ import math
 
 from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, listed, rounded
 from expdesign.diagnosis.model import ExtendedModel
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS, Fault
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG, Fault, Quantity
 
 
 def _candidates_heading_bias(situation: Situation) -> tuple[Candidate, ...]:
@@ -73,30 +73,28 @@ LEVER_ARM = Cause(
 )
 
 
-def _of_fault(fault: Fault) -> Cause:
+def _of_row(row: Quantity, fault: Fault) -> Cause:
     """The cause of a gain or an offset.
 
     None of a log where positions are measured: these tell it before any model (`kinematics`).
     """
 
     def candidates(situation: Situation) -> tuple[Candidate, ...]:
-        signals = {*fault.signals}
-        told = fault.sensor == "velocity" and situation.windows.has_position
-        if told or signals & {*situation.windows.derived} or not signals <= {*situation.ship.model.outputs}:
-            return ()
-        return (Candidate(cause=fault.cause, free={fault.effect: 0.0}),)
+        told = row.shown_by == LOG and situation.windows.has_position
+        seen = row.is_shown(situation.windows.derived) and {*row.signals} <= {*situation.ship.model.outputs}
+        return (Candidate(cause=fault.name, free=dict.fromkeys(row.effects, 0.0)),) if seen and not told else ()
 
     def explain(values: Values, _ship: ExtendedModel) -> str:
         _, value, std = first(values)
-        return fault.explained.format(rounded(100 * (1 + value), 100 * std) if fault.is_gain else rounded(value, std))
+        return fault.explained.format(rounded(100 * (1 + value), 100 * std) if row.is_gain else rounded(value, std))
 
     return Cause(
-        name=fault.cause, title=fault.title, missing=fault.missing, summary=fault.summary, unseen=fault.unseen,
+        name=fault.name, title=fault.title, missing=fault.missing, summary=fault.summary, unseen=fault.unseen,
         candidates=candidates, explain=explain,
     )  # fmt: skip
 
 
-OF_FAULTS = tuple(map(_of_fault, GAINS_AND_OFFSETS))
+OF_ROWS = tuple(_of_row(row, row.fault) for row in GAINS_AND_OFFSETS if row.fault is not None)
 
 
 NAMES = {
@@ -142,5 +140,5 @@ SENSOR_DELAY = Cause(
 )
 
 
-SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_FAULTS)
+SENSOR_CAUSES = (HEADING_BIAS, LEVER_ARM, SENSOR_DELAY, *OF_ROWS)
 """Faults of the record rather than of the model."""

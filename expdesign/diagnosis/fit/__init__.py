@@ -46,6 +46,7 @@ from expdesign.diagnosis.fit.held_out import (
     leads_away,
     on_common_units,
     prediction_gain,
+    prediction_p_value,
 )
 from expdesign.diagnosis.fit.linear_model import (
     MarginalInformation,

@@ -1,12 +1,4 @@
-"""A fit of effects and uncertain parameters, and likelihoods of fits.
-
-How much of the simulation error a slowly varying force that nobody measured would account for.
-
-The force is piecewise linear in time, in every equation of motion. Its size follows from generalised cross-validation,
-so it does not follow the noise.
-
-Source: G. H. Golub, M. Heath and G. Wahba, Technometrics 21 (1979), 215-223.
-"""
+"""A fit of effects and uncertain parameters, and likelihoods of fits."""
 
 from __future__ import annotations
 
@@ -28,9 +20,10 @@ from expdesign.diagnosis.fit.linear_model import (
     gram_matrices,
     marginalised,
 )
-from expdesign.diagnosis.model import TIME, ExtendedModel, acts_on, effect_kind, resisting, term_factors
+from expdesign.diagnosis.model import ExtendedModel, resisting, term_factors
 from expdesign.diagnosis.motion import Disturbance, LinearisedMotion
 from expdesign.values import Array
+from expdesign.vessel.quantities import TIME, acts_on, effect_row
 
 STEPS = 8  # Gauss-Newton steps of a fit, at most
 SMALLEST_FACTOR_CHANGE = -0.8  # factors of inertia, thrust, log and gyro stay above one plus this
@@ -261,7 +254,7 @@ def within_bounds(ship: ExtendedModel, effects: dict[str, float]) -> dict[str, f
             before, ratio = ship.get(key), LARGEST_RATIO
             least = 0.0 if kind in ("lag", "delay", "slew") else before / ratio
             value = min(max(value, least, 1e-6), max(before, 1e-3) * ratio)
-        elif effect_kind(key).neutral == 1.0 and not acts_on(key, TIME):
+        elif effect_row(key).neutral == 1.0 and not acts_on(key, TIME):
             value = max(value, SMALLEST_FACTOR_CHANGE)
         result[key] = value
     return result
@@ -315,6 +308,11 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 
 
 # How much of the simulation error a slowly varying force that nobody measured would account for.
+#
+# The force is piecewise linear in time, in every equation of motion. Its size follows from generalised
+# cross-validation, so it does not follow the noise.
+#
+# Source: G. H. Golub, M. Heath and G. Wahba, Technometrics 21 (1979), 215-223.
 
 
 def unmeasured_force_share(linear: LinearisedMotion, outputs: tuple[str, ...]) -> Array:

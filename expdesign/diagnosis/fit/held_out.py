@@ -313,19 +313,28 @@ def prediction_gain(
         windows: all data.
         noise: that both are whitened by.
     """
-    if not before.models or not after.models:
-        return np.nan, (np.nan, np.nan)
-    lost, left = (np.concatenate([_squares(*one, windows, noise) for one in held.models]) for held in (before, after))
-    if lost.shape != left.shape or len(lost) < 2:
-        return np.nan, (np.nan, np.nan)
-    with np.errstate(invalid="ignore"):
-        ratios = np.log(left / lost)  # nan where both models run away
-    middle, error = (
-        ratios.mean(),
-        scipy.special.stdtrit(len(ratios) - 1, 0.975) * ratios.std(ddof=1) / np.sqrt(len(ratios)),
-    )
+    middle, std, freedom = _mean_change(before, after, windows, noise)
+    error = scipy.special.stdtrit(freedom, 0.975) * std
     share, most, least = (1.0 - np.exp([middle, middle - error, middle + error])).tolist()
     return share, (least, most)
+
+
+def prediction_p_value(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> float:
+    """That held-out predictions are no better with a model; arguments as of `prediction_gain`."""
+    middle, std, freedom = _mean_change(before, after, windows, noise)
+    return float(scipy.special.stdtr(freedom, middle / max(std, 1e-300))) if np.isfinite(middle) else 1.0
+
+
+def _mean_change(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise) -> tuple[float, float, int]:
+    """Mean logarithm of the ratio of squared errors over blocks, its standard error and degrees of freedom."""
+    if not before.models or not after.models:
+        return np.nan, np.nan, 1
+    lost, left = (np.concatenate([_squares(*one, windows, noise) for one in held.models]) for held in (before, after))
+    if lost.shape != left.shape or len(lost) < 2:
+        return np.nan, np.nan, 1
+    with np.errstate(invalid="ignore"):
+        ratios = np.log(left / lost)  # nan where both models run away
+    return float(ratios.mean()), float(ratios.std(ddof=1) / np.sqrt(len(ratios))), len(ratios) - 1
 
 
 def _current(grams: GramMatrices, found: Sensitivities, noise: Noise) -> Array:

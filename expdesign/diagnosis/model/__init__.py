@@ -1,16 +1,5 @@
 """The simulation model with effects added to it: its terms, the term library and the groups of inputs."""
 
-from expdesign.diagnosis.model.effects import (
-    ACTUATORS,
-    EFFECTS,
-    SENSOR,
-    TERMS,
-    TIME,
-    WEATHER,
-    EffectKind,
-    acts_on,
-    effect_kind,
-)
 from expdesign.diagnosis.model.extended_model import ANGLE_STEMS, ROLL, ExtendedModel, mean_wind
 from expdesign.diagnosis.model.terms import (
     ADVANCE_LOSS,

@@ -1,6 +1,6 @@
 """A simulation model with effects added to it; each cause of the catalogue has a few effects, zero without it.
 
-Their keys are those of `effects.EFFECTS`.
+Their keys are those of `quantities.EFFECTS`.
 
 The search begins at the values that the vessel file states; every test is of the difference.
 """
@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 
 from expdesign.conventions import OUTPUTS
-from expdesign.diagnosis.model.effects import effect_kind
 from expdesign.diagnosis.model.terms import (
     Effects,
     ScaledTerm,
@@ -29,7 +28,7 @@ from expdesign.diagnosis.model.terms import (
 from expdesign.simulation.program import Evaluation, evaluation
 from expdesign.values import Array
 from expdesign.vessel import Roll, Term, VesselModel
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, effect_row
 from expdesign.vessel.structures import Expression
 from expdesign.waves import G_MPS2
 
@@ -117,10 +116,10 @@ class ExtendedModel:
         )
 
     def gain_and_offset(self, signal: str) -> tuple[float, float]:
-        """With which sensors show u, v or r: gain * true + offset; see `vessel.sensors.Fault`."""
-        own = [fault for fault in GAINS_AND_OFFSETS if signal in fault.signals]
-        gain = math.prod(1.0 + self.get(fault.effect) for fault in own if fault.is_gain)
-        return gain, sum(self.get(fault.effect) for fault in own if not fault.is_gain)
+        """With which sensors show u, v or r: gain * true + offset."""
+        own = [row for row in GAINS_AND_OFFSETS if signal in row.signals]
+        gain = math.prod(1.0 + self.get(row.effects[0]) for row in own if row.is_gain)
+        return gain, sum(self.get(row.effects[0]) for row in own if not row.is_gain)
 
     def get(self, key: str) -> float:
         """Value of an effect."""
@@ -130,7 +129,7 @@ class ExtendedModel:
         """Least and greatest possible value of an effect; what the vessel file states is possible."""
         kind, _, which = key.partition(":")
         sizes = {"forward": self.length_m, "starboard": self.beam_m, "asymmetry": self.beam_m / 2}
-        row = effect_kind(key)
+        row = effect_row(key)
         low, high = row.low, row.high
         if kind == "lever" or (kind == "asymmetry" and turns_by_force(self.model)):
             low, high = -sizes[which or kind], sizes[which or kind]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import dtbtrs
@@ -11,7 +12,7 @@ from scipy.linalg.lapack import dtbtrs
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.model import ExtendedModel, ScaledTerm, ahead_force
 from expdesign.diagnosis.motion.inputs import ExogenousInputs
-from expdesign.simulation.motion import rates_over_ground
+from expdesign.simulation.motion import rates_over_ground, rk4_step
 from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel.structures import SHOAL
@@ -22,6 +23,7 @@ DIFFERENCE = 1e-5  # step of finite differences of the rates by the state
 SAMPLES_AT_ONCE = 16_000
 ROLL_ANGLE_RAD = 0.25  # of a roll oscillation in one part of an integrator step, at most
 MOST_ROLL_PARTS = 16  # parts of an integrator step for roll
+FARTHEST = 1e3  # state whose rates are taken, at most [m/s, rad/s]
 
 
 # Equations of motion of an extended model.
@@ -111,13 +113,13 @@ def runge_kutta_step(
 ) -> tuple[tuple[Array, ...], Array]:
     """The state after one step, and the change of heading; fast roll is integrated in parts of the step."""
     parts = parts_of_step(ship, h)
-    heading_gain: Array | float = 0.0
+    state = (*x, np.zeros_like(x[2]))
     end = exogenous.at_fraction(-0.5)
     for part in range(parts):
         begin, middle, end = end, *(exogenous.at_fraction((part + share) / parts - 0.5) for share in (0.5, 1.0))
-        x, more = _rk4_part(ship, x, (begin, middle, end), h / parts)
-        heading_gain = heading_gain + more
-    return x, np.asarray(heading_gain)
+        later = partial(_rates_ahead, ship, middle), partial(_rates_ahead, ship, end)
+        state = rk4_step(partial(_rates, ship, begin), state, h / parts, later)
+    return state[:-1], state[-1]
 
 
 def parts_of_step(ship: ExtendedModel, h: float) -> int:
@@ -126,21 +128,15 @@ def parts_of_step(ship: ExtendedModel, h: float) -> int:
     return min(max(1, math.ceil(turn / ROLL_ANGLE_RAD)), MOST_ROLL_PARTS)
 
 
-def _rk4_part(
-    ship: ExtendedModel, x: tuple[Array, ...], exogenous: Sequence[ExogenousInputs], h: float
-) -> tuple[tuple[Array, ...], Array]:
-    """One Runge-Kutta step, with exogenous signals at its beginning, middle and end."""
-    begin, middle, end = exogenous
+def _rates(ship: ExtendedModel, exogenous: ExogenousInputs, state: tuple[Array, ...]) -> tuple[Array, ...]:
+    """d/dt of a state and of the heading after it."""
+    return (*state_rates(ship, state[:-1], exogenous), state[2])
 
-    def ahead(slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
-        return tuple(np.minimum(np.maximum(a + share * h * b, -1e3), 1e3) for a, b in zip(x, slope, strict=True))
 
-    k1 = state_rates(ship, x, begin)
-    k2 = state_rates(ship, x2 := ahead(k1, 0.5), middle)
-    k3 = state_rates(ship, x3 := ahead(k2, 0.5), middle)
-    k4 = state_rates(ship, x4 := ahead(k3, 1.0), end)
-    transition = tuple(a + h / 6 * (p + 2 * q + 2 * s + t) for a, p, q, s, t in zip(x, k1, k2, k3, k4, strict=True))
-    return transition, h / 6 * (x[2] + 2 * x2[2] + 2 * x3[2] + x4[2])
+def _rates_ahead(ship: ExtendedModel, exogenous: ExogenousInputs, state: tuple[Array, ...]) -> tuple[Array, ...]:
+    """The same within a step, where a motion that runs away must not overflow."""
+    x = tuple(np.minimum(np.maximum(part, -FARTHEST), FARTHEST) for part in state[:-1])
+    return (*state_rates(ship, x, exogenous), x[2])
 
 
 def state_jacobian(ship: ExtendedModel, states: Array, exogenous: ExogenousInputs) -> Array:

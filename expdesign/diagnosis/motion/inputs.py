@@ -1,23 +1,18 @@
-"""Inputs of an extended model: actuators, water, air, depth and time.
-
-Inputs as the actuators of an extended model deliver them.
-
-Slew rate, dead band, dead time, lag, offset and scale, in this order.
-"""
+"""Inputs of an extended model: actuators, water, air, depth and time."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy
 
 from expdesign.diagnosis.data import Windows, averaging_half_width
 from expdesign.diagnosis.model import (
-    ACTUATORS,
     RESPONSES,
     ExtendedModel,
-    acts_on,
     group_columns,
     mean_wind,
     response_effect,
@@ -27,13 +22,17 @@ from expdesign.simulation.motion import to_body
 from expdesign.simulation.program import evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Response, generalised_force
+from expdesign.vessel.quantities import ACTUATORS, acts_on
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
 
 # parts of an integrator step in which moving actuators are followed, at least; forces are not linear in angles
 ACTUATOR_SUBSTEPS = 4
+FEW_STEPS, MOST_KNOWN = 10_000, 64  # integrator steps of windows whose forces are kept, and how many of them
 
 
 # Inputs as the actuators of an extended model deliver them.
+#
+# Slew rate, dead band, dead time, lag, offset and scale, in this order.
 
 
 def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tuple[Array, int]:
@@ -180,8 +179,26 @@ def exogenous_inputs(
     return table
 
 
+_known_forces = WeakKeyDictionary[Windows, dict[Hashable, ExogenousInputs]]()
+
+
 def _forces(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
-    """Delivered inputs and their forces; batches of equal length are followed at once, those without windows never."""
+    """Delivered inputs and their forces; of few data they are kept: a search returns to the same actuators often."""
+    if windows.heading.size > FEW_STEPS:
+        return _followed(ship, windows)
+    acting = tuple(actuator_effects(ship).items())
+    stated = tuple(item for item in sorted(ship.stated.items()) if item[0].startswith("slew:"))
+    key = (acting, stated, ship.model.inputs, ship.model.actuators, _force_names(ship))
+    known = _known_forces.setdefault(windows, {})
+    if key not in known:
+        if len(known) >= MOST_KNOWN:
+            known.clear()
+        known[key] = _followed(ship, windows)
+    return ExogenousInputs(known[key])
+
+
+def _followed(ship: ExtendedModel, windows: Windows) -> ExogenousInputs:
+    """The same, each actuator followed; batches of equal length at once, those without windows never."""
     batches, found = windows.batch_inputs, dict[int, Array]()
     used = np.unique(windows.batch).astype(int).tolist()
     for length in dict.fromkeys(len(batches[place]) for place in used):

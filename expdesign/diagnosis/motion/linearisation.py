@@ -1,10 +1,4 @@
-"""A simulation of all windows as values, its sensor outputs, and its linearisation.
-
-Linearised motion of all windows, and its responses to small disturbances.
-
-The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
-All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
-"""
+"""A simulation of all windows as values, its sensor outputs, and its linearisation."""
 
 from __future__ import annotations
 
@@ -17,8 +11,9 @@ from numpy.typing import NDArray
 
 from expdesign.conventions import OUTPUTS
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.model import SENSOR, TERMS, ExtendedModel, acts_on
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion.equations_of_motion import (
+    SAMPLES_AT_ONCE,
     parts_of_step,
     propagated,
     rates_by_term,
@@ -28,6 +23,7 @@ from expdesign.diagnosis.motion.equations_of_motion import (
 )
 from expdesign.diagnosis.motion.inputs import ExogenousInputs, exogenous_inputs
 from expdesign.values import Array
+from expdesign.vessel.quantities import SENSOR, TERMS, acts_on
 
 LARGEST_SPEED = 60.0  # state beyond which a simulation has diverged [m/s, rad/s]
 NEWTON_TOLERANCE = 1e-8  # correction below which it has converged
@@ -127,7 +123,7 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
     if not from_position:
         u, v = _with_faults(ship, "u", u), _with_faults(ship, "v", v)
     if from_position and ship.get("late:psi"):
-        u, v = _rotated(u, v, r * ship.get("late:psi"))
+        u, v = _rotated(u, v, _turn(ship.get("late:psi"), r, headings, windows))
     channels = {"u": u, "v": v, "r": _with_faults(ship, "r", r), "psi_rate": simpson_mean(r, finer)}
     if headings is not None and finer == 1:
         channels["psi_rate"] = heading_differences(headings, channels["psi_rate"], windows)
@@ -139,7 +135,8 @@ def sensor_outputs(ship: ExtendedModel, states: Array, windows: Windows, heading
         if delay:
             channels[name] = _shifted(channels[name], delay / windows.sample_s)
     if from_position and ship.get("late:position"):
-        channels["u"], channels["v"] = _rotated(channels["u"], channels["v"], -r * ship.get("late:position"))
+        turn = _turn(ship.get("late:position"), r, headings, windows)
+        channels["u"], channels["v"] = _rotated(channels["u"], channels["v"], -turn)
     return np.stack(list(channels.values()), axis=-1)
 
 
@@ -196,6 +193,15 @@ def simpson_mean_of_track(u: Array, v: Array, heading: Array, finer: int = 1) ->
     return north * c + east * s, east * c - north * s
 
 
+def _turn(delay_s: float, r: Array, headings: Array | None, windows: Windows) -> Array:
+    """(w, s) turn of the ship since as long ago as a delay; at the present rate where no heading tells it [rad]."""
+    if headings is None:
+        return r * delay_s
+    then = np.arange(headings.shape[1]) - delay_s / windows.sample_s
+    known = (then >= 0) & (then <= headings.shape[1] - 1)
+    return np.where(known, headings - _shifted(headings, delay_s / windows.sample_s), r * delay_s)
+
+
 def _shifted(values: Array, samples: float) -> Array:
     """Delayed by a number of samples, with linear interpolation; before the window, its first value."""
     place = np.clip(np.arange(values.shape[1]) - samples, 0, values.shape[1] - 1)
@@ -206,6 +212,9 @@ def _shifted(values: Array, samples: float) -> Array:
 
 
 # Linearised motion of all windows, and its responses to small disturbances.
+#
+# The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
+# All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
 
 TURNS = "heading_bias"
 """The effect of a sensor that also turns current and wind, where the heading is the compass's."""
@@ -346,9 +355,11 @@ def _shown(motion: Motion, moved: Array) -> Array:
     if any(acts_on(key, SENSOR) for key in motion.ship.effects):
         size = 1e-4
         still = sensor_outputs(motion.ship, motion.states, windows)
-        for index in range(count):
-            states = motion.states + size * moved[..., index]
-            result[index] = (sensor_outputs(motion.ship, states, windows) - still) / size
+        at_once = max(1, SAMPLES_AT_ONCE // motion.states[..., 0].size)
+        for low in range(0, count, at_once):
+            states = motion.states + size * np.moveaxis(moved[..., low : low + at_once], -1, 0)
+            seen = sensor_outputs(motion.ship, states.reshape(-1, *states.shape[2:]), windows)
+            result[low : low + at_once] = (seen.reshape(-1, *still.shape) - still) / size
         return result
     for channel, name in enumerate("uvr"):
         result[..., channel] = np.moveaxis(moved[:, :: windows.steps_per_sample, channel], -1, 0)

@@ -13,10 +13,11 @@ import numpy as np
 from expdesign.diagnosis.causes import Candidate, rounded
 from expdesign.diagnosis.data import Windows
 from expdesign.diagnosis.fit import Fit, fit, tail
-from expdesign.diagnosis.model import ExtendedModel, effect_kind
+from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import fitted_start
 from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.tuning import TUNING
+from expdesign.vessel.quantities import effect_row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +37,7 @@ class Suspected:
     @property
     def in_words(self) -> str:
         """The outcome."""
-        unit = effect_kind(self.effect).unit
+        unit = effect_row(self.effect).unit
         size = f"{rounded(self.value, self.std)}{' ' * bool(unit)}{unit}"
         answer = "the data show it" if self.confirmed else "the data do not show it"
         return f"tested first and alone, {answer}: {self.effect} by {size}, p = {self.p_value:.2g}"

@@ -14,7 +14,6 @@ from expdesign.diagnosis.model import (
     Effects,
     ExtendedModel,
     ahead_force_text,
-    effect_kind,
     group_columns,
     response_effect,
     term_library,
@@ -26,7 +25,7 @@ from expdesign.estimation.regression import model_for
 from expdesign.signals import Batch, Record
 from expdesign.simulation import acting_response
 from expdesign.vessel import Environment, Response, Roll, Sensors, Vessel, VesselModel, column_name
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import effect_row, rows_of
 from expdesign.vessel.structures import SHOAL
 
 # Standard deviations of what a vessel file states of water, air, actuators and sensors: read and written alike.
@@ -87,16 +86,7 @@ def _file_keys(key: str, inputs: tuple[str, ...], derived: tuple[str, ...]) -> t
     kind, _, rest = key.partition(":")
     if kind in RESPONSES:
         return tuple(f"{inputs[column]}_{RESPONSES[kind]}" for column in group_columns(rest, inputs))
-    from_pose = "u" in derived
-    place = "position" if from_pose else "velocity"
-    late = {"u": "velocity", "v": "velocity", "r": "yaw_rate", "psi": "heading", "position": "position"}
-    if kind == "late":
-        return (f"{late[rest]}_delay_s",)
-    if kind == "lever":
-        return (f"{place}_{rest}_m",)
-    names = {fault.effect: fault.key for fault in GAINS_AND_OFFSETS}
-    names["heading_bias"] = "heading_bias_rad" if from_pose else "velocity_angle_rad"
-    return (names[kind],) if kind in names else ()
+    return tuple(row.key for row in rows_of(Sensors) if key in row.effects and row.is_shown(derived))
 
 
 # The extended model of a vessel file and a record.
@@ -157,23 +147,8 @@ def _flowing(weather: Environment) -> dict[str, float]:
 
 def _sensed(sensors: Sensors, derived: tuple[str, ...]) -> dict[str, float]:
     """Sensor errors of a vessel file, of the sensors that the data come from."""
-    from_pose = "u" in derived
-    place = sensors.position if from_pose else sensors.velocity
-    velocity_s = 0.0 if from_pose else sensors.velocity.delay_s
-    return {
-        "heading_bias": -(sensors.heading_bias_rad if from_pose else sensors.velocity_angle_rad),
-        **{
-            fault.effect: 0.0 if {*fault.signals} & {*derived} else getattr(sensors, fault.key) - fault.neutral
-            for fault in GAINS_AND_OFFSETS
-        },
-        "lever:forward": place.forward_m,
-        "lever:starboard": place.starboard_m,
-        "late:u": velocity_s,
-        "late:v": velocity_s,
-        "late:r": 0.0 if "r" in derived else sensors.yaw_rate.delay_s,
-        "late:psi": sensors.heading.delay_s,
-        "late:position": sensors.position.delay_s if from_pose else 0.0,
-    }
+    rows = [row for row in rows_of(Sensors) if row.is_shown(derived)]
+    return {key: row.sign * (getattr(sensors, row.key) - row.neutral) for row in rows for key in row.effects}
 
 
 def _driven(vessel: Vessel, record: Record) -> tuple[VesselModel, float]:
@@ -225,8 +200,8 @@ def public_name(key: str, ship: ExtendedModel) -> tuple[str, float, float, str]:
         return f"slew_{rest}_s_per_{unit or 'unit'}", 1.0, 0.0, f"s/{unit}" if unit else "s"
     if key == "asymmetry":
         return _lean_name(model)
-    row = effect_kind(key)
-    return row.name.format(rest), 1.0, row.neutral, row.unit
+    row = effect_row(key)
+    return row.result.format(rest), 1.0, row.neutral, row.unit
 
 
 def _input_unit(group: str, model: VesselModel) -> str:

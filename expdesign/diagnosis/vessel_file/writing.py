@@ -1,18 +1,4 @@
-"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file.
-
-Dependence on depth as factors of a model's terms.
-
-The growth becomes a factor of the terms: a term ``u`` turns into ``(u)*(1 + 0.8*h)``, where the signal `h` is draught
-over depth. Parameters keep their names and their values, which are those of deep water. Inertia divides, which the
-language of terms cannot express. So its factor 1 / (1 + b h) is written as a polynomial of third order, exact in deep
-water and nearly exact down to the least depth in the data. A dependence on depth that the model already has counts as
-known, and the growth that is found multiplies it.
-
-The model of a vessel file with the findings: its terms, their parameters and standard deviations.
-
-An effect that scales a term ends up in its parameter, and the effect's standard error beside that of the parameter as
-if the two were independent. What is added becomes a term of its own.
-"""
+"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file."""
 
 from __future__ import annotations
 
@@ -40,10 +26,16 @@ from expdesign.diagnosis.model import (
 from expdesign.diagnosis.vessel_file.reading import found_std, with_std
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel, std_keys
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS
+from expdesign.vessel.quantities import NOT_NEGATIVE, rows_of
 from expdesign.vessel.structures import SHOAL, Expression
 
 # Dependence on depth as factors of a model's terms.
+#
+# The growth becomes a factor of the terms: a term ``u`` turns into ``(u)*(1 + 0.8*h)``, where the signal `h` is draught
+# over depth. Parameters keep their names and their values, which are those of deep water. Inertia divides, which the
+# language of terms cannot express. So its factor 1 / (1 + b h) is written as a polynomial of third order, exact in deep
+# water and nearly exact down to the least depth in the data. A dependence on depth that the model already has counts as
+# known, and the growth that is found multiplies it.
 
 DAMPING, INERTIA = "damping", "inertia"
 ORDER = 3
@@ -109,6 +101,9 @@ def _taken_apart(expression: str) -> tuple[str, Polynomial]:
 
 
 # The model of a vessel file with the findings: its terms, their parameters and standard deviations.
+#
+# An effect that scales a term ends up in its parameter, and the effect's standard error beside that of the parameter as
+# if the two were independent. What is added becomes a term of its own.
 
 TURN = re.compile(r"\btau_psi\b")
 FORCES = {"u": "X", "v": "Y", "r": "N"}
@@ -372,22 +367,10 @@ def _changed(response: Response, effects: Mapping[str, float]) -> Response:
 
 
 def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:
-    get = ship.get
-
-    def late(*keys: str) -> float:
-        return max(0.0, *(get(key) for key in keys))
-
-    lever = {"forward_m": get("lever:forward"), "starboard_m": get("lever:starboard")}
-    faults: dict[str, Any] = {
-        fault.key: fault.neutral + get(fault.effect)
-        for fault in GAINS_AND_OFFSETS
-        if not {*fault.signals} & {*ship.derived}
-    }
-    sensors = replace(sensors, heading=replace(sensors.heading, delay_s=late("late:psi")), **faults)
-    if "r" not in ship.derived:
-        sensors = replace(sensors, yaw_rate=replace(sensors.yaw_rate, delay_s=late("late:r")))
-    if "u" in ship.derived:
-        position = replace(sensors.position, **lever, delay_s=late("late:position"))
-        return replace(sensors, heading_bias_rad=0.0 - get("heading_bias"), position=position)
-    velocity = replace(sensors.velocity, **lever, delay_s=late("late:u", "late:v"))
-    return replace(sensors, velocity_angle_rad=0.0 - get("heading_bias"), velocity=velocity)
+    """The sensors with the effects that the data show; no sensor shows what is yet to come."""
+    found: dict[str, Any] = {}
+    for row in rows_of(Sensors):
+        if row.effects and row.is_shown(ship.derived):
+            value = row.neutral + row.sign * max(map(ship.get, row.effects))
+            found[row.key] = max(0.0, value) if row.takes == NOT_NEGATIVE else value
+    return replace(sensors, **found)

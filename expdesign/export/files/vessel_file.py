@@ -12,9 +12,8 @@ import numpy as np
 from expdesign.errors import InputError
 from expdesign.values import Array
 from expdesign.vessel import (
-    CENTRAL,
+    EXACT,
     KINDS,
-    SENSORS,
     STRUCTURES,
     UNSTATED_SHARE,
     Actuator,
@@ -52,7 +51,7 @@ def vessel_toml(vessel: Vessel, *, comments: Sequence[str] = ()) -> str:
     for actuator in vessel.actuators:
         lines += ["", *_table("[[actuators]]", _actuator(actuator))]
     lines += _model(vessel.model)
-    if vessel.sensors != Sensors():
+    if vessel.sensors != EXACT:
         lines += ["", *_table("[sensors]", _sensors(vessel.sensors))]
     if vessel.std:
         lines += ["", *_table("[std]", vessel.std)]
@@ -78,14 +77,7 @@ def _actuator(actuator: Actuator) -> dict[str, str | float]:
 
 def _sensors(sensors: Sensors) -> dict[str, str | float]:
     """Entries that differ from the defaults."""
-    usual = Sensors()
-    entries = {
-        name: value for name, value in vars(sensors).items() if name not in SENSORS and value != getattr(usual, name)
-    }
-    for sensor in SENSORS:
-        mounting = vars(getattr(sensors, sensor))
-        entries |= {f"{sensor}_{key}": value for key, value in mounting.items() if value != getattr(CENTRAL, key)}
-    return entries
+    return {name: value for name, value in vars(sensors).items() if value != getattr(EXACT, name)}
 
 
 def _environment(environment: Environment) -> Iterator[str]:

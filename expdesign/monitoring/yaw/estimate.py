@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.monitoring.yaw.model import YawData, YawModel
+from expdesign.simulation.motion import State, rk4_step
 from expdesign.values import Array, seal
 
 SEARCH_STEPS = 25
@@ -66,17 +68,19 @@ def _rate(c: Array, r: Array) -> Array:
     return np.asarray(c[0] + c[1] * r + (c[2] + c[3] * r) * np.abs(r))
 
 
+def _turn(c: Array, state: State) -> State:
+    return (_rate(c, state[0]),)
+
+
 def _integrated(by: Array, data: YawData) -> Array:
     """(k, n) yaw rates from their first measured values."""
     middle, step = _middle(by), data.sample_time_s
     rates: Array = np.empty_like(by[0])
     rates[0] = r = data.r[:, 0]
     for index in range(len(rates) - 1):
-        a = _rate(by[:, index], r)
-        b = _rate(middle[:, index], r + step / 2 * a)
-        c = _rate(middle[:, index], r + step / 2 * b)
-        d = _rate(by[:, index + 1], r + step * c)
-        rates[index + 1] = r = np.clip(r + step / 6 * (a + 2 * b + 2 * c + d), -LARGEST_RATE, LARGEST_RATE)
+        now, soon, then = (partial(_turn, c) for c in (by[:, index], middle[:, index], by[:, index + 1]))
+        (after,) = rk4_step(now, (r,), step, (soon, then))
+        rates[index + 1] = r = np.clip(after, -LARGEST_RATE, LARGEST_RATE)
     return rates
 
 

@@ -3,6 +3,7 @@
 from expdesign.plan.local_planner.arcs import arc_end, moved, run_ends
 from expdesign.plan.local_planner.factory import local_planner
 from expdesign.plan.local_planner.protocol import (
+    Departure,
     GoAroundTime,
     LegEnds,
     LocalPlanner,

@@ -80,6 +80,15 @@ class RunSpace:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Departure:
+    """Where a search begins."""
+
+    pose: Array  # (3,)
+    exit_mps: float = 0.0  # surge speed there
+    last: int = -1  # index of the run that ends there, or -1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SearchSpace:
     """Data of the search for places and orders."""
 

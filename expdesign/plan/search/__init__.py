@@ -2,4 +2,4 @@
 
 from expdesign.plan.search.beam import path_exceeds_displacement, place_runs
 from expdesign.plan.search.local_search import have_room, runs_clear
-from expdesign.plan.search.planners import PlacementSearch, placement_search
+from expdesign.plan.search.planners import placed_runs

@@ -16,8 +16,8 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
-from expdesign.plan.local_planner import PartialPlans, SearchSpace, Successors
-from expdesign.plan.search.local_search import EQUAL, ChainEnds, clear_successors, polished
+from expdesign.plan.local_planner import Departure, PartialPlans, SearchSpace, Successors
+from expdesign.plan.search.local_search import EQUAL, clear_successors, polished
 from expdesign.plan.values import Placement
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
@@ -68,10 +68,8 @@ def path_exceeds_displacement(space: SearchSpace, repeats: Sequence[int], start:
 def place_runs(
     space: SearchSpace,
     repeats: Sequence[int],
+    departure: Departure,
     *,
-    start: Array,
-    exit_mps: float = 0.0,
-    last: str = "",
     width: int = BEAM_WIDTH,
     orders: int = POLISHED_ORDERS,
     progress: Progress = silent,
@@ -81,9 +79,7 @@ def place_runs(
     Args:
         space: the primitives and the water.
         repeats: runs of each of the space's primitives.
-        start: (3,) pose where the search begins.
-        exit_mps: surge speed there.
-        last: name of the primitive that ends there, if any.
+        departure: where the search begins.
         width: partial plans kept.
         orders: of runs, of which the best plan is polished; 0 for none.
         progress: told each run that is placed, and each order that is polished.
@@ -91,16 +87,15 @@ def place_runs(
     Raises:
         NoPlan: some run does not fit anywhere the search can reach; the message names it and the place.
     """
-    names = [item.name for item in space.footprints]
     beam = PartialPlans(
-        pose=start[None],
-        exit_mps=np.array([exit_mps]),
-        last=np.array([names.index(last) if last in names else -1]),
+        pose=departure.pose[None],
+        exit_mps=np.array([departure.exit_mps]),
+        last=np.array([departure.last]),
         left=np.array([repeats]),
         cost_s=np.zeros(1),
         history=((),),
     )
-    ahead = orders_ahead(space, repeats, made_good=path_exceeds_displacement(space, repeats, start))
+    ahead = orders_ahead(space, repeats, made_good=path_exceeds_displacement(space, repeats, departure.pose))
     count = int(np.sum(repeats))
     for number in range(count):
         progress(f"placing run {number + 1} of {count}", PLACING_SHARE * number / count)
@@ -111,16 +106,16 @@ def place_runs(
         raise NoRoom("no path to the goal from where the last run ends", place=beam.pose[best, :2])
     runs, poses = _chain(beam, best)
     if orders:
-        ends = ChainEnds(start=start, exit_mps=exit_mps, last=names.index(last) if last else -1)
         chains = list(_different(beam, final_s, orders))
         better = []
-        for found in in_order(polished, (space, ends), chains):
+        for found in in_order(polished, (space, departure), chains):
             better.append(found)
             progress(
                 "moving runs closer to each other", 1.0 - (1.0 - PLACING_SHARE) * (1.0 - len(better) / len(chains))
             )
         best = int(np.argmin([round(seconds, EQUAL) for _, seconds in better]))
         runs, poses = chains[best][0], better[best][0]
+    names = [item.name for item in space.footprints]
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 
 from expdesign.plan.chart import ClearanceField
-from expdesign.plan.local_planner import LegEnds, SearchSpace, moved
+from expdesign.plan.local_planner import Departure, LegEnds, SearchSpace, moved
 from expdesign.plan.runs import Footprint
 from expdesign.plan.search.lattice import LatticeProblem
 from expdesign.values import Array
@@ -120,15 +120,6 @@ class Lattice:
 
 
 NO_BENDS = np.zeros((0, 2))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Departure:
-    """Where a lattice plan begins."""
-
-    pose: Array  # (3,)
-    exit_mps: float = 0.0  # surge speed there
-    last: int = -1  # index of the run that ends there, or -1
 
 
 def build_lattice(lattice: Lattice, counts: Sequence[int], departure: Departure) -> LatticeProblem:

@@ -16,7 +16,7 @@ import shapely
 
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import sight_lines
-from expdesign.plan.local_planner import LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
+from expdesign.plan.local_planner import Departure, LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
 from expdesign.values import Array
 
 MANY_RUNS, SPARSE_DISCS = 50, 8  # of more runs than this, every so manieth disc is looked at before all of them
@@ -117,15 +117,6 @@ def _lines_clear(space: SearchSpace, pose: Array, start: Array) -> np.ndarray:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ChainEnds:
-    """Where a chain of runs begins; it ends at the space's goal."""
-
-    start: Array  # (3,) pose before the first leg
-    exit_mps: float  # surge speed there
-    last: int  # primitive that ends there, or -1
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Chain:
     """Runs in order, where they are, and what the legs between them take."""
 
@@ -141,16 +132,16 @@ class Chain:
         return tuple(part.tobytes() for part in near)
 
 
-def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Array) -> tuple[Array, float]:
+def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array) -> tuple[Array, float]:
     """(n, 3) better poses for the same runs in the same order, and the time of all legs by the rule [s].
 
     Args:
         space: the primitives and the water; with a rule for the time of legs.
-        ends: of the chain; the last leg leads to the goal.
+        departure: where the chain begins; the last leg leads to the goal.
         runs: (n,) indices of primitives.
         poses: (n, 3) where they begin.
     """
-    legs = _Legs(space=space, ends=ends)
+    legs = _Legs(space=space, departure=departure)
     chain = legs.measured(np.asarray(runs), poses)
     most = _longest_block(len(runs))
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, min(i + most, len(runs)))]
@@ -167,7 +158,7 @@ def polished(space: SearchSpace, ends: ChainEnds, runs: Sequence[int], poses: Ar
         if chain is before:
             break
         chain = legs.measured(chain.runs, chain.poses)
-    return chain.poses, measured_s(space, runs, chain.poses, ends)
+    return chain.poses, measured_s(space, runs, chain.poses, departure)
 
 
 def _longest_block(runs: int) -> int:
@@ -176,9 +167,9 @@ def _longest_block(runs: int) -> int:
     return max(1, int(np.searchsorted(np.cumsum(lengths * (runs + 1 - lengths)), MOST_POSES, side="right")))
 
 
-def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, ends: ChainEnds) -> float:
+def measured_s(space: SearchSpace, runs: Sequence[int], poses: Array, departure: Departure) -> float:
     """Time of all legs between runs at poses (n, 3), the last one leading to the goal, by the rule [s]."""
-    return float(_Legs(space=space, ends=ends).measured(np.asarray(runs), poses).legs_s.sum())
+    return float(_Legs(space=space, departure=departure).measured(np.asarray(runs), poses).legs_s.sum())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,7 +177,7 @@ class _Legs:
     """Legs of chains that begin and end at the same places."""
 
     space: SearchSpace
-    ends: ChainEnds
+    departure: Departure
 
     def measured(self, runs: np.ndarray, poses: Array) -> Chain:
         """A chain with the shortest paths for its legs."""
@@ -250,7 +241,7 @@ class _Legs:
         turned = abs(float(wrap_angle(after[2] - before[2] - tried.step[2])))
         if away >= SAME * self.space.hull_m or turned >= SAME:
             return 0.0
-        before_run, after_run = (int(run) for run in np.r_[self.ends.last, runs, -1][k : k + 2])
+        before_run, after_run = (int(run) for run in np.r_[self.departure.last, runs, -1][k : k + 2])
         return tried.seconds + float(self.space.going_round_s(before_run, after_run, np.array(tried.seconds)))
 
     def _kept(self, runs: np.ndarray, k: int) -> bool:
@@ -259,7 +250,7 @@ class _Legs:
 
     def _pair(self, runs: np.ndarray, k: int) -> Pair:
         """Names of the runs before and after leg k."""
-        chain = [self.ends.last, *runs.tolist(), -1]
+        chain = [self.departure.last, *runs.tolist(), -1]
         return self.space.pair(chain[k], chain[k + 1])
 
     def _clear(self, runs: np.ndarray, blocks: Array, before: Array, after: Array) -> np.ndarray:
@@ -294,15 +285,15 @@ class _Legs:
 
     def _ends(self, runs: np.ndarray, poses: Array) -> tuple[Array, Array]:
         """(n + 1, 3) where legs begin, and where they end."""
-        return np.vstack([self.ends.start, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
+        return np.vstack([self.departure.pose, run_ends(self.space, runs, poses)]), np.vstack([poses, self.space.goal])
 
     def _leg_s(self, runs: np.ndarray, k: int, froms: Array, tos: Array, bends: Array) -> Array:
         """(m,) time of leg k from poses (m, 3) to poses (m, 3) along a path's bends (b, 2)."""
         runs_of = self.space.footprints
         ends = LegEnds(
-            before=int(runs[k - 1]) if k else self.ends.last,
+            before=int(runs[k - 1]) if k else self.departure.last,
             after=int(runs[k]) if k < len(runs) else -1,
-            exit_mps=runs_of[runs[k - 1]].exit_mps if k else self.ends.exit_mps,
+            exit_mps=runs_of[runs[k - 1]].exit_mps if k else self.departure.exit_mps,
             entry_mps=runs_of[runs[k]].entry_mps if k < len(runs) else 0.0,
         )
         return self.space.planner.leg_s(self.space, ends, froms, tos, bends)

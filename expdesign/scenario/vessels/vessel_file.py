@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from expdesign.scenario.vessels.vessel_tables import (
     ActuatorTable,
     ModelTable,
     ParticularsTable,
-    SensorsTable,
     TermTable,
     VesselTable,
     build_environment,
@@ -27,12 +25,10 @@ from expdesign.scenario.vessels.vessel_tables import (
 from expdesign.vessel import (
     CALM,
     KINDS,
-    SENSORS,
     STRUCTURES,
     Actuator,
     Inertia,
     Limit,
-    Mounting,
     Response,
     Roll,
     RollPendulum,
@@ -48,7 +44,6 @@ from expdesign.vessel import (
 )
 from expdesign.vessel.structures import FORCE_SIGNALS, MOTION_SIGNALS, parse_expression
 
-MOUNTING_KEYS = tuple(field.name for field in fields(Mounting))
 CORRELATION_ROUNDING = 1e-6
 """Negative eigenvalue that rounded correlations may have."""
 
@@ -74,7 +69,7 @@ def vessel_of(tables: Mapping[str, Any], entry: Entry) -> Vessel:
     return Vessel(
         **file.vessel.model_dump(),
         model=model,
-        sensors=_sensors(file.sensors),
+        sensors=Sensors(**file.sensors.model_dump()),
         environment=CALM if file.environment is None else build_environment(file.environment),
         pendulum=_pendulum(file, model, entry),
         std=_std(file.std, actuators, entry.at("std")),
@@ -99,14 +94,6 @@ def _std(given: Mapping[str, float], actuators: Sequence[Actuator], entry: Entry
         if name.endswith("_rate") and not math.isfinite(response_values(actuators)[name]):
             raise entry.at(name).error("is given without a rate, expected the rate in the table of its actuator")
     return dict(given)
-
-
-def _sensors(table: SensorsTable) -> Sensors:
-    flat: dict[str, Any] = table.model_dump()
-    for sensor in SENSORS:
-        keys = {key: f"{sensor}_{key}" for key in MOUNTING_KEYS if f"{sensor}_{key}" in flat}
-        flat[sensor] = Mounting(**{key: flat.pop(name) for key, name in keys.items()})
-    return Sensors(**flat)
 
 
 def _actuators(rows: list[dict[str, Any]], ship: ParticularsTable, entry: Entry) -> tuple[Actuator, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -13,15 +14,16 @@ from expdesign.scenario.vessels.pendulum_table import PendulumTable
 from expdesign.vessel import (
     KINDS,
     RATE_UNITS,
-    SENSORS,
     STRUCTURES,
     UNSTATED_SHARE,
     Environment,
+    Response,
+    Sensors,
     Variation,
     limit_keys,
     response_keys,
 )
-from expdesign.vessel.sensors import GAINS_AND_OFFSETS, NOISE, PLACED
+from expdesign.vessel.quantities import ANGLE, NOT_NEGATIVE, NUMBER, POSITIVE, STD, WIND_SENSORS, Quantity, rows_of
 
 # `[environment]` of scenario and vessel files: expected current and wind.
 
@@ -126,6 +128,19 @@ class ActuatorTable(Table):
     )
 
 
+TYPES: dict[str, Any] = {
+    NUMBER: Number, ANGLE: HalfTurn, NOT_NEGATIVE: NonNegative, POSITIVE: Positive, STD: NonNegative,
+}  # fmt: skip
+"""What a quantity takes -> type of its key."""
+
+
+def _key_of(row: Quantity, words: str) -> tuple[Any, Any]:
+    """Type and field of the key of a quantity; one without a number when a file is silent has None."""
+    kind, silent = TYPES[row.takes], row.default
+    free = not math.isfinite(silent)
+    return (kind | None if free else kind), Field(default=None if free else silent, description=words)
+
+
 SIGNALS: dict[str, tuple[str, Any, str]] = {
     "n": ("the propeller speed", Number, " [rps], negative for astern"),
     "a": ("the angle", TwoTurns, " [rad], positive to starboard"),
@@ -145,26 +160,16 @@ def _signal_keys(stem: str, *, free: bool) -> dict[str, Any]:
         free: whether it may do without limits.
     """
     words, limit, unit = SIGNALS[stem]
-    name, key = words.removeprefix("the "), response_keys(stem)
-    per = {"rps2": "rps per second", "radps": "rad/s", "": "per second"}[RATE_UNITS[stem]]
+    name, keys = words.removeprefix("the "), response_keys(stem)
     kind, default, or_free = (limit | None, None, "; it turns freely when not given") if free else (limit, ..., "")
-    rows: dict[str, tuple[Any, Any, str]] = {
-        low_or_high: (kind, default, f"the {which} {name}{unit}{or_free}")
-        for low_or_high, which in zip(limit_keys(stem), ("lowest", "highest"), strict=True)
+    limits: dict[str, Any] = {
+        key: (kind, Field(default=default, description=f"the {which} {name}{unit}{or_free}"))
+        for key, which in zip(limit_keys(stem), ("lowest", "highest"), strict=True)
     }
-    rows |= {
-        key["rate"]: (
-            Positive | None, None, f"the slew rate at which {words} follows orders [{per}]; no limit when not given"
-        ),
-        key["lag_s"]: (NonNegative, 0.0, f"the time constant with which {words} follows [s]"),
-        key["delay_s"]: (NonNegative, 0.0, f"the dead time of {words} [s]"),
-        key["deadband"]: (
-            NonNegative, 0.0, f"the dead band: a smaller {name} ordered has no effect{unit.split(',')[0]}"
-        ),
-    }  # fmt: skip
-    if stem in ("a", "rudder"):
-        rows[key["offset"]] = HalfTurn, 0.0, "the misalignment [rad]: the true angle less the commanded one"
-    return {name: (kind, Field(default=default, description=text)) for name, (kind, default, text) in rows.items()}
+    per = {"rps2": "rps per second", "radps": "rad/s", "": "per second"}[RATE_UNITS[stem]]
+    said = {"the": words, "bare": name, "per": per, "in_unit": unit.split(",")[0]}
+    rows = [row for row in rows_of(Response) if row.takes != ANGLE or stem in ("a", "rudder")]
+    return limits | {keys[row.key]: _key_of(row, row.words.format(**said)) for row in rows}
 
 
 def _actuator_table(name: str, words: str, stems: tuple[str, ...], *, free: bool = False) -> type[ActuatorTable]:
@@ -282,29 +287,16 @@ class ModelTable(Table):
 
 
 def _sensor_keys() -> dict[str, Any]:
-    """Fields of `[sensors]`: noise, axes, gains and offsets, and by sensor its place, delay and interval."""
-    rows: dict[str, tuple[Any, Any, str]] = {
-        key: (NonNegative, 0.0, f"the standard deviation of {of}") for key, of in NOISE.items()
+    """Fields of `[sensors]`, in the order of those of `Sensors`."""
+    rows = {row.key: row for row in rows_of(Sensors)}
+    wind = Field(default="cartesian", description="the kind of wind sensor: components of the relative wind, or its "
+                 "speed and angle")  # fmt: skip
+    return {
+        field.name: _key_of(rows[field.name], rows[field.name].words)
+        if field.name in rows
+        else (Literal[WIND_SENSORS], wind)
+        for field in fields(Sensors)
     }
-    axis = "the angle from the bow to the velocity sensor's forward axis [rad], clockwise"
-    rows |= {
-        "heading_bias_rad": (HalfTurn, 0.0, "the measured heading less the true one [rad]"),
-        "velocity_angle_rad": (HalfTurn, 0.0, axis),
-    }
-    rows |= {
-        fault.key: (Positive if fault.is_gain else Number, fault.neutral, fault.words) for fault in GAINS_AND_OFFSETS
-    }
-    wind = "the kind of wind sensor: components of the relative wind, or its speed and angle"
-    rows["wind_sensor"] = Literal["cartesian", "vane"], "cartesian", wind
-    for sensor, words in SENSORS.items():
-        if sensor in PLACED:
-            place = f"the place of the sensor of {words}"
-            rows[f"{sensor}_forward_m"] = Number, 0.0, f"{place} forward of amidships [m]"
-            rows[f"{sensor}_starboard_m"] = Number, 0.0, f"{place} to starboard of the centre line [m]"
-        rows[f"{sensor}_delay_s"] = NonNegative, 0.0, f"the delay of {words} [s]"
-        between = f"the time between new readings of {words} [s], or 0 for every sample"
-        rows[f"{sensor}_interval_s"] = NonNegative, 0.0, between
-    return {key: (kind, Field(default=default, description=text)) for key, (kind, default, text) in rows.items()}
 
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from nicegui import ui
@@ -83,7 +82,7 @@ class _Manoeuvres:
             if found["note"]:
                 ui.label(found["note"]).classes("quiet")
         self.runs.clear()
-        order = sorted(found["runs"], key=lambda run: (-run["duration_s"], -(run["gain"] or -math.inf)))
+        order = sorted(found["runs"], key=lambda run: (-run["duration_s"], -(run["of_average"] or 0.0)))
         with self.runs:
             for run in order:
                 self._run(run, run["name"] not in found["excluded"])
@@ -93,9 +92,9 @@ class _Manoeuvres:
             ui.checkbox(run["words"], value=is_on, on_change=lambda event: self._switch(run["name"], event.value))
             ui.html(_drawn(run["track"], run["words"]), sanitize=False)
             tells = (
-                "adds nothing beside the others"
-                if run["gain"] is None
-                else f"log det {run['gain']:+.2g} beside the others"
+                "not ranked: all manoeuvres together leave a parameter undetermined"
+                if run["of_average"] is None
+                else f"tells {run['of_average']:.2g} times the average, per second"
             )
             ui.label(f"{words.times(run['repeats'])} {words.duration(run['run_s'])}" if run["repeats"] else "not run")
             ui.label(tells).classes("quiet")

@@ -133,10 +133,8 @@ class _Plan:
         ui.label(mark).classes("mark good" if verified else "mark doubt")
         if content["verdict"].lower() != mark.lower():
             ui.label(content["verdict"])
-        day = content["informative_s"] + content["reposition_s"]
-        ui.label(f"{words.duration(day)}: {words.duration(content['informative_s'])} of runs, "
-                 f"{words.duration(content['reposition_s'])} between them.")  # fmt: skip
-        ui.label(f"Least clearance {words.distance(content['clearance_min_m'])}.")
+        for text in _booked(content):
+            ui.label(text)
         beside = Path(self.shown).parent
         if draft:
             ui.label("A draft is drawn on the chart; nobody sails or plays it.").classes("quiet")
@@ -186,6 +184,27 @@ class _Plan:
         self.site.folder.change(self.scenario, change)
         self.watched.show(self.scenario)
         ui.notify(f"{self.scenario}: {table}.{key} = {value}; plan again")
+
+
+def _booked(plan: dict[str, Any]) -> list[str]:
+    """The time to book, what may go wrong in it, and the clearance."""
+    runs, between, drawn = plan["informative_s"], plan["reposition_s"], plan["drawn_trials"]
+    planned = (
+        f"{words.duration(runs + between)} as planned: {words.duration(runs)} of runs, {words.duration(between)} "
+        "between them."
+    )
+    clearance = f"Least clearance {words.distance(plan['clearance_min_m'])}."
+    if drawn is None:
+        return [planned, clearance]
+    booked = [] if drawn["extra_time_95_s"] is None else [
+        f"Book {words.duration(runs + between + max(0.0, drawn['extra_time_95_s']))}: enough in 95 % of "
+        f"{drawn['trials']} simulated trials."
+    ]  # fmt: skip
+    risks = (
+        f"{words.percent(drawn['leave_water_share'])} of them leave allowed water, "
+        f"{words.percent(drawn['aborted_share'])} are aborted."
+    )
+    return [*booked, planned, risks, clearance]
 
 
 def _place_of(refusal: dict[str, Any] | None) -> dict[str, Any] | None:

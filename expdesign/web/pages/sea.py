@@ -56,7 +56,7 @@ class _Sea:
         """The map on the left, what is on it on the right."""
         with ui.row().classes("two"):
             with ui.column().classes("wide"):
-                self.map = chart_element()
+                self.map = chart_element(("start", "#0a7d4b"), ("goal", "#7a3ea1"), ("drag to turn", "#f5a400"))
                 with ui.row().classes("line"):
                     ui.button("Draw a no-go zone", on_click=self._pen).tooltip("Click corners; end on the first one")
                     ui.button("Undo", on_click=self._undo).props("outline").tooltip(

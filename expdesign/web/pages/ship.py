@@ -8,7 +8,8 @@ from urllib.parse import quote
 from nicegui import ui
 
 from expdesign.scenario.card_file import CardFile
-from expdesign.scenario.vessels.vessel_tables import VesselTable
+from expdesign.scenario.vessels.vessel_file import vessel_of
+from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, VesselTable
 from expdesign.web.forms import Form
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, spelled
@@ -45,10 +46,10 @@ def register(site: Site) -> None:
                 vessel = site.file_of(scenario, "vessel")
                 watched.show(vessel)
                 ui.label(f"The vessel file {vessel}").classes("head2")
-                ui.label(
-                    "Actuators and terms of the model are lists of tables of several kinds: the page Files edits them."
-                ).classes("quiet")
-                Form(site.folder, vessel, VesselTable, changed=lambda: watched.show(vessel)).draw(skip=("actuators",))
+                Form(
+                    site.folder, vessel, VesselTable, kinds={"actuators": ACTUATOR_TABLES}, check=vessel_of,
+                    changed=lambda: watched.show(vessel),
+                ).draw()  # fmt: skip
                 spelled(f"expdesign run {scenario}", f"reads {vessel}")
 
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import tomllib
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
+from expdesign.scenario.scenario_file import changed_entries
 from expdesign.scenario.tables import read_toml
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 
+OF_ANOTHER = ("scenario.vessel =", "scenario.area =")
+"""Changes; a scenario with both is no variant of this trial."""
 FIRST = "[design]\ntotal_s = 1800.0\n"
 
 
@@ -43,13 +46,17 @@ class _Variants:
         ui.label("A variant is a file with only the keys that differ from the scenario, or a whole scenario.").classes(
             "quiet"
         )
-        with ui.element("div").classes("runs"):
-            for name in self._names():
-                with ui.card().classes("run"):
-                    ui.checkbox(name, on_change=lambda event, name=name: self._choose(name, event.value))
-                    for line in self._differences(name):
-                        ui.label(line).classes("quiet")
+        differences = {name: self._differences(name) for name in self._names()}
+        others = [
+            name
+            for name, found in differences.items()
+            if all(any(line.startswith(key) for line in found) for key in OF_ANOTHER)
+        ]
+        self._cards({name: found for name, found in differences.items() if name not in others})
         self._new()
+        if others:
+            with ui.expansion(f"Scenarios of another ship in other waters: {len(others)}").classes("table"):
+                self._cards({name: differences[name] for name in others})
         with ui.row().classes("line"):
             ui.button("Compare", on_click=lambda: self._start(False))
             ui.button("Compare with plans", on_click=lambda: self._start(True)).props("outline").tooltip(
@@ -62,6 +69,15 @@ class _Variants:
                     shown_job(self.site, job, ended=self._ended)
                     return
             self._results()
+
+    def _cards(self, variants: Mapping[str, Sequence[str]]) -> None:
+        """A card for each variant, what it changes below its name."""
+        with ui.element("div").classes("runs"):
+            for name, found in variants.items():
+                with ui.card().classes("run"):
+                    ui.checkbox(name, on_change=lambda event, name=name: self._choose(name, event.value))
+                    for line in found or ["No entry differs."]:
+                        ui.label(line).classes("quiet")
 
     def _names(self) -> list[str]:
         """TOML files of the folder that have tables of a scenario."""
@@ -78,14 +94,9 @@ class _Variants:
                     found.append(name)
         return found
 
-    def _differences(self, name: str) -> list[str]:
-        """What differs, key by key."""
-        own, other = (_flat(read_toml(self.site.folder.path(file))) for file in (self.scenario, name))
-        return [
-            f"{key} = {value!r}, not {own.get(key, 'stated')!r}"
-            for key, value in other.items()
-            if own.get(key) != value
-        ]
+    def _differences(self, name: str) -> tuple[str, ...]:
+        own, other = (read_toml(self.site.folder.path(file)) for file in (self.scenario, name))
+        return changed_entries(own, other)
 
     def _choose(self, name: str, is_on: bool) -> None:
         (self.chosen.add if is_on else self.chosen.discard)(name)
@@ -135,10 +146,3 @@ class _Variants:
             cases = json.loads(path.read_text(encoding="utf-8")).get("cases", [])
             ui.label(f"{len(cases)} cases compared").classes("head2")
             page_of(f"{self.out}/whatif.html")
-
-
-def _flat(tables: dict[str, Any], before: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in tables.items():
-        found |= _flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
-    return found

@@ -63,7 +63,11 @@
   function pen(id) {
     const map = mapOf(id);
     map.off("draw:created");
-    map.on("draw:created", (event) => emitEvent("zone_drawn", event.layer.getLatLngs()[0].map(plain)));
+    map.on("draw:created", (event) => {
+      emitEvent("zone_drawn", event.layer.getLatLngs()[0].map(plain));
+      // The last corner goes away under the finger, whose lifting the map then never sees: it would follow the next touch.
+      setTimeout(() => { map.dragging.disable(); map.dragging.enable(); });
+    });
     new L.Draw.Polygon(map, { allowIntersection: false, shapeOptions: { color: "#a3261c" } }).enable();
   }
 
@@ -186,8 +190,8 @@
       const leg = this.plan.legs[of.leg[k]], degrees = (((heading * 180) / Math.PI) % 360 + 360) % 360;
       const rows = [
         ["time", clock(now)], ["leg", leg ? leg.name : ""], ["heading", `${degrees.toFixed(0).padStart(3, "0")}°`],
-        ["ahead", `${mix("u_mps").toFixed(2)} m/s`], ["to starboard", `${mix("v_mps").toFixed(2)} m/s`],
-        ["turning", `${((mix("r_radps") * 180) / Math.PI).toFixed(2)} °/s`],
+        ["ahead", `${fixed(mix("u_mps"), 2)} m/s`], ["to starboard", `${fixed(mix("v_mps"), 2)} m/s`],
+        ["turning", `${fixed((mix("r_radps") * 180) / Math.PI, 2)} °/s`],
         ...Object.entries(this.plan.commands).map(([name, values]) => [...order(name, values[k])]),
       ];
       const table = document.createElement("dl");
@@ -216,8 +220,11 @@
 
   function order(name, value) {
     const cut = name.lastIndexOf("_"), [unit, factor, decimals] = UNITS[name.slice(cut + 1)] || ["", 1, 3];
-    return [unit ? name.slice(0, cut) : name, `${(value * factor).toFixed(decimals)} ${unit}`];
+    return [unit ? name.slice(0, cut) : name, `${fixed(value * factor, decimals)} ${unit}`];
   }
+
+  // A number without the sign of zero.
+  const fixed = (value, decimals) => value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "");
 
   function clock(seconds) {
     const s = Math.floor(seconds);

@@ -79,7 +79,7 @@ def indices(
 
 
 def _check_place(ship: Vessel, forward_m: float) -> None:
-    stated = [place.forward_m for place in (ship.sensors.position, ship.sensors.velocity) if place.forward_m]
+    stated = [ahead for ahead in (ship.sensors.position_forward_m, ship.sensors.velocity_forward_m) if ahead]
     if forward_m and stated:
         raise InputError(
             f"--antenna-forward-m is {forward_m:g}, expected none where the vessel file states a sensor's place, "

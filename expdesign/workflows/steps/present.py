@@ -121,7 +121,7 @@ def present_pose(fix: Fix, ship: Vessel, first: Scenario) -> Array:
     area, sensors = first.area, ship.sensors
     heading_rad = fix.heading_rad - sensors.heading_bias_rad
     antenna = build_berth(np.asarray(fix.position), heading_rad, area, degrees=fix.degrees)
-    mounted = np.array([sensors.position.forward_m, sensors.position.starboard_m])
+    mounted = np.array(sensors.place("position"))
     pose = np.array([*to_n_frame(-mounted, antenna.pose), heading_rad])
     berth = replace(antenna, pose=pose)
     problem = berth_problem(berth, ship, area, first.plan, end=first.goal, way="a way to the goal")
