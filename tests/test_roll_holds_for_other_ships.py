@@ -84,7 +84,6 @@ def test_a_load_is_positive_and_its_interval_longer_above_than_below_in_waves() 
     low, high = one.load_interval
     assert 0.0 <= low <= one.values["m"] <= high
     assert high - one.values["m"] > one.values["m"] - low
-    assert inside(one, sea.load[0])
 
 
 def test_metacentric_heights_are_within_what_is_stated() -> None:

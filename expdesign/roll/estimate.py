@@ -61,6 +61,7 @@ MOST_ROUNDS = 8  # of instruments and noise models
 SETTLED = 0.1  # change in a round, in standard deviations of each parameter, that ends them
 LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
 LEAST_ROUNDS = 3  # before effects are looked for
+MOST_SCANS = 3  # of all tilts
 SMALL_DEVIATION = 1e-2  # of second derivatives, in standard deviations that a parameter alone would have
 SMALL_STEP = 1e-6  # of derivatives, in typical sizes of the parameters
 UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
@@ -168,11 +169,12 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         settled = len(history) > 1 and _little(problem, theta - before, sensed) and fits == weighted[0].follows
         more, std = missing_sizes(problem, weighted, theta, sensed, left, added)
         settled = settled and bool((np.abs(more) <= 2 * SETTLED * std).all())
-        if unmeasured and TILT not in added and (len(history) == LEAST_ROUNDS or settled) and scans < MOST_TRIES:
+        looked = settled or len(history) in (LEAST_ROUNDS, MOST_ROUNDS)
+        if unmeasured and TILT not in added and looked and scans < MOST_SCANS:
             scans += 1
             tilts = tilts_of(problem, weighted, theta, held)
             if tilts.other:
-                added, theta = [TILT], tilts.theta
+                added, unseen_before, theta = [TILT], [], tilts.theta
                 problem = with_effects(problem, added, np.array([tilts.best_rad]))
                 values, settled = [*sampled(problem, theta)], False
                 continue
@@ -183,7 +185,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
             banned = [place for place in unseen_before if unseen_before.count(place) >= MOST_TRIES]
             new = [] if unseen else missed_effects(problem, weighted, theta, sensed, left, added, banned)
             added, settled = [*added, *new], settled and not new and not unseen
-        if settled or len(history) == MOST_ROUNDS * (1 + bool(added)):
+        if settled or len(history) == MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
             break
         if added:
             more, _ = missing_sizes(problem, weighted, theta, sensed, left, added)

@@ -23,7 +23,7 @@ MOST_RAD, STEP_RAD = 0.052, 0.004  # of the tilts that are tried
 NARROW_RAD = 0.009  # beside a tilt, that counts as the same valley
 CLEAR = 12.0  # sum of squares by which one of so many tilts is better than the others not by chance
 REFINING = 10  # tries between two tilts
-ROUGHLY = 1e-3  # share of a sum of squares within which it is found
+ROUGHLY = 1e-7  # share of a sum of squares within which it is found
 TILT = tuple(EFFECTS).index("tilt")
 
 
@@ -32,19 +32,20 @@ class Tilts:
     """What the sum of squares is at its best beside each tilt."""
 
     best_rad: float  # more than what the problem has
-    gain: float  # by which that is better than no more tilt
-    lead: float  # by which it is better than all tilts that are not near it
+    # gain, lead: by which that is better than no more tilt, and than all tilts that are not near it, in mean squares
+    gain: float
+    lead: float
     theta: Array  # (9,) parameters with it
 
     @property
     def other(self) -> bool:
-        """Whether data show another tilt."""
-        return self.gain > CLEAR
+        """Whether data show another tilt, and none of the others instead."""
+        return min(self.gain, self.lead) > CLEAR
 
     @property
     def told(self) -> bool:
         """Whether data tell that the tilt is the one that the problem has."""
-        return self.lead > CLEAR and not self.other
+        return self.lead > CLEAR >= self.gain
 
 
 def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str]) -> Tilts:
@@ -56,7 +57,7 @@ def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, h
                 part,
                 top=part.top + more * part.effects[:, TILT, 0],
                 slope=part.slope + more * part.effects[:, TILT, 1:],
-                follows=part.spread is not None,
+                follows=part.follows,
             )
             for part in weighted
         ]
@@ -74,4 +75,7 @@ def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, h
     )
     here = float(fine.x) if fine.fun < costs.min() else best
     found, least = at(here)
-    return Tilts(here, cost(0.0) - least, float(costs[np.abs(tried - here) > NARROW_RAD].min()) - least, found)
+    # what the model misses is in all sums of squares
+    size = max(1.0, least / max(sum(len(part.top) for part in weighted) - len(problem.free), 1))
+    lead = float(costs[np.abs(tried - here) > NARROW_RAD].min()) - least
+    return Tilts(here, (cost(0.0) - least) / size, lead / size, found)

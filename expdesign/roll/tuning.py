@@ -15,8 +15,8 @@ class Tuning:
     noise_ratios: tuple[float, ...] = (0.0, *(10.0**power for power in range(-4, 5)), 1e6)
     # least sum of squares over its expected value, beyond which intervals are not to be trusted
     most_surprise: float = 3.0
-    # of instruments, below which noise alone would give as much information, and no interval is trusted
-    least_strength: float = 1.0
+    # of instruments, below which noise alone seems to give nearly as much information, and no interval is trusted
+    least_strength: float = 1.5
 
 
 TUNING = Tuning()
