@@ -1,10 +1,12 @@
 """A ship with a helm that is beside its track is steady on it by the end of a run-up, also when not the nominal one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from expdesign.conventions import wrap_angle
-from expdesign.plan.control import Helmsman, capability
+from expdesign.plan.control import HelmShip, Helmsman, capability
 from expdesign.plan.control.ships import HELM_RUN_UP_HULLS
 from expdesign.plan.monte_carlo.procedure import HEADING_RAD, YAW_RATE_SHARE
 from expdesign.plan.runs import Fleet, Truths
@@ -71,3 +73,62 @@ def test_engine_orders_are_read_from_commands(azimuths: Vessel) -> None:
     np.testing.assert_allclose(helm.drives(helm.rows(orders, 0.2 * orders)), orders, atol=1e-12)
     assert helm.turns_thrust
     assert not open_water(coaster()).ship.approach.helm.turns_thrust
+
+
+PARTICULARS = {
+    "X_uu": -0.00106, "X_vr": 1.49, "X_T1": 0.0026, "X_T2": 0.0026, "X_uT": -0.0015, "Y_uv": -0.015, "Y_vv": -0.026,
+    "Y_ur": -0.5, "Y_T1": 0.0016, "Y_T2": 0.0016, "N_uv": -0.0035, "N_ur": -0.045, "N_rr": -0.6, "N_T1": 1.57e-5,
+    "N_T2": 1.57e-5,
+}  # fmt: skip
+"""Of an offshore vessel of 45 m by published regressions: a small turn grows by itself, and her thrust is modest."""
+
+
+@pytest.fixture(scope="module")
+def lively(azimuths: Vessel) -> tuple[Vessel, HelmShip]:
+    """An offshore vessel that is unstable on her course, and what she can do."""
+    own = dict(zip(azimuths.model.names, azimuths.model.parameters.tolist(), strict=True))
+    vessel = replace(azimuths, model=azimuths.model.with_parameters(own | PARTICULARS))
+    ship = capability(vessel, PlanSettings())
+    tilt, speed = 1e-6, ship.transit_speed_mps
+    columns = [
+        vessel.model.accelerations((speed, *(tilt * unit)), (speed, tilt * unit[0]), ship.approach.inputs)[1:]
+        for unit in np.eye(2)
+    ]
+    assert np.linalg.eigvals(np.array(columns).T / tilt).real.max() > 0.5 * speed / vessel.length_m
+    return vessel, ship
+
+
+def northward(vessel: Vessel, ship: HelmShip, start: list[float], speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
+    """(k, 40, 6) states and (k, 40) engine orders of ships up to 30 % off the nominal one that are to go north."""
+    rng, count = np.random.default_rng(2), 40
+    drawn = vessel.model.parameters * (1.0 + 0.3 * rng.uniform(-1, 1, (count, len(vessel.model.parameters))))
+    truths = Truths(parameters=drawn, current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)))
+    fleet = Fleet(vessel, CALM, truths, state=np.array(start), standing=np.array(ship.approach.inputs), rng=rng)
+    helm, unexplained = Helmsman(vessel=vessel, environment=CALM, ship=ship), np.zeros((count, 3))
+    states, orders = [], []
+    for _ in range(int(25 * vessel.length_m / ship.transit_speed_mps / vessel.sample_time_s)):
+        before = fleet.states
+        desired = np.column_stack([before[:, :2], 0 * before[:, :1], np.full(count, speed_mps), 0 * before[:, :2]])
+        fleet.advance(helm.commands(desired, before, fleet.given, unexplained=unexplained))
+        unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
+        states.append(fleet.states.copy())
+        orders.append(ship.approach.helm.drives(fleet.given))
+    return np.array(states), np.array(orders)
+
+
+def test_ships_that_are_unstable_on_their_course_come_to_it_and_keep_it(lively: tuple[Vessel, HelmShip]) -> None:
+    vessel, ship = lively
+    speed = ship.transit_speed_mps
+    states, _ = northward(vessel, ship, [0.0, 0.0, np.radians(30.0), speed, 0.0, 0.0], speed)
+    assert np.mean(np.abs(wrap_angle(states[-1, :, 2])) < HEADING_RAD) > 0.95
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_azimuths_stop_a_turn_before_they_slow_her_down(lively: tuple[Vessel, HelmShip], side: float) -> None:
+    """Without the thrust that steers, she would turn on until she goes another way."""
+    vessel, ship = lively
+    turning = [0.0, 0.0, 0.0, ship.transit_speed_mps, -0.6 * side, 0.03 * side]
+    states, orders = northward(vessel, ship, turning, 0.5 * ship.transit_speed_mps)
+    assert np.median(np.abs(wrap_angle(states[:, :, 2])).max(axis=0)) < np.radians(30.0)
+    assert (orders[:12] > 0.0).all()
+    assert np.abs(states[-1, :, 3] / ship.transit_speed_mps - 0.5).max() < 0.2

@@ -197,6 +197,10 @@ SENSORS = {
     "wind": "the wind",
 }
 """Sensor -> what it measures."""
+READINGS = {
+    "position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates", "wind": "winds",
+}  # fmt: skip
+"""Sensor -> its readings in words."""
 
 
 def _std(of: str) -> Any:

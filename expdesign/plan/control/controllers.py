@@ -7,19 +7,20 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy
 
-from expdesign.conventions import wrap_angle
+from expdesign.conventions import OUTPUTS, wrap_angle
 from expdesign.plan.control.helm_capability import SteadyTurn
 from expdesign.simulation import Approach
 from expdesign.values import Array
 from expdesign.vessel import Allocator, Vessel, required_push
 
-# natural frequency of courses in that of a hull length at transit speed, and their damping
-COURSE_FREQUENCY, COURSE_DAMPING = 1.2, 0.9
+COURSE_FREQUENCY = 1.2  # in that of a hull length at transit speed; a heading error and its square are worth as much
 COARSE = 1e-2  # acceleration that commands may miss, in those of full thrust: the next sample makes it good
 HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
 HELM_TILT_RAD = 0.1  # to both sides, by which the effect of thrust that is turned is measured
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
+KICK_RAD = 0.1  # heading error from which, or from as much yaw rate and sway, steering comes before speed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,6 +82,8 @@ class ForceController:
 
 ORDERS = np.linspace(-1.0, 1.0, 9)
 """Engine orders compared."""
+KICKS = np.linspace(0.0, 1.0, 9)
+"""Engine orders ahead compared where the helm needs thrust."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,9 +103,12 @@ class HelmController:
     def commands(self, demand: Demand) -> Array:
         """(n, m) desired actuator values."""
         speed, course = self._pointed(demand)
-        desired = np.column_stack([speed, course - demand.states[:, 2], demand.reference[:, 5]])
-        angle = self._helm(desired, demand.moving, demand.unexplained, demand.standing)
-        drive = self._drive(desired[:, 0], demand.moving, angle, demand.unexplained[:, 0])
+        rate, moving, unexplained = demand.reference[:, 5], demand.moving, demand.unexplained
+        missing = self._missing(course - demand.states[:, 2], rate, moving) - unexplained[:, 2]
+        angle = self._helm(rate, missing, moving, demand.standing)
+        drive = self._drive(speed, moving, angle, unexplained[:, 0])
+        if self.approach.helm.turns_thrust:
+            drive = self._kicked(drive, np.where(speed > 0.0, np.abs(missing), 0.0), moving)
         return np.asarray(self.approach.helm.rows(drive, angle))
 
     def _pointed(self, demand: Demand) -> tuple[Array, Array]:
@@ -124,17 +130,30 @@ class HelmController:
         """Time of a hull length at transit speed [s]."""
         return self.vessel.length_m / self.transit_speed_mps
 
-    def _helm(self, desired: Array, moving: Array, unexplained: Array, standing: Array) -> Array:
-        """(n,) helm angles: those of steady turns, and more or less by what is missing in heading and yaw rate."""
+    def _missing(self, turn: Array, rate: Array, moving: Array) -> Array:
+        """(n,) yaw accelerations that heading, sway and yaw rate ask for [rad/s2].
+
+        Args:
+            turn: (n,) from the heading to the desired one [rad].
+            rate: (n,) desired yaw rates [rad/s].
+            moving: (n, 3) velocities through water.
+        """
+        rates, sways, _ = self._turns
+        by_heading, by_sway, by_rate = self._gains
+        turn = np.clip(wrap_angle(turn), -HELM_FARTHEST_RAD, HELM_FARTHEST_RAD)
+        sway = np.interp(rate, rates, sways)
+        return np.asarray(by_heading * turn + by_sway * (sway - moving[:, 1]) + by_rate * (rate - moving[:, 2]))
+
+    def _helm(self, rate: Array, missing: Array, moving: Array, standing: Array) -> Array:
+        """(n,) helm angles: those of steady turns at yaw rates (n,), and more or less for what is missing (n,)."""
         approach = self.approach
-        quick = COURSE_FREQUENCY / self._pace_s
-        turn = np.clip(wrap_angle(desired[:, 1]), -HELM_FARTHEST_RAD, HELM_FARTHEST_RAD)
-        damping = 2 * COURSE_DAMPING * quick - self._own_damping
-        missing = quick**2 * turn + damping * (desired[:, 2] - moving[:, 2]) - unexplained[:, 2]
+        rates, _, angles = self._turns
         effect = self._helm_effect * np.maximum(moving[:, 0] / self.transit_speed_mps, HELM_SLOWEST) ** 2
-        change = np.interp(desired[:, 2], *self._turns) + missing / effect
-        if self.approach.helm.turns_thrust:
-            change *= effect / self._effects_of_thrust(moving, standing)
+        change = np.interp(rate, rates, angles) + missing / effect
+        if approach.helm.turns_thrust:
+            found = self._effects_of_thrust(approach.helm.drives(standing), moving)
+            least = HELM_SLOWEST**2 * self._helm_effect
+            change *= effect / np.where(found < 0.0, np.minimum(found, -least), np.maximum(found, least))
         return np.asarray(approach.angle_rad + approach.starboard * np.clip(change, -self._hardest, self._hardest))
 
     def _drive(self, speed: Array, moving: Array, angle: Array, unexplained: Array) -> Array:
@@ -150,46 +169,87 @@ class HelmController:
         share = np.clip((desired - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
         return np.asarray(ORDERS[above - 1] + share * (ORDERS[above] - ORDERS[above - 1]))
 
+    def _kicked(self, drive: Array, missing: Array, moving: Array) -> Array:
+        """(n,) engine orders at which the helm, hard over, gives yaw accelerations (n,) that a course far off asks for.
+
+        Thrust that is turned steers by its size: a mate does not slow down, or go astern, out of a turn that he must
+        stop, but kicks ahead.
+        """
+        ships = np.flatnonzero(missing > self._gains[0] * KICK_RAD)
+        if not len(ships):
+            return drive
+        given = self._effects_of_thrust(np.repeat(KICKS[:, None], len(ships), axis=1), moving[ships])
+        weak = (given * self._hardest < missing[ships]).sum(axis=0)
+        kicked = drive.copy()
+        kicked[ships] = np.maximum(drive[ships], KICKS[np.minimum(weak, len(KICKS) - 1)])
+        return kicked
+
     @cached_property
     def _hardest(self) -> float:
         approach = self.approach
         return float(approach.helm.hardest(approach.drive) - abs(approach.angle_rad))
 
-    @cached_property
-    def _helm_effect(self) -> float:
-        """Yaw acceleration per helm angle on the straight approach [1/s2]."""
-        approach, tilt = self.approach, 1e-3
-        motion = tuple(approach.velocity.tolist())
-        sides = [
-            approach.helm.acceleration(motion, approach.drive, approach.angle_rad + side * approach.starboard * tilt)[2]
-            for side in (1, -1)
-        ]
-        return max(float(sides[0] - sides[1]) / (2 * tilt), 1e-12)
+    def _effects_of_thrust(self, order: Array, moving: Array) -> Array:
+        """(..., n) yaw acceleration per helm angle of thrust that is turned: none at idle, the other way round astern.
 
-    def _effects_of_thrust(self, moving: Array, standing: Array) -> Array:
-        """(n,) yaw acceleration per helm angle of thrust that is turned: none at idle, the other way round astern."""
-        helm, tilt = self.approach.helm, HELM_TILT_RAD
-        order, motion = helm.drives(standing), tuple(moving.T)
+        Args:
+            order: (..., n) engine orders.
+            moving: (n, 3) velocities through water.
+        """
+        helm, tilt, motion = self.approach.helm, HELM_TILT_RAD, tuple(moving.T)
         sides = [
             self.vessel.model.accelerations(
                 motion, motion[:2], tuple(np.moveaxis(helm.rows(order, self.approach.angle_rad + angle), -1, 0))
             )[2]
-            for angle in self.approach.starboard * np.array([[tilt], [-tilt]])
+            for angle in self.approach.starboard * np.array([tilt, -tilt])
         ]
-        found = (sides[0] - sides[1]) / (2 * tilt)
-        least = HELM_SLOWEST**2 * self._helm_effect
-        return np.asarray(np.where(found < 0.0, np.minimum(found, -least), np.maximum(found, least)))
+        return np.asarray((sides[0] - sides[1]) / (2 * tilt))
 
     @cached_property
-    def _own_damping(self) -> float:
-        """What the ship herself damps yaw rates by, sway following [1/s]; negative for course-unstable ones."""
-        rates, angles = self._turns
-        nearest = int(np.abs(rates[rates != 0.0]).argmin())
-        return float(self._helm_effect * angles[rates != 0.0][nearest] / rates[rates != 0.0][nearest])
+    def _gains(self) -> Array:
+        """(3,) yaw acceleration by heading error [1/s2], by that of sway [rad/(m s)] and by that of yaw rate [1/s].
+
+        Those of the linear quadratic regulator of the straight approach, which holds ships that are unstable on their
+        course as well: a yaw acceleration of the square of the course's frequency costs as much as a radian of heading.
+        Source: B. D. O. Anderson and J. B. Moore, Optimal Control: Linear Quadratic Methods (1990), section 3.2.
+        """
+        used = [0, *(OUTPUTS.index(name) for name in self.vessel.model.outputs if name != "u")]
+        rates = np.zeros((3, 3))
+        rates[0, 2] = 1.0
+        rates[1:, 1:], push = self._sway_and_yaw
+        by_yaw = np.r_[0.0, push[0] / self._helm_effect, 1.0][used, None]
+        worth = np.diag([1.0] + [0.0] * (len(used) - 1))
+        dear = np.array([[(self._pace_s / COURSE_FREQUENCY) ** 4]])
+        cost = scipy.linalg.solve_continuous_are(rates[np.ix_(used, used)], by_yaw, worth, dear)
+        gains = np.zeros(3)
+        gains[used] = (by_yaw.T @ cost / dear)[0]
+        return gains
 
     @cached_property
-    def _turns(self) -> tuple[Array, Array]:
-        """Yaw rates of steady turns, and changes of helm that hold them."""
-        rows = sorted([(turn.yaw_rate_radps, turn.helm_rad) for turn in self.turns] + [(0.0, 0.0)])
-        rates, angles = np.array(rows).T
-        return rates, angles
+    def _sway_and_yaw(self) -> tuple[Array, Array]:
+        """(2, 2) derivatives of the accelerations of sway and yaw by these velocities, (2,) by helm, straight ahead."""
+        approach = self.approach
+        velocity, straight = np.array(approach.velocity), approach.angle_rad
+        steps = 1e-3 * approach.speed_mps * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0 / self.vessel.length_m]])
+        tilt = 1e-3 * approach.starboard
+
+        def pushed(motion: Array, angle_rad: float) -> Array:
+            return np.array(approach.helm.acceleration(tuple(motion.tolist()), approach.drive, angle_rad))[1:]
+
+        by_motion = [
+            (pushed(velocity + step, straight) - pushed(velocity - step, straight)) / (2 * step.sum()) for step in steps
+        ]
+        by_helm = (pushed(velocity, straight + tilt) - pushed(velocity, straight - tilt)) / 2e-3
+        return np.array(by_motion).T, by_helm
+
+    @cached_property
+    def _helm_effect(self) -> float:
+        """Yaw acceleration per helm angle on the straight approach [1/s2]."""
+        return max(float(self._sway_and_yaw[1][1]), 1e-12)
+
+    @cached_property
+    def _turns(self) -> tuple[Array, Array, Array]:
+        """Yaw rates of steady turns, their sway, and changes of helm that hold them."""
+        rows = sorted([(turn.yaw_rate_radps, turn.sway_mps, turn.helm_rad) for turn in self.turns] + [(0.0, 0.0, 0.0)])
+        rates, sways, angles = np.array(rows).T
+        return rates, sways, angles
