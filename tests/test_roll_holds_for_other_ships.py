@@ -72,7 +72,7 @@ def test_a_tilt_that_nobody_measured_is_found_in_waves_or_takes_the_trust_in_wha
         value, std = one.effects["tilt"]
         assert abs(value - np.radians(sea.tilt_deg)) < 4 * std
     else:
-        assert one.by_tilt == ("K_r", "K_vd") or not one.trusted
+        assert one.by_tilt == ("d", "K_r", "K_vd", "K_delta") or not one.trusted
 
 
 @pytest.mark.thorough
@@ -111,5 +111,10 @@ def test_what_an_unknown_tilt_moves_is_not_trusted_and_the_rest_is() -> None:
     blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
     content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="", version="")
     assert one.trusted
-    assert any(text.startswith("K_r and K_vd are not to be trusted") for text in roll_sentences(content))
-    assert [row[0] for row in parameter_rows(content) if "none to be trusted" in row[3]] == ["K_r", "K_vd"]
+    assert any(text.startswith("d, K_r, K_vd, K_delta are not to be trusted") for text in roll_sentences(content))
+    assert [row[0] for row in parameter_rows(content) if "none to be trusted" in row[3]] == [
+        "d",
+        "K_r",
+        "K_vd",
+        "K_delta",
+    ]

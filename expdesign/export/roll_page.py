@@ -144,7 +144,7 @@ def _sentences(content: RollContent) -> Iterator[str]:
         )
     if estimate.trusted and estimate.by_tilt:
         yield (
-            f"{' and '.join(estimate.by_tilt)} are not to be trusted, as nothing tells how the sensor is tilted: other "
+            f"{', '.join(estimate.by_tilt)} are not to be trusted, as nothing tells how the sensor is tilted: other "
             "tilts fit as well, with other values of these. The load and metacentric heights hardly mind. Measure the "
             "tilt and state sensor_tilt_deg."
         )

@@ -62,6 +62,7 @@ SETTLED = 0.1  # change in a round, in standard deviations of each parameter, th
 LEAST_UNANSWERED = 0.05  # chance without feedback, below which the rudder is said to answer roll
 LEAST_ROUNDS = 3  # before effects are looked for
 MOST_SCANS = 3  # of all tilts
+BY_TILT = ("d", "K_r", "K_vd", "K_delta")  # parameters that an unknown tilt moves
 SMALL_DEVIATION = 1e-2  # of second derivatives, in standard deviations that a parameter alone would have
 SMALL_STEP = 1e-6  # of derivatives, in typical sizes of the parameters
 UNSEEN = 1e-9  # relative sensitivity below which the equations themselves leave a direction open
@@ -127,7 +128,7 @@ class RollEstimate:
     @property
     def by_tilt(self) -> tuple[str, ...]:
         """Free parameters that may be far off, as nothing tells how the sensor is tilted, while the others are not."""
-        return () if self.tilt_told else tuple(name for name in ("K_r", "K_vd") if name in self.problem.free)
+        return () if self.tilt_told else tuple(name for name in BY_TILT if name in self.problem.free)
 
     @property
     def weak(self) -> bool:
