@@ -314,13 +314,13 @@ def test_a_cause_with_fewer_numbers_comes_before_one_that_imitates_many():
 def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data_better():
     """By more than a point, or by less where it is about as likely; one of the same cause is no rival.
 
-    One with as many numbers is a rival where it is about as likely, and comes first where it is better by a point. Any
-    other comes first where it is better by five. Of the same cause only one with fewer numbers is a rival, where it is
-    about as likely.
+    One with as many numbers is a rival where it is about as likely, and comes first where it is better by a point for
+    certain. Any other comes first where it is better by five. Of the same cause only one with fewer numbers is a rival,
+    where it is about as likely.
     """
     about, less = (100.0 * (ABOUT_AS_LIKELY + more) for more in (0.01, -0.01))
 
-    def item(cause: str, numbers: int, fit_percent: float, gain: float) -> SimpleNamespace:
+    def item(cause: str, numbers: int, fit_percent: np.ndarray | float, gain: float) -> SimpleNamespace:
         candidate = Candidate(cause=cause, free={})
         return SimpleNamespace(candidate=candidate, numbers=numbers, fit=fit_percent, likelihood_gain=gain)
 
@@ -342,6 +342,10 @@ def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data
         accepted = [wind, item("wind", 1, 90.0, less), item("current", 3, 64.0, less), rival]
         chosen = _best_on_held_out(wind, accepted, validation)  # type: ignore[arg-type,list-item]
         assert chosen is (rival if better else wind)
+    apart = np.array([[-9.0], [-9.0], [-9.0], [9.0], [9.0], [9.0]])  # better on average, and perhaps not
+    for numbers, better in ((1, True), (3, False), (4, False)):
+        rival = item("actuator_scale", numbers, 66.0 + apart, about)
+        assert (_best_on_held_out(wind, [wind, rival], validation) is rival) == better  # type: ignore[arg-type,list-item]
     one = item("wind", 1, 59.5, about)
     for fewer in (item("wind", 3, 90.0, about), item("wind", 1, 58.5, about), one):
         assert (_best_on_held_out(wind, [wind, fewer], validation) is fewer) == (fewer is one)  # type: ignore[arg-type,list-item]

@@ -57,7 +57,7 @@ def test_a_headline_gives_the_few_numbers_of_a_cause_and_what_the_file_says():
     assert verdict([one], BEFORE).startswith(f"The simulation lacks the correct value of X_abs_u_u ({sizes}). ")
     flow = [Estimate(name=name, value=0.1, std=0.02, unit="m/s") for name in ("north_mps", "east_mps")]
     current = replace(finding("current"), estimates=tuple(flow))
-    sizes = "north_mps 0.100 \N{PLUS-MINUS SIGN} 0.020, east_mps 0.100 \N{PLUS-MINUS SIGN} 0.020"
+    sizes = "0.100 \N{PLUS-MINUS SIGN} 0.020 m/s to north, 0.100 \N{PLUS-MINUS SIGN} 0.020 m/s to east"
     assert f"lacks a current ({sizes})" in verdict([current], BEFORE)
     assert "lacks a current." in verdict([replace(current, estimates=(*flow, drag))], BEFORE)  # the table has them all
     unknown = replace(current, estimates=(replace(drag, value=np.nan),))

@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from expdesign.assessment import EstimateOptions, assess, settled
+from expdesign.assessment.actuator_times import with_held_noted
 from expdesign.cli import main
+from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import drive_of
 from expdesign.estimation.replay import Stretches, compiled
 from expdesign.export import vessel_toml
-from expdesign.reduction import reduced
+from expdesign.reduction import TIMES, reduced
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record
 from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
 from expdesign.simulation.run import SUBSTEPS
-from expdesign.vessel import Sensors, Vessel, response_values, with_response_values
+from expdesign.vessel import Sensors, Vessel, response_values, std_keys, with_response_values
 from step_case import GUESS, INPUTS, TRUTH, write_csv
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -175,6 +177,28 @@ def test_times_are_written_with_their_standard_deviation_and_named(tmp_path: Pat
         assert report["nuisance"][name]["value"] == pytest.approx(response_values(found.actuators)[name])
         assert report["nuisance"][name]["std"] == pytest.approx(found.std[name])
         assert any(name in line for line in report["warnings"])
+
+
+UNSURE = replace(CRAFT, std=dict.fromkeys([name for name in std_keys(CRAFT.actuators) if "_rate" not in name], 0.01))
+
+
+def test_stated_errors_that_no_standard_deviation_counts_are_named() -> None:
+    """Every quantity that may have a standard deviation, of sensors that the data come from, but for times."""
+    run = measured_run(1, holds=8, quiet=False)
+    found = estimate(run, CRAFT.model, method="ls")
+    told = with_held_noted(found, run, UNSURE).warnings[-1]
+    for name in UNSURE.std:
+        unseen = name == "heading_bias_rad" or name.startswith("position_")
+        counted = name.startswith(INPUTS) and name.endswith(TIMES)
+        assert (f" {name}" in told.replace(":", ",")) == (not unseen and not counted), name
+    assert with_held_noted(found, run, CRAFT).warnings == found.warnings
+
+
+@pytest.mark.thorough
+def test_an_assessment_names_stated_errors_that_it_holds() -> None:
+    run = measured_run(1, holds=8, quiet=False)
+    done = assess(UNSURE, run, EstimateOptions(methods=("ls",), mean="none"))
+    assert sum("are held" in note for note in done.methods[0].estimate.warnings) == 1
 
 
 @pytest.mark.slow

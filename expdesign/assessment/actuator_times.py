@@ -20,7 +20,8 @@ from expdesign.estimation.values import Estimate
 from expdesign.reduction import TIMES, reduced
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
-from expdesign.vessel import RATE_UNITS, Vessel, response_values, stem, with_response_values
+from expdesign.vessel import RATE_UNITS, Sensors, Vessel, response_values, stem, with_response_values
+from expdesign.vessel.quantities import rows_of
 
 MOST_DELIVERIES = 5  # how often data are delivered with new dead times and lags, at most
 SETTLED_CHANGE = 0.5  # change of such a time, in its standard deviations, below which it is not delivered again
@@ -170,3 +171,24 @@ def with_times_noted(found: Estimate, record: Record, stated: Vessel, vessel: Ve
     values = dict(zip(found.nuisance_names, found.nuisance_values.tolist(), strict=True))
     values |= {name: time for name, (time, _) in times.items()}
     return replace(found, nuisance_values=np.array(list(values.values())), warnings=(*found.warnings, note))
+
+
+def with_held_noted(found: Estimate, record: Record, stated: Vessel) -> Estimate:
+    """An estimate with a sentence on stated errors that its standard deviations leave out: all but those of times.
+
+    Args:
+        found: from the record.
+        record: which a sensor shows whose errors count.
+        stated: as the vessel's file has it.
+    """
+    sensed, responses = {row.key: row for row in rows_of(Sensors)}, response_values(stated.actuators)
+    held = [
+        name
+        for name, std in stated.std.items()
+        if std > 0 and not (name in responses and name.endswith(TIMES))
+        and (name not in sensed or any(sensed[name].is_shown(batch.derived) for batch in record.batches))
+    ]  # fmt: skip
+    if not held:
+        return found
+    note = f"Standard deviations do not count the errors of {', '.join(held)}: the values in the vessel file are held."
+    return replace(found, warnings=(*found.warnings, note))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from expdesign.assessment.actuator_times import (
     delivered_anew,
     found_times,
+    with_held_noted,
     with_times,
     with_times_noted,
 )
@@ -225,7 +226,7 @@ def _assessed(work: Work, tests: Record, trial: Trial) -> Assessed:
         found = with_prior(found, vessel.model)
     wind = USES_WIND[method.predictor]
     now = with_times(vessel, found_times(found, vessel))
-    found = with_times_noted(found, record, work.stated, vessel)
+    found = with_held_noted(with_times_noted(found, record, work.stated, vessel), record, work.stated)
     model = found.model(now.model)
     runs = [
         check_run(model, batch, use=use, wind=wind, integration=options.integration)

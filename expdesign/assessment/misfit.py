@@ -1,17 +1,4 @@
-"""The misfit of a simulated run: one-step residuals, the run from its first measured state, the causes of its error.
-
-The causes of misfit of a simulated run: a decomposition of the simulation error.
-
-With y measured, x simulated and f one step of the model, the misfit e = y - x obeys
-
-    e(k+1) = A(k) e(k) + eps(k)        eps(k) = y(k+1) - f(y(k)), A(k) the slope of f half-way between y(k) and x(k)
-
-so it is the sum of the propagated parts of the one-step residuals eps: their mean over the run (a constant unmodelled
-force, or a wrong parameter with the same effect), their slow part (gusts, current, missing terms), and the rest
-(measurement noise, fast disturbances). Shares are projections on the misfit and add up to one, apart from the error of
-the half-way slope. The same slopes give the growth of an initial error. Where it grows, the ship is unstable under the
-recorded inputs, for any model: the recorded steering stabilised her, but the simulation does not react to the motion.
-"""
+"""The misfit of a simulated run: one-step residuals, the run from its first measured state, the causes of its error."""
 
 from __future__ import annotations
 
@@ -97,6 +84,17 @@ def _simulated(model: VesselModel, batch: Batch, *, wind: bool, integration: Int
 
 
 # The causes of misfit of a simulated run: a decomposition of the simulation error.
+#
+# With y measured, x simulated and f one step of the model, the misfit e = y - x obeys
+#
+#     e(k+1) = A(k) e(k) + eps(k)        eps(k) = y(k+1) - f(y(k)), A(k) the slope of f half-way between y(k) and x(k)
+#
+# so it is the sum of the propagated parts of the one-step residuals eps: their mean over the run (a constant unmodelled
+# force, or a wrong parameter with the same effect), their slow part (gusts, current, missing terms), and the rest
+# (measurement noise, fast disturbances). Shares are projections on the misfit and add up to one, apart from the error
+# of the half-way slope. The same slopes give the growth of an initial error. Where it grows, the ship is unstable under
+# the recorded inputs, for any model: the recorded steering stabilised her, but the simulation does not react to the
+# motion.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

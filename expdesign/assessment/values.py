@@ -1,17 +1,4 @@
-"""Options and results of an estimation, and what the vessel file knew before the data.
-
-An estimate together with what the vessel file knew before the data.
-
-Values and covariances of both, independent of each other, are joined by their information; in gain form, for nuisance
-parameters too:
-
-    K = C_: (C + P)^-1          x + K (theta_0 - theta)          C_:: - K C_:'
-
-with the estimate theta and covariance C of the parameters, all numbers x and their covariance C_::, columns C_: of the
-parameters, and the prior theta_0 with P.
-
-Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
-"""
+"""Options and results of an estimation, and what the vessel file knew before the data."""
 
 from __future__ import annotations
 
@@ -120,6 +107,16 @@ class Assessment:
 
 
 # An estimate together with what the vessel file knew before the data.
+#
+# Values and covariances of both, independent of each other, are joined by their information; in gain form, for nuisance
+# parameters too:
+#
+#     K = C_: (C + P)^-1          x + K (theta_0 - theta)          C_:: - K C_:'
+#
+# with the estimate theta and covariance C of the parameters, all numbers x and their covariance C_::, columns C_: of
+# the parameters, and the prior theta_0 with P.
+#
+# Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
 
 NONE, PARAMETER_STD = "none", "parameter_std"
 PRIORS = (NONE, PARAMETER_STD)

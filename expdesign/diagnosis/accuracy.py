@@ -1,11 +1,4 @@
-"""Accuracy of the simulation, one-step residuals, and excitation by the inputs.
-
-One-step residuals of a model, and the variables that they may depend on.
-
-Each stretch of a few samples is simulated from its own measured state. The rate at which measured and simulated
-velocity diverge is the acceleration that the model lacks: a one-step residual, taken over several samples because of
-the measurement noise. No cause is assumed.
-"""
+"""Accuracy of the simulation, one-step residuals, and excitation by the inputs."""
 
 from __future__ import annotations
 
@@ -206,6 +199,10 @@ class Accuracy:
 
 
 # One-step residuals of a model, and the variables that they may depend on.
+#
+# Each stretch of a few samples is simulated from its own measured state. The rate at which measured and simulated
+# velocity diverge is the acceleration that the model lacks: a one-step residual, taken over several samples because of
+# the measurement noise. No cause is assumed.
 
 TINY = 1e-300
 

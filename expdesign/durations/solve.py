@@ -2,15 +2,6 @@
 
 The concave problem is solved by `maximise`. The certificate is computed from the problem alone; a design without one is
 not returned.
-
-Recorded or noisy primitives: B_q is not symmetric, and |det B(w)| is not concave in logarithm.
-
-The symmetric part gives a concave problem. Where sym B is positive definite, det(sym B) <= |det B|, so its optimum is
-a guaranteed value. A local search from there improves |det B| itself, without a certificate. Where no fractions make
-sym B positive definite, only the local search remains.
-
-Source: A. M. Ostrowski and O. Taussky, On the variation of the determinant of a positive definite matrix, Indagationes
-Math. 13 (1951), 383-385; F. Ljungberg, doctoral thesis, Linköping University, (7.57), (7.9).
 """
 
 from __future__ import annotations
@@ -55,6 +46,13 @@ TIGHTENED = (1.05, 1.15, 1.3, 1.6)  # factors on least information with which sh
 
 
 # Recorded or noisy primitives: B_q is not symmetric, and |det B(w)| is not concave in logarithm.
+#
+# The symmetric part gives a concave problem. Where sym B is positive definite, det(sym B) <= |det B|, so its optimum is
+# a guaranteed value. A local search from there improves |det B| itself, without a certificate. Where no fractions make
+# sym B positive definite, only the local search remains.
+#
+# Source: A. M. Ostrowski and O. Taussky, On the variation of the determinant of a positive definite matrix,
+# Indagationes Math. 13 (1951), 383-385; F. Ljungberg, doctoral thesis, Linköping University, (7.57), (7.9).
 
 
 def definite_start(problem: DurationProblem, polytope: Polytope) -> Array | None:

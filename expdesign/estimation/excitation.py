@@ -1,28 +1,4 @@
-"""The excitation condition, and the samples of each equation that meet it.
-
-The excitation condition: values inside a modulus keep their sign and exceed the worst noise.
-
-Then moduli are signs, the noise enters the equations as in a polynomial model, and zero-mean instruments remove what it
-leaves. The check goes sample by sample and says which ones break the condition.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8), (5.54), (5.72), (5.77).
-
-Samples of each equation: those at which what stands inside its moduli keeps its sign.
-
-The moduli of an equation are those of its own terms: of the manoeuvring model, surge has |u|, sway and yaw have |v|.
-Where |u| is clear of zero and |v| is not, a sample is good for surge alone. Every equation therefore has its own
-samples, its own mean of instruments over them, and its own equations to solve.
-
-Samples are chosen by the signals that instruments are simulated from, which owe nothing to the noise of the sample.
-(Chosen by measured velocities, those whose noise is large would be chosen more often near the margin.) Least squares,
-which has no instruments, goes by measured ones.
-
-The mean of a square's noise changes its sign with the modulus. Samples on either side of zero therefore have a mean of
-instruments of their own, or, which is the same, a constant of their own (Lemma 7.1). Nuisance regressors change their
-signs with the modulus, too; they have one sign in a batch, and only samples on that side are used.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, 5.6, (5.72), (5.77).
-"""
+"""The excitation condition, and the samples of each equation that meet it."""
 
 from __future__ import annotations
 
@@ -55,6 +31,11 @@ WORST_CASE_SIGMAS = 3.0  # standard deviations of Gaussian noise in the excitati
 
 
 # The excitation condition: values inside a modulus keep their sign and exceed the worst noise.
+#
+# Then moduli are signs, the noise enters the equations as in a polynomial model, and zero-mean instruments remove what
+# it leaves. The check goes sample by sample and says which ones break the condition.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, assumptions A5 and A7, (5.8), (5.54), (5.72), (5.77).
 
 STATES = ("u", "v", "r", *AIR)
 
@@ -235,6 +216,20 @@ def _spans(rows: Integers, most: int = 5) -> str:
 
 
 # Samples of each equation: those at which what stands inside its moduli keeps its sign.
+#
+# The moduli of an equation are those of its own terms: of the manoeuvring model, surge has |u|, sway and yaw have |v|.
+# Where |u| is clear of zero and |v| is not, a sample is good for surge alone. Every equation therefore has its own
+# samples, its own mean of instruments over them, and its own equations to solve.
+#
+# Samples are chosen by the signals that instruments are simulated from, which owe nothing to the noise of the sample.
+# (Chosen by measured velocities, those whose noise is large would be chosen more often near the margin.) Least squares,
+# which has no instruments, goes by measured ones.
+#
+# The mean of a square's noise changes its sign with the modulus. Samples on either side of zero therefore have a mean
+# of instruments of their own, or, which is the same, a constant of their own (Lemma 7.1). Nuisance regressors change
+# their signs with the modulus, too; they have one sign in a batch, and only samples on that side are used.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, 5.6, (5.72), (5.77).
 
 ALL, EQUATION_WISE = "all", "equation-wise"
 SAMPLES = (ALL, EQUATION_WISE)

@@ -1,9 +1,4 @@
-"""The result of an estimation.
-
-Fit of a simulated output to a measured one.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (6.4).
-"""
+"""The result of an estimation."""
 
 from __future__ import annotations
 
@@ -93,6 +88,8 @@ class Estimate:
 
 
 # Fit of a simulated output to a measured one.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (6.4).
 
 
 def fit_percent(measured: Array, simulated: Array) -> Array:

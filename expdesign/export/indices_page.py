@@ -1,9 +1,4 @@
-"""The form as one page that prints on paper.
-
-The reporting form: ship, conditions, and results to port and to starboard beside the criterion.
-
-Source: IMO MSC/Circ.1053 (2002), appendix 6, form for reporting manoeuvring data to IMO.
-"""
+"""The form as one page that prints on paper."""
 
 from __future__ import annotations
 
@@ -18,6 +13,8 @@ from expdesign.export.words import speed
 from expdesign.indices import DEPTH_BY_DRAUGHT, HIGHEST_SEA, STRONGEST_WIND, Circle, Stop, Verdict, ZigZag, beaufort
 
 # The reporting form: ship, conditions, and results to port and to starboard beside the criterion.
+#
+# Source: IMO MSC/Circ.1053 (2002), appendix 6, form for reporting manoeuvring data to IMO.
 
 GROUPS = (
     ("Turning circle", (("advance_m", "Advance"), ("tactical_diameter_m", "Tactical diameter"))),

@@ -39,11 +39,11 @@ from expdesign.kinematics.instruments import (
     stretches,
 )
 from expdesign.kinematics.relation import CERTAIN, relation
-from expdesign.reduction import at_reference_point, with_delivered_inputs
+from expdesign.reduction import at_reference_point, readings_by_sensor, with_delivered_inputs
 from expdesign.signals import Batch, Record
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Sensors, Vessel, VesselModel, column_name
-from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, LOG, READINGS, SENSORS
 
 FASTER = 1.2  # multiple of a stated rate above which an input moves faster than stated
 RAMP, FEWEST_RAMPS = 3, 3  # samples of an even movement, and how many of them tell
@@ -191,10 +191,6 @@ def _answers(batch: Batch, model: VesselModel, axis: int, places: Sequence[int],
 DRIFTS = 0.2  # that distance of ships, at least, from which the drift is expected
 
 
-SIGNALS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
-           "wind": "winds"}  # fmt: skip
-
-
 SCALES = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if row.is_gain}
 """Findings that are undone -> columns of the velocity that are divided by them."""
 OFFSETS = {row.key: tuple(map(OUTPUTS.index, row.signals)) for row in GAINS_AND_OFFSETS if not row.is_gain}
@@ -270,7 +266,7 @@ def _corrected(batch: Batch, found: Sequence[Finding]) -> Batch:
 
 def in_stated_time(record: Record, sensors: Sensors) -> Record:
     """The record with signals read at the stated intervals of their sensors, for models that know no intervals."""
-    intervals: dict[str, Any] = {key: getattr(sensors, key) for key in (f"{name}_interval_s" for name in SIGNALS)}
+    intervals: dict[str, Any] = {key: getattr(sensors, key) for key in (f"{name}_interval_s" for name in SENSORS)}
     if not any(intervals.values()):
         return record
     own = Sensors(heading_rad=sensors.heading_rad, **intervals)
@@ -282,14 +278,14 @@ def _in_time(batch: Batch, sensors: Sensors, *, smoothed: bool) -> tuple[Batch, 
     """A batch with the signals that its file holds between readings, of sensors without a stated interval."""
     found = {
         name: how
-        for name, values in _signals(batch).items()
+        for name, values in readings_by_sensor(batch).items()
         if not sensors.timing(name)[1] and (how := held(values)) is not None
     }
     notes = [_how_held(name, how, batch.sample_time_s) for name, how in found.items()]
     undone = {name: how for name, how in found.items() if how.even}
     if not undone:
         return batch, notes
-    lines = {name: knots_held(_signals(batch)[name], how) for name, how in undone.items() if how.interpolated}
+    lines = {name: knots_held(readings_by_sensor(batch)[name], how) for name, how in undone.items() if how.interpolated}
     intervals: dict[str, Any] = {
         f"{name}_interval_s": how.interval * batch.sample_time_s for name, how in undone.items()
     }
@@ -306,20 +302,6 @@ def _where_pose_is_known(batch: Batch) -> Batch:
     return batch.cut(slice(int(known[0]), int(known[-1]) + 1)) if len(known) else batch
 
 
-def _signals(batch: Batch) -> dict[str, Array]:
-    """Sensor -> its measured values (k, c)."""
-    values: dict[str, Array] = {}
-    if batch.pose is not None:
-        values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
-    if not {"u", "v"} & set(batch.derived):
-        values["velocity"] = batch.velocity[:, :2]
-    if "r" not in batch.derived:
-        values["yaw_rate"] = batch.velocity[:, 2:]
-    if batch.wind is not None:
-        values["wind"] = batch.wind
-    return values
-
-
 def _with(batch: Batch, lines: dict[str, Array]) -> Batch:
     """The batch with other values of some sensors."""
     pose, velocity = (None if own is None else own.copy() for own in (batch.pose, batch.velocity))
@@ -334,7 +316,7 @@ def _with(batch: Batch, lines: dict[str, Array]) -> Batch:
 
 
 def _how_held(name: str, how: Held, sample_time_s: float) -> str:
-    seconds, words = how.interval * sample_time_s, SIGNALS[name]
+    seconds, words = how.interval * sample_time_s, READINGS[name]
     between = "a straight line is drawn between readings" if how.interpolated else "the last one is repeated in between"
     if not how.even:
         return (

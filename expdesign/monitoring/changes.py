@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.monitoring.tuning import TUNING
 from expdesign.vessel import stem
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, GYRO
 
 ANGLE_RAD = 0.03  # misalignment that matters [rad]
-GYRO_SHARE = 0.05  # change of the gyro's scale that matters
 # kinds of effects that a load may change, each with the standard deviation of its change in a port call, in sizes that
 # matter
 LOADS = (("inertia", 2.0), ("hull", 1.0))
@@ -78,6 +78,9 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
         for name, what in (("a", "azimuth"), ("rudder", "rudder"))
         if name in stems
     ]
-    if "r" not in ship.derived and "r" in model.outputs:
-        changes.append(Change(effect="gyro", size=share * GYRO_SHARE, unit=(0.01, "%"), words="scale of yaw rate"))
+    changes += [
+        Change(effect=row.effects[0], size=share * row.matters, unit=(0.01, "%"), words=f"scale of {row.what}")
+        for row in GAINS_AND_OFFSETS
+        if row.is_gain and row.shown_by == GYRO and row.is_shown(ship.derived) and "r" in model.outputs
+    ]
     return tuple(changes)

@@ -6,11 +6,6 @@ one, so that a sum reaches h in exp(h) stretches on average, or later: the thres
 alarms that is asked for.
 
 Sources: E. S. Page, Biometrika 41 (1954), 100-115; G. Lorden, Annals of Mathematical Statistics 42 (1971), 1897-1908.
-
-Port calls: the ship may carry another load afterwards, which is estimated anew and raises no alarm.
-
-A load is a change of inertia and hull that lasts until the next call. The filter of the unmeasured force estimates it
-too, so that it is in no score of a change; that of a change which looks like a load grows only as the load is known.
 """
 
 from __future__ import annotations
@@ -39,6 +34,9 @@ LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its
 
 
 # Port calls: the ship may carry another load afterwards, which is estimated anew and raises no alarm.
+#
+# A load is a change of inertia and hull that lasts until the next call. The filter of the unmeasured force estimates it
+# too, so that it is in no score of a change; that of a change which looks like a load grows only as the load is known.
 
 MOST_CALLS = 100
 """Kept for the page."""

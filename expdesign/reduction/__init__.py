@@ -11,6 +11,7 @@ Lags, dead times, dead bands and misalignments act on inputs as in simulation (`
 from expdesign.reduction.averaging import averaged, samples_of_a_mean
 from expdesign.reduction.reduce import (
     at_reference_point,
+    readings_by_sensor,
     reduced,
     with_delivered_inputs,
     with_reduced_wind,

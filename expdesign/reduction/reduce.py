@@ -20,7 +20,7 @@ from expdesign.simulation import acting_response, deliver, step_shares
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array
 from expdesign.vessel import IDEAL, RATE_UNITS, Response, Sensors, Vessel, VesselModel, column_name, stem
-from expdesign.vessel.quantities import GAINS_AND_OFFSETS, NOISE
+from expdesign.vessel.quantities import GAINS_AND_OFFSETS, NOISE, READINGS
 
 # Remarks on what was undone of the sensors of a batch, and what could not be.
 
@@ -29,9 +29,10 @@ STATED = "As the vessel file states, "
 
 def remarks(stated: Stated) -> Iterator[str]:
     """One sentence for each stated fault of a sensor in the data."""
-    sensors, signals = stated.sensors, _signals(stated)
-    for name, (words, values) in signals.items():
-        timing, place = sensors.timing(name), sensors.place(name)
+    sensors = stated.sensors
+    signals = {name: values for name, values in readings_by_sensor(stated.batch).items() if measured(values)}
+    for name, values in signals.items():
+        timing, place, words = sensors.timing(name), sensors.place(name), READINGS[name]
         if any(timing):
             yield STATED + _timing(words, *timing, as_stated=stated.readings(name, values)[1])
         if any(place):
@@ -48,23 +49,18 @@ def remarks(stated: Stated) -> Iterator[str]:
         yield f"{STATED}noise on the vane's angle shrinks the wind to {shrunk:.4g}; it is divided by that."
 
 
-WORDS = {"position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates",
-         "wind": "winds"}  # fmt: skip
-
-
-def _signals(stated: Stated) -> dict[str, tuple[str, Array]]:
-    """Sensor -> its words and measured values (k, c), for the sensors that the data come from."""
-    batch = stated.batch
+def readings_by_sensor(batch: Batch) -> dict[str, Array]:
+    """Sensor -> its measured values (k, c), of the sensors that the batch comes from."""
     values: dict[str, Array] = {}
     if batch.pose is not None:
         values |= {"position": batch.pose[:, :2], "heading": batch.pose[:, 2:]}
-    if not {"u", "v"} <= set(batch.derived):
+    if not {"u", "v"} & set(batch.derived):
         values["velocity"] = batch.velocity[:, :2]
     if "r" not in batch.derived:
         values["yaw_rate"] = batch.velocity[:, 2:]
     if batch.wind is not None:
         values["wind"] = batch.wind
-    return {name: (WORDS[name], part) for name, part in values.items() if measured(part)}
+    return values
 
 
 def _timing(words: str, delay_s: float, interval_s: float, *, as_stated: bool) -> str:
@@ -80,9 +76,9 @@ def _timing(words: str, delay_s: float, interval_s: float, *, as_stated: bool) -
 
 def _moved(words: str, where: str, stated: Stated) -> Iterator[str]:
     """What is done about a place off the reference point."""
-    if words != WORDS["position"] and not measured(stated.batch.velocity[:, 2]):
+    if words != READINGS["position"] and not measured(stated.batch.velocity[:, 2]):
         yield f"{words.capitalize()} are not moved from {where}, as that needs a yaw rate."
-    elif words == WORDS["position"] and stated.batch.pose is not None and not measured(stated.batch.pose[:, 2]):
+    elif words == READINGS["position"] and stated.batch.pose is not None and not measured(stated.batch.pose[:, 2]):
         yield f"{words.capitalize()} are not moved from {where}, as that needs a heading."
     else:
         yield f"{STATED}{words} are measured {where}; they are moved to amidships."

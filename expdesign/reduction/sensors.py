@@ -2,19 +2,6 @@
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.39)-(5.50), for wind sensors and the shrinkage of a
 vane's components; T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (2.28), for places.
-
-Readings of a sensor at the times at which they were taken, and the signal between them.
-
-A sample shows the last reading that has arrived. Reading n is taken at (phase + n) intervals and arrives `delay_s`
-later; the phase follows from the samples at which the signal changes. Without an interval every sample shows a reading
-of its own.
-
-Between readings the signal is the cubic through the four nearest ones. For a smooth signal x the error is at most
-3/128 h**4 max|d4x/dt4|, h being the time between readings, and at a reading it is zero; in the first and last interval
-it is at most 1/24 of the same. A delay of whole samples is therefore undone exactly.
-
-Source: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions (1964), 25.2.13 to 25.2.15 (Lagrange's
-four-point formula and its remainder).
 """
 
 from __future__ import annotations
@@ -36,6 +23,17 @@ PHASES = 50  # changes from which the time of the readings within an interval is
 
 
 # Readings of a sensor at the times at which they were taken, and the signal between them.
+#
+# A sample shows the last reading that has arrived. Reading n is taken at (phase + n) intervals and arrives `delay_s`
+# later; the phase follows from the samples at which the signal changes. Without an interval every sample shows a
+# reading of its own.
+#
+# Between readings the signal is the cubic through the four nearest ones. For a smooth signal x the error is at most
+# 3/128 h**4 max|d4x/dt4|, h being the time between readings, and at a reading it is zero; in the first and last
+# interval it is at most 1/24 of the same. A delay of whole samples is therefore undone exactly.
+#
+# Source: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions (1964), 25.2.13 to 25.2.15 (Lagrange's
+# four-point formula and its remainder).
 
 NODES = np.arange(4.0)
 

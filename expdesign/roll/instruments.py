@@ -8,22 +8,6 @@ parts, and each has the boxes that the others were fitted to. Errors of the boxe
 Source: doctoral thesis on grey-box identification of roll with few sensors, algorithm 5.1, step A; J. D. Angrist, G. W.
 Imbens and A. B. Krueger, J. Applied Econometrics 14 (1999), 57-67, for instruments fitted elsewhere. The simulation of
 the grey-box model that the thesis goes on with is left out: instruments so made were no better (`tests/benchmarks`).
-
-Whether the rudder answers the moment that rolls the ship, as then no instrument comes from the rudder.
-
-Noise of the equation is independent of a rudder that was set beforehand, at earlier and at later times. A rudder that
-answers roll correlates with the noise of somewhat earlier times:
-
-    h = sum over cases of W' (y - X c(theta)),          W: changes of the rudder some time later, weighed as instruments
-
-With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h is distributed as chi-square if nothing
-answers. Changes of the rudder are used, as in the equation: the rudder itself would weigh frequency zero most, where
-the noise is zero and its spectrum cannot be estimated. What the model misses of the ship follows the rudder of earlier
-times, with which later rudders correlate too: only that part of them is used that earlier rudders and the instruments
-do not predict, and moments count in the size that those of the instruments are left with.
-
-Source: L. Ljung, System Identification (1999), 16.6, for residuals that go with later inputs; L. P. Hansen,
-Econometrica 50 (1982), 1029-1054, for the covariance of moments at an estimate.
 """
 
 from __future__ import annotations
@@ -216,6 +200,20 @@ def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
 
 
 # Whether the rudder answers the moment that rolls the ship, as then no instrument comes from the rudder.
+#
+# Noise of the equation is independent of a rudder that was set beforehand, at earlier and at later times. A rudder that
+# answers roll correlates with the noise of somewhat earlier times:
+#
+#     h = sum over cases of W' (y - X c(theta)),        W: changes of the rudder some time later, weighed as instruments
+#
+# With the covariance of h, in which that of theta has its part, h' cov(h)^-1 h is distributed as chi-square if nothing
+# answers. Changes of the rudder are used, as in the equation: the rudder itself would weigh frequency zero most, where
+# the noise is zero and its spectrum cannot be estimated. What the model misses of the ship follows the rudder of
+# earlier times, with which later rudders correlate too: only that part of them is used that earlier rudders and the
+# instruments do not predict, and moments count in the size that those of the instruments are left with.
+#
+# Source: L. Ljung, System Identification (1999), 16.6, for residuals that go with later inputs; L. P. Hansen,
+# Econometrica 50 (1982), 1029-1054, for the covariance of moments at an estimate.
 
 
 def chance_of_answers(

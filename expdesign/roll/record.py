@@ -1,21 +1,4 @@
-"""Roll of measured records: their runs, and whether a ship still rolls as her file says.
-
-Whether a ship still rolls as her file says, and if not, what changed: from one record at one load.
-
-The record gives the five coefficients c of the roll equation, with the covariance of their errors; the file gives them
-with that of its parameters. Their difference has the sum V of both as covariance where nothing changed, so that
-
-    T = (c - c_file)' V^-1 (c - c_file)
-
-has Hotelling's distribution with 5 numbers and as many degrees of freedom as the power of the noise has at a frequency:
-waves are narrow, so that V is no better known than their power. A cause explains it when the rest, after the best size
-of the cause, is within chance. The weight's share of the righting moment is no part of the stiffness in this equation,
-as the accelerometer feels gravity too: hull and load can be distinguished.
-
-Source: doctoral thesis on grey-box identification of ship roll with few sensors, (5.17)-(5.24), for the equation; L. P.
-Hansen, Econometrica 50 (1982), 1029-1054, for the test; H. Hotelling, Annals of Mathematical Statistics 2 (1931),
-360-378, for its distribution.
-"""
+"""Roll of measured records: their runs, and whether a ship still rolls as her file says."""
 
 from __future__ import annotations
 
@@ -120,6 +103,20 @@ def _rudders(names: tuple[str, ...], asked: Sequence[str]) -> tuple[str, ...]:
 
 
 # Whether a ship still rolls as her file says, and if not, what changed: from one record at one load.
+#
+# The record gives the five coefficients c of the roll equation, with the covariance of their errors; the file gives
+# them with that of its parameters. Their difference has the sum V of both as covariance where nothing changed, so that
+#
+#     T = (c - c_file)' V^-1 (c - c_file)
+#
+# has Hotelling's distribution with 5 numbers and as many degrees of freedom as the power of the noise has at a
+# frequency: waves are narrow, so that V is no better known than their power. A cause explains it when the rest, after
+# the best size of the cause, is within chance. The weight's share of the righting moment is no part of the stiffness in
+# this equation, as the accelerometer feels gravity too: hull and load can be distinguished.
+#
+# Source: doctoral thesis on grey-box identification of ship roll with few sensors, (5.17)-(5.24), for the equation; L.
+# P. Hansen, Econometrica 50 (1982), 1029-1054, for the test; H. Hotelling, Annals of Mathematical Statistics 2 (1931),
+# 360-378, for its distribution.
 
 ALARM_P = 0.01
 """Chance that a change is reported where there is none."""

@@ -1,12 +1,4 @@
-"""Runs at one load each, and their preparation: low-pass filter, fewer samples, differences.
-
-Low-pass filter and thinning out of runs, which must pass the roll mode.
-
-All signals of a run pass the same symmetric filter, so that the equations between them stay as they are and nothing is
-late.
-
-Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing (2010), 7.5, for windowed filters.
-"""
+"""Runs at one load each, and their preparation: low-pass filter, fewer samples, differences."""
 
 from __future__ import annotations
 
@@ -71,6 +63,11 @@ class Case:
 
 
 # Low-pass filter and thinning out of runs, which must pass the roll mode.
+#
+# All signals of a run pass the same symmetric filter, so that the equations between them stay as they are and nothing
+# is late.
+#
+# Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing (2010), 7.5, for windowed filters.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,19 +11,6 @@ for it, one more at a time. Whole runs are found from the optimum's runs by exch
 
 Source: S. Boyd and L. Vandenberghe, Convex Optimization (2004), 11.7, for the interior point; A. F. Veinott 1967 for
 tangents where the way to inner points meets the boundary.
-
-Whole runs that reach an accuracy at little cost, from those of the continuous problem.
-
-Runs of the continuous problem are rounded up, which reaches the accuracy, as more runs never tell less. Then up to
-three runs at a time are left out or exchanged for at most two others, by the cheapest exchange that still reaches it,
-until none is cheaper. The tangent of the margin f at the present runs bounds f at all others, since f is concave; so
-most exchanges are ruled out without computing f.
-
-On the choices of the shortest day off Helsinki, 24 manoeuvres, it found the costs of a mixed-integer program by outer
-approximation in a twentieth of the time. It proves nothing; the bound is that of the continuous problem.
-
-Source: A. C. Atkinson, A. N. Donev and R. D. Tobias, Optimum Experimental Designs, with SAS (2007), 12.6, for
-exchanges.
 """
 
 from __future__ import annotations
@@ -58,6 +45,17 @@ EXCHANGED = 24  # most manoeuvres of which runs are left out, and put in, in the
 
 
 # Whole runs that reach an accuracy at little cost, from those of the continuous problem.
+#
+# Runs of the continuous problem are rounded up, which reaches the accuracy, as more runs never tell less. Then up to
+# three runs at a time are left out or exchanged for at most two others, by the cheapest exchange that still reaches it,
+# until none is cheaper. The tangent of the margin f at the present runs bounds f at all others, since f is concave; so
+# most exchanges are ruled out without computing f.
+#
+# On the choices of the shortest day off Helsinki, 24 manoeuvres, it found the costs of a mixed-integer program by outer
+# approximation in a twentieth of the time. It proves nothing; the bound is that of the continuous problem.
+#
+# Source: A. C. Atkinson, A. N. Donev and R. D. Tobias, Optimum Experimental Designs, with SAS (2007), 12.6, for
+# exchanges.
 
 
 def exchanged(accuracy: Accuracy, offer: Offer, runs: Array, level: float) -> Array:

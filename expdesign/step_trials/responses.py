@@ -1,22 +1,4 @@
-"""Responses to steps: one by one, and with a shape in common.
-
-Responses to one step: first order, and second order with a zero, both after a dead time.
-
-First order:   x(t) = x- + (x+ - x-) (1 - exp(-(t - t_d)/T))                                   for t > t_d
-Second order:  T1 T2 x'' + (T1 + T2) x' + x = K (tau + T3 tau'),  T1, T2 real or complex conjugate
-
-Both plateaus are known, so that the inertia m = k T follows from T alone, with k the change of command per change of
-state. Of a second order response it follows from T1 + T2 - T3, the first order time constant with the same area between
-response and plateau (K. Nomoto et al., On the steering qualities of ships, Int. Shipbuilding Progress 4, 1957).
-
-The dead time of the rudder, from all of its steps together.
-
-Sway makes the yaw rate begin faster than a first order response, which makes the dead time of one too short. All
-responses have one shape instead, second order with a zero, each stretched in time, as the time constants of a hull go
-with length over speed (K. Nomoto et al., Int. Shipbuilding Progress 4, 1957). One step in noise cannot separate dead
-time and shape. All steps together can, with a prior on hulls in general: T3 is less than T1 + T2, and the poles are
-real or nearly so. The plateaus are estimated too, within their standard errors.
-"""
+"""Responses to steps: one by one, and with a shape in common."""
 
 from __future__ import annotations
 
@@ -30,6 +12,14 @@ import scipy
 from expdesign.values import Array
 
 # Responses to one step: first order, and second order with a zero, both after a dead time.
+#
+# First order:   x(t) = x- + (x+ - x-) (1 - exp(-(t - t_d)/T))                                   for t > t_d
+# Second order:  T1 T2 x'' + (T1 + T2) x' + x = K (tau + T3 tau'),  T1, T2 real or complex conjugate
+#
+# Both plateaus are known, so that the inertia m = k T follows from T alone, with k the change of command per change of
+# state. Of a second order response it follows from T1 + T2 - T3, the first order time constant with the same area
+# between response and plateau (K. Nomoto et al., On the steering qualities of ships, Int. Shipbuilding Progress 4,
+# 1957).
 
 NARROW_S = 1e-6
 """Half the distance between the bounds of a dead time that is fixed [s]."""
@@ -195,6 +185,12 @@ def preference(first: Response, second: Response) -> float:
 
 
 # The dead time of the rudder, from all of its steps together.
+#
+# Sway makes the yaw rate begin faster than a first order response, which makes the dead time of one too short. All
+# responses have one shape instead, second order with a zero, each stretched in time, as the time constants of a hull go
+# with length over speed (K. Nomoto et al., Int. Shipbuilding Progress 4, 1957). One step in noise cannot separate dead
+# time and shape. All steps together can, with a prior on hulls in general: T3 is less than T1 + T2, and the poles are
+# real or nearly so. The plateaus are estimated too, within their standard errors.
 
 SHAPE = (math.log(1.5), math.log(0.6))
 SHAPE_STD = (0.4, 0.5)

@@ -5,18 +5,6 @@
 so the explicit Euler map at the sample time is nu(k+1) = nu(k) + Phi^T theta with discrete parameters.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (3.58)-(3.64).
-
-Coupled inertia of sway and yaw, as of a ship whose centre of gravity is not at the origin of the b-frame.
-
-    [ sway_kg       sway_yaw_kgm ] [ dv/dt ]   [ sway_kg   Y(u, v, r, ...) ]
-    [ yaw_sway_kgm  yaw_kgm2     ] [ dr/dt ] = [ yaw_kgm2  N(u, v, r, ...) ]
-
-Y and N are what the model's terms say: the accelerations were there no coupling. For a rigid body of mass m with added
-mass and its centre of gravity x_g ahead of midships, the four numbers are m - Y_dv, m x_g - Y_dr, m x_g - N_dv and
-I_z - N_dr, with I_z about midships. Coriolis forces are terms: m x_g r^2 in surge, m u r in sway, m x_g u r in yaw. The
-accelerations stay linear in the parameters, as the matrix is known from the vessel file.
-
-Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (6.41)-(6.44).
 """
 
 from __future__ import annotations
@@ -48,6 +36,16 @@ from expdesign.vessel.structures import (
 )
 
 # Coupled inertia of sway and yaw, as of a ship whose centre of gravity is not at the origin of the b-frame.
+#
+#     [ sway_kg       sway_yaw_kgm ] [ dv/dt ]   [ sway_kg   Y(u, v, r, ...) ]
+#     [ yaw_sway_kgm  yaw_kgm2     ] [ dr/dt ] = [ yaw_kgm2  N(u, v, r, ...) ]
+#
+# Y and N are what the model's terms say: the accelerations were there no coupling. For a rigid body of mass m with
+# added mass and its centre of gravity x_g ahead of midships, the four numbers are m - Y_dv, m x_g - Y_dr, m x_g - N_dv
+# and I_z - N_dr, with I_z about midships. Coriolis forces are terms: m x_g r^2 in surge, m u r in sway, m x_g u r in
+# yaw. The accelerations stay linear in the parameters, as the matrix is known from the vessel file.
+#
+# Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), (6.41)-(6.44).
 
 
 @dataclass(frozen=True, kw_only=True)

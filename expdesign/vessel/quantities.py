@@ -161,15 +161,15 @@ class Response:
         unit="s", takes=POSITIVE, stated_as="{name}_rate{rate}",
         effects=("slew",), result="slew_{}_s_per_unit", low=0.0, high=120.0,
     )  # fmt: skip
-    # time constant [s], 0 for none
-    lag_s: float = _time("the time constant with which {the} follows [s]", "lag")
-    # dead time [s]
-    delay_s: float = _time("the dead time of {the} [s]", "delay")
     deadband: float = _row(  # [unit of the signal], not negative
         stage=ACTUATORS, words="the dead band: a smaller {bare} ordered has no effect{in_unit}", takes=NOT_NEGATIVE,
         stated_as="{name}_deadband{unit}",
         effects=("deadband",), result="deadband_{}", low=0.0,
     )  # fmt: skip
+    # dead time [s]
+    delay_s: float = _time("the dead time of {the} [s]", "delay")
+    # time constant [s], 0 for none
+    lag_s: float = _time("the time constant with which {the} follows [s]", "lag")
     # delivered beyond the command [rad]: positive turns thrust, or rudder, from bow towards starboard
     offset: float = _row(
         stage=ACTUATORS, words="the misalignment [rad]: the true angle less the commanded one", unit="rad", takes=ANGLE,
@@ -197,6 +197,10 @@ SENSORS = {
     "wind": "the wind",
 }
 """Sensor -> what it measures."""
+READINGS = {
+    "position": "positions", "heading": "headings", "velocity": "velocities", "yaw_rate": "yaw rates", "wind": "winds",
+}  # fmt: skip
+"""Sensor -> its readings in words."""
 
 
 def _std(of: str) -> Any:

@@ -185,13 +185,20 @@ def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplaine
     return [f"The simulation lacks {listed(named)}", sure, _advice(findings)]
 
 
+TOWARDS = {"north_mps": "north", "east_mps": "east"}
+
+
 def _with_sizes(item: Finding) -> str:
     """A missing effect and its few numbers: the correct value of X_u (-0.050 ± 0.001, the file says 0)."""
     what, sizes = lacking(item), []
     for one in item.estimates:
-        name = "" if what.endswith(f" {one.name}") else f"{one.name} "
         says = "" if one.stated is None else f", the file says {plus_minus(one.stated, 0.0)}"
-        sizes.append(f"{name}{plus_minus(one.value, one.std)}{says}")
+        size = plus_minus(one.value, one.std)
+        if one.name in TOWARDS:
+            size = f"{size} {one.unit} to {TOWARDS[one.name]}"
+        elif not what.endswith(f" {one.name}"):
+            size = f"{one.name} {size}"
+        sizes.append(f"{size}{says}")
     between = ", " if all(one.stated is None for one in item.estimates) else "; "
     told = 0 < len(sizes) <= MOST_SIZES and all(np.isfinite(one.value) for one in item.estimates)
     return f"{what} ({between.join(sizes)})" if told else what

@@ -1,12 +1,4 @@
-"""A fit of effects and uncertain parameters, and likelihoods of fits.
-
-How much of the simulation error a slowly varying force that nobody measured would account for.
-
-The force is piecewise linear in time, in every equation of motion. Its size follows from generalised cross-validation,
-so it does not follow the noise.
-
-Source: G. H. Golub, M. Heath and G. Wahba, Technometrics 21 (1979), 215-223.
-"""
+"""A fit of effects and uncertain parameters, and likelihoods of fits."""
 
 from __future__ import annotations
 
@@ -316,6 +308,11 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 
 
 # How much of the simulation error a slowly varying force that nobody measured would account for.
+#
+# The force is piecewise linear in time, in every equation of motion. Its size follows from generalised
+# cross-validation, so it does not follow the noise.
+#
+# Source: G. H. Golub, M. Heath and G. Wahba, Technometrics 21 (1979), 215-223.
 
 
 def unmeasured_force_share(linear: LinearisedMotion, outputs: tuple[str, ...]) -> Array:

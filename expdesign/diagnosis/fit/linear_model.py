@@ -1,14 +1,4 @@
-"""The joint linear model of a fit, and the Gram matrices of its whitened sensitivities.
-
-The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
-
-Rows are errors, columns are sensitivities. Initial states have a flat prior, uncertain parameters their Gaussian prior,
-and the random current is a random effect with piecewise linear basis functions of time.
-
-Gram matrices of whitened sensitivities, with initial states projected out and the random current integrated out.
-
-These small matrices suffice for steps, covariances, score tests and likelihoods.
-"""
+"""The joint linear model of a fit, and the Gram matrices of its whitened sensitivities."""
 
 from __future__ import annotations
 
@@ -41,6 +31,9 @@ LARGEST_SENSITIVITY = 1e30  # beyond it the model counts as unstable
 
 
 # The joint linear model of a fit: how effects, a random current and initial states change the simulated channels.
+#
+# Rows are errors, columns are sensitivities. Initial states have a flat prior, uncertain parameters their Gaussian
+# prior, and the random current is a random effect with piecewise linear basis functions of time.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,6 +160,8 @@ def _parameter_scale(ship: ExtendedModel, key: str) -> float:
 
 
 # Gram matrices of whitened sensitivities, with initial states projected out and the random current integrated out.
+#
+# These small matrices suffice for steps, covariances, score tests and likelihoods.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

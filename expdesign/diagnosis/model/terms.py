@@ -13,7 +13,8 @@ import numpy as np
 from expdesign.estimation.regression import Polynomial, lift, symbol
 from expdesign.simulation.program import evaluation
 from expdesign.values import Array
-from expdesign.vessel import NUMPY, TERMS, Operators, Term, VesselModel, stem
+from expdesign.vessel import NUMPY, TERMS, Operators, Response, Term, VesselModel, stem
+from expdesign.vessel.quantities import rows_of
 from expdesign.vessel.structures import FORCE_SIGNALS, FUNCTIONS, MOTION_SIGNALS, Expression, parse_expression
 
 # The terms of an extended model, with their factors and kinds.
@@ -385,7 +386,7 @@ def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
 
 # Groups of inputs that share an actuator fault: all, those of one stem, single ones.
 
-RESPONSES = {"slew": "rate", "deadband": "deadband", "delay": "delay_s", "lag": "lag_s", "offset": "offset"}
+RESPONSES = {row.effects[0]: row.key for row in rows_of(Response)}
 """Kind of effect of a group of inputs -> field of `vessel.Response`, in the order in which they act.
 
 The effect of a slew rate is its inverse, the time that a change of one unit takes, so that zero changes nothing.

@@ -1,9 +1,4 @@
-"""Inputs of an extended model: actuators, water, air, depth and time.
-
-Inputs as the actuators of an extended model deliver them.
-
-Slew rate, dead band, dead time, lag, offset and scale, in this order.
-"""
+"""Inputs of an extended model: actuators, water, air, depth and time."""
 
 from __future__ import annotations
 
@@ -36,6 +31,8 @@ FEW_STEPS, MOST_KNOWN = 10_000, 64  # integrator steps of windows whose forces a
 
 
 # Inputs as the actuators of an extended model deliver them.
+#
+# Slew rate, dead band, dead time, lag, offset and scale, in this order.
 
 
 def delivered_inputs(ship: ExtendedModel, rows: Array, windows: Windows) -> tuple[Array, int]:

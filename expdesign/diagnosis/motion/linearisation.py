@@ -1,10 +1,4 @@
-"""A simulation of all windows as values, its sensor outputs, and its linearisation.
-
-Linearised motion of all windows, and its responses to small disturbances.
-
-The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
-All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
-"""
+"""A simulation of all windows as values, its sensor outputs, and its linearisation."""
 
 from __future__ import annotations
 
@@ -218,6 +212,9 @@ def _shifted(values: Array, samples: float) -> Array:
 
 
 # Linearised motion of all windows, and its responses to small disturbances.
+#
+# The response to a disturbance is that of the linearised motion to its change of acceleration along the simulated path.
+# All disturbances share one linearisation, so hundreds of them cost little more than one simulation.
 
 TURNS = "heading_bias"
 """The effect of a sensor that also turns current and wind, where the heading is the compass's."""

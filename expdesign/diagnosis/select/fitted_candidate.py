@@ -1,13 +1,4 @@
-"""Candidates fitted together with the findings so far, their likelihood gains, and profiles of their likelihoods.
-
-Profile likelihood of effects whose likelihood has corners or plateaus: widths of dead bands, times of changes.
-
-All widths of a dead band between two recorded command levels explain the data equally well, and so do nearby times of a
-change. So the estimate is the middle of all values that are nearly as likely as the best one, and its standard error is
-half their range. All other effects are optimised for each value.
-
-Source: D. R. Cox and D. Oakes, Analysis of Survival Data (1984), section 3.3, for intervals from profiles.
-"""
+"""Candidates fitted together with the findings so far, their likelihood gains, and profiles of their likelihoods."""
 
 from __future__ import annotations
 
@@ -177,6 +168,12 @@ def ranked_by_gain(base: Fit, fitted: Sequence[FittedCandidate]) -> list[FittedC
 
 
 # Profile likelihood of effects whose likelihood has corners or plateaus: widths of dead bands, times of changes.
+#
+# All widths of a dead band between two recorded command levels explain the data equally well, and so do nearby times of
+# a change. So the estimate is the middle of all values that are nearly as likely as the best one, and its standard
+# error is half their range. All other effects are optimised for each value.
+#
+# Source: D. R. Cox and D. Oakes, Analysis of Survival Data (1984), section 3.3, for intervals from profiles.
 
 
 def with_profile_estimate(chosen: FittedCandidate, base: Fit) -> FittedCandidate:

@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.diagnosis.causes import CAUSES, Candidate, Situation
 from expdesign.diagnosis.data import Windows
-from expdesign.diagnosis.fit import CrossValidation, Fit, judged, leads_away
+from expdesign.diagnosis.fit import CrossValidation, Fit, held_out_gain, judged, leads_away
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.select.fitted_candidate import (
     FittedCandidate,
@@ -241,8 +241,9 @@ def _best_on_held_out(
     that others with fewer numbers are about as likely as. Many numbers explain errors of the model's structure in the
     data that they are fitted to, and in no others. Where the simulation of whole units leads away from the ship,
     likelihoods tell little, and the best candidates of all other causes are compared. Where it does so only with
-    another cause, that one is no rival. Any other cause has to be much better. One that imitates many causes is a rival
-    only of another such one.
+    another cause, that one is no rival. Any other cause has to be much better, and any that is less likely with no
+    fewer numbers for certain: likelihoods tell more than a few runs do. One that imitates many causes is a rival only
+    of another such one.
     """
     astray = astray or leads_away(validation.of(first.fit))
     alike = [item for item in accepted if first.candidate.imitates or not item.candidate.imitates]
@@ -253,13 +254,15 @@ def _best_on_held_out(
     if not rivals:
         return first
     held = judged([validation.of(item.fit) for item in (first, *rivals)], first=0)
-    own, *means = (item.mean_fit for item in held)
+    own, *others = held
     better: list[tuple[float, FittedCandidate]] = []
-    for mean, rival in zip(means, rivals, strict=True):
-        simpler = rival.numbers < first.numbers and (first.candidate.imitates or _is_about_as_likely(rival, first))
+    for other, rival in zip(others, rivals, strict=True):
+        fewer = rival.numbers < first.numbers
+        simpler = fewer and (first.candidate.imitates or _is_about_as_likely(rival, first))
         least = TUNING.clear_gain_points if rival in near else TUNING.much_better_points
-        if mean > own + (-TUNING.clear_gain_points if simpler and not astray else least):
-            better.append((mean, rival))
+        is_better = other.mean_fit > own.mean_fit + (-TUNING.clear_gain_points if simpler and not astray else least)
+        if is_better and (fewer or astray or held_out_gain(own, other, 0)[1][0] > 0.0):
+            better.append((other.mean_fit, rival))
     return max(better, key=lambda pair: pair[0])[1] if better else first
 
 

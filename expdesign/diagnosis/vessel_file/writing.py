@@ -1,18 +1,4 @@
-"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file.
-
-Dependence on depth as factors of a model's terms.
-
-The growth becomes a factor of the terms: a term ``u`` turns into ``(u)*(1 + 0.8*h)``, where the signal `h` is draught
-over depth. Parameters keep their names and their values, which are those of deep water. Inertia divides, which the
-language of terms cannot express. So its factor 1 / (1 + b h) is written as a polynomial of third order, exact in deep
-water and nearly exact down to the least depth in the data. A dependence on depth that the model already has counts as
-known, and the growth that is found multiplies it.
-
-The model of a vessel file with the findings: its terms, their parameters and standard deviations.
-
-An effect that scales a term ends up in its parameter, and the effect's standard error beside that of the parameter as
-if the two were independent. What is added becomes a term of its own.
-"""
+"""From a vessel to a model with effects, and back: everything found becomes part of a vessel file."""
 
 from __future__ import annotations
 
@@ -44,6 +30,12 @@ from expdesign.vessel.quantities import NOT_NEGATIVE, rows_of
 from expdesign.vessel.structures import SHOAL, Expression
 
 # Dependence on depth as factors of a model's terms.
+#
+# The growth becomes a factor of the terms: a term ``u`` turns into ``(u)*(1 + 0.8*h)``, where the signal `h` is draught
+# over depth. Parameters keep their names and their values, which are those of deep water. Inertia divides, which the
+# language of terms cannot express. So its factor 1 / (1 + b h) is written as a polynomial of third order, exact in deep
+# water and nearly exact down to the least depth in the data. A dependence on depth that the model already has counts as
+# known, and the growth that is found multiplies it.
 
 DAMPING, INERTIA = "damping", "inertia"
 ORDER = 3
@@ -109,6 +101,9 @@ def _taken_apart(expression: str) -> tuple[str, Polynomial]:
 
 
 # The model of a vessel file with the findings: its terms, their parameters and standard deviations.
+#
+# An effect that scales a term ends up in its parameter, and the effect's standard error beside that of the parameter as
+# if the two were independent. What is added becomes a term of its own.
 
 TURN = re.compile(r"\btau_psi\b")
 FORCES = {"u": "X", "v": "Y", "r": "N"}

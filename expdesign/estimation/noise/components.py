@@ -1,41 +1,4 @@
-"""Residual noise as a sum of independent parts, each with a known shape in time, fitted to periodograms.
-
-Parts that noise may consist of: white, of the sensors, and slow ones, with their covariances in time.
-
-The formula and its sources stand in `components`.
-
-Periodograms of residuals, and their expectations for each part of the noise.
-
-Stretches may have gaps; expectations are exact for the samples that are there.
-
-Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
-
-    cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1])
-        + sum over m of (slow_m + turning_m cos(psi(i) - psi(j))) exp(-|i - j| / m)
-
-White are gusts and eddies new at every sample, and the part of the sensor noise that damping lets through; sensor is
-noise that enters at one sample and leaves at the next, eps(k) = e(k + 1) - (1 + J) e(k), whose low frequencies cancel;
-slow are disturbances that last m samples, or as long as a batch, and keep their side of the ship; turning are those
-that keep their side of the chart, as currents and winds do, seen from a ship with heading psi: north and east vary
-alike and independently, so that any fixed combination of their components along and across the ship has this
-covariance. The variances are none of them negative. They are estimated from the periodograms of the batches, whose
-expectations for batches of finite length, with or without gaps, are linear in them, by Whittle's likelihood. Slow parts
-count only if they earn more likelihood than one parameter may by chance (Schwarz's criterion), and then those of the
-ship or those of the chart, whichever are likelier: from few turns both together can hardly be told apart. The
-covariance of sum W eps then follows for any W, ends of batches included, without kernel or lags.
-
-Residuals are less than the noise by what the parameters take up: r = eps - Phi sum W eps. From few data that is much of
-the slow noise. With Sigma the covariance matrix of a part, the expected periodogram is that of
-
-    Sigma - Phi W^T Sigma - Sigma W Phi^T + Phi W^T Sigma W Phi^T
-
-Whether the parts fit is tested: the periodogram over its expectation must spread its sum evenly over frequencies
-(Bartlett's test, 1 %).
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66), for the parts; A. M. Sykulski, S. C. Olhede,
-A. P. Guillaumin, J. M. Lilly and J. J. Early, Biometrika 106 (2019), 251-266, for the likelihood; M. S. Bartlett, An
-Introduction to Stochastic Processes (1955), for the test.
-"""
+"""Residual noise as a sum of independent parts, each with a known shape in time, fitted to periodograms."""
 
 from __future__ import annotations
 
@@ -146,6 +109,8 @@ def timeline(batch: Integers, step: Integers) -> Timeline:
 
 
 # Parts that noise may consist of: white, of the sensors, and slow ones, with their covariances in time.
+#
+# The formula and its sources stand in `components`.
 
 WHITE, SENSOR = 0, 1
 """Places of the quick parts among the variances; slow ones follow."""
@@ -231,6 +196,8 @@ def _remembered(W: Array, memory: float) -> Array:
 
 
 # Periodograms of residuals, and their expectations for each part of the noise.
+#
+# Stretches may have gaps; expectations are exact for the samples that are there.
 
 
 def periodograms(eps: Array, parts: Sequence[Stretch], expected: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -299,6 +266,32 @@ def misfit_of(frequency: Array, ordinates: Array, level: Array) -> float:
 
 
 # Residual noise as a sum of independent parts, each with a known shape in time, and their effect on an estimate.
+#
+#     cov eps(i), eps(j) = white [i = j] + sensor (2 [i = j] - [|i - j| = 1])
+#         + sum over m of (slow_m + turning_m cos(psi(i) - psi(j))) exp(-|i - j| / m)
+#
+# White are gusts and eddies new at every sample, and the part of the sensor noise that damping lets through; sensor is
+# noise that enters at one sample and leaves at the next, eps(k) = e(k + 1) - (1 + J) e(k), whose low frequencies
+# cancel; slow are disturbances that last m samples, or as long as a batch, and keep their side of the ship; turning are
+# those that keep their side of the chart, as currents and winds do, seen from a ship with heading psi: north and east
+# vary alike and independently, so that any fixed combination of their components along and across the ship has this
+# covariance. The variances are none of them negative. They are estimated from the periodograms of the batches, whose
+# expectations for batches of finite length, with or without gaps, are linear in them, by Whittle's likelihood. Slow
+# parts count only if they earn more likelihood than one parameter may by chance (Schwarz's criterion), and then those
+# of the ship or those of the chart, whichever are likelier: from few turns both together can hardly be told apart. The
+# covariance of sum W eps then follows for any W, ends of batches included, without kernel or lags.
+#
+# Residuals are less than the noise by what the parameters take up: r = eps - Phi sum W eps. From few data that is much
+# of the slow noise. With Sigma the covariance matrix of a part, the expected periodogram is that of
+#
+#     Sigma - Phi W^T Sigma - Sigma W Phi^T + Phi W^T Sigma W Phi^T
+#
+# Whether the parts fit is tested: the periodogram over its expectation must spread its sum evenly over frequencies
+# (Bartlett's test, 1 %).
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66), for the parts; A. M. Sykulski, S. C.
+# Olhede, A. P. Guillaumin, J. M. Lilly and J. J. Early, Biometrika 106 (2019), 251-266, for the likelihood; M. S.
+# Bartlett, An Introduction to Stochastic Processes (1955), for the test.
 
 
 @dataclass(frozen=True, eq=False)

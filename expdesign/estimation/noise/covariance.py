@@ -1,35 +1,4 @@
-"""Covariances of sums of noise: long-run, from the parts of the noise, and of whitened residuals.
-
-Long-run covariance of a vector series: how its sum varies when samples depend on each other.
-
-    Omega = sum over lags l of w(l / (L + 1)) Gamma(l),    Gamma(l) = sum over k of s(k) s(k - l)^T
-
-Lags never reach from one batch into another. Kernels are positive semidefinite, and so is Omega.
-
-Where lags nearly cancel lag zero, as noise does that enters with opposite sign a sample later, Bartlett's kernel (Newey
-and West) loses a share 1 / L of that cancellation, Parzen's only about 6 / L^2; Parzen's is therefore the default.
-
-Source: W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708, and Review of Economic Studies 61 (1994), 631-653;
-D. W. K. Andrews, Econometrica 59 (1991), 817-858.
-
-Whitened residuals, with instruments transformed so that the IV equations stay the same.
-
-A residual eps is modelled as ARMA(1, 1), (1 - a q^-1) eps(k) = (1 + c q^-1) n(k). Written as eps = T n with the lower
-triangular matrix T of that filter, its score is
-
-    sum Z(k) eps(k) = sum zeta(k) n(k),    zeta = T^T Z, the same filter run backwards,
-
-whatever a and c are. The terms zeta(k) n(k) depend on each other far less than Z(k) eps(k): measurement noise enters a
-one-step residual at k and again, nearly cancelling, at k - 1, and no kernel with few lags sees that cancellation, while
-one with many loses variance to the estimated parameters. What colour is left is for the kernel to count. Filters start
-as stationary noise does, not from zero, so that the ends of many short batches count too.
-
-A disturbance that lasts many samples under much measurement noise is only partly seen so: with a current that wanders
-for 100 s the standard deviations of the surge parameters come out about a fifth too small. `components` sees it.
-
-Source: prewhitening after D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992), 953-966, here of the residuals
-and exact; noise in one-step predictors: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66).
-"""
+"""Covariances of sums of noise: long-run, from the parts of the noise, and of whitened residuals."""
 
 from __future__ import annotations
 
@@ -53,6 +22,17 @@ FEW_LAGS = 10  # up to this number, sums of products are faster than Fourier tra
 
 
 # Long-run covariance of a vector series: how its sum varies when samples depend on each other.
+#
+#     Omega = sum over lags l of w(l / (L + 1)) Gamma(l),    Gamma(l) = sum over k of s(k) s(k - l)^T
+#
+# Lags never reach from one batch into another. Kernels are positive semidefinite, and so is Omega.
+#
+# Where lags nearly cancel lag zero, as noise does that enters with opposite sign a sample later, Bartlett's kernel
+# (Newey and West) loses a share 1 / L of that cancellation, Parzen's only about 6 / L^2; Parzen's is therefore the
+# default.
+#
+# Source: W. K. Newey and K. D. West, Econometrica 55 (1987), 703-708, and Review of Economic Studies 61 (1994),
+# 631-653; D. W. K. Andrews, Econometrica 59 (1991), 817-858.
 
 
 def bartlett(x: Array) -> Array:
@@ -236,6 +216,22 @@ def as_correlation(found: Array) -> Array:
 
 
 # Whitened residuals, with instruments transformed so that the IV equations stay the same.
+#
+# A residual eps is modelled as ARMA(1, 1), (1 - a q^-1) eps(k) = (1 + c q^-1) n(k). Written as eps = T n with the lower
+# triangular matrix T of that filter, its score is
+#
+#     sum Z(k) eps(k) = sum zeta(k) n(k),    zeta = T^T Z, the same filter run backwards,
+#
+# whatever a and c are. The terms zeta(k) n(k) depend on each other far less than Z(k) eps(k): measurement noise enters
+# a one-step residual at k and again, nearly cancelling, at k - 1, and no kernel with few lags sees that cancellation,
+# while one with many loses variance to the estimated parameters. What colour is left is for the kernel to count.
+# Filters start as stationary noise does, not from zero, so that the ends of many short batches count too.
+#
+# A disturbance that lasts many samples under much measurement noise is only partly seen so: with a current that wanders
+# for 100 s the standard deviations of the surge parameters come out about a fifth too small. `components` sees it.
+#
+# Source: prewhitening after D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992), 953-966, here of the residuals
+# and exact; noise in one-step predictors: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.66).
 
 MOVING_AVERAGES = np.tanh(np.linspace(-2.3, 2.3, 18))
 """Values tried for c, from -0.98 to 0.98; they need not be exact."""

@@ -1,48 +1,4 @@
-"""Nuisance regressors: an unknown current and wind, and terms of the wind from a vane.
-
-Nuisance regressors for an unknown mean current and wind, derived from the terms.
-
-With a current (N, E) in the n-frame the water velocities are u - (N cos psi + E sin psi) and v - (-N sin psi + E cos
-psi). A term f(u, v) of second order then grows by its derivatives times cos psi and sin psi, and by its second
-derivatives times cos^2 psi and sin 2psi; the unknown factors are estimated along. (sin^2 psi is left out: with
-zero-mean instruments it is minus cos^2 psi.) For the manoeuvring model of 18 terms these are exactly the published
-regressors. Where a modulus stands over something negative its derivatives change sign; every batch takes the sign that
-its data have, so batches excited either way can be estimated together.
-
-The current's components also change along the axes of a ship that turns. This leaves r cos psi and r sin psi in surge
-and sway, which most models have by their own terms, too.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (4.44), (5.22), (5.37), (5.68)-(5.70).
-
-Regressors of an unknown steady current, exact to first order around a first guess of it.
-
-The acceleration over ground is that through water, Phi(nu - R(psi)^T c)^T theta with the current c to north and east,
-and the change of the current's components along the axes of a ship that turns, r S R^T c with S = [[0, 1], [-1, 0]].
-Around c_0 and theta_0
-
-    Phi(nu - R^T c)^T theta + r S R^T c ~ Phi(nu - R^T c_0)^T theta + r S R^T c_0 + J(c_0, theta_0) (c - c_0),
-
-with J = d(Phi^T theta) / dc + r S R^T. So two columns stand for all that the current does, whatever the terms are, and
-the estimate is repeated around what it found until the current stays. Beside the regressors of (5.68)-(5.70), which
-leave every product of a parameter and the current free, the two cost less information; they need no excitation
-condition.
-
-Source: Gauss's and Newton's linearisation of the model of T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
-Motion Control (2011), 8.3; the predictor of F. Ljungberg, doctoral thesis, Linköping University, (5.63), with it.
-
-Terms of the wind from a vane: unbiased for noise on its angle.
-
-Gaussian noise of standard deviation s on an angle shrinks its n-th harmonic by exp(-n**2 s**2 / 2). Components of the
-wind, n = 1, come divided by exp(-s**2 / 2). In a term of second degree, such as u_q v_q, or |u_q| u_q where u_q keeps
-its sign, that leaves the mean over the angle, n = 0, too large by exp(s**2) and the rest, n = 2, too small by as much.
-Both are known from the term at the wind turned by 90 degrees.
-
-That is right for instruments. Least squares is biased towards zero by the noise left in its regressors, and more so the
-more they are enlarged; it uses the wind as measured.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (5.47)-(5.50), for components; K. V. Mardia and P. E. Jupp,
-Directional Statistics (2000), 3.5.7, for the harmonics of an angle with Gaussian noise.
-"""
+"""Nuisance regressors: an unknown current and wind, and terms of the wind from a vane."""
 
 from __future__ import annotations
 
@@ -63,6 +19,18 @@ from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import Expression
 
 # Nuisance regressors for an unknown mean current and wind, derived from the terms.
+#
+# With a current (N, E) in the n-frame the water velocities are u - (N cos psi + E sin psi) and v - (-N sin psi + E cos
+# psi). A term f(u, v) of second order then grows by its derivatives times cos psi and sin psi, and by its second
+# derivatives times cos^2 psi and sin 2psi; the unknown factors are estimated along. (sin^2 psi is left out: with
+# zero-mean instruments it is minus cos^2 psi.) For the manoeuvring model of 18 terms these are exactly the published
+# regressors. Where a modulus stands over something negative its derivatives change sign; every batch takes the sign
+# that its data have, so batches excited either way can be estimated together.
+#
+# The current's components also change along the axes of a ship that turns. This leaves r cos psi and r sin psi in surge
+# and sway, which most models have by their own terms, too.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (4.44), (5.22), (5.37), (5.68)-(5.70).
 
 FIRST = ("cos psi", "sin psi")
 SECOND = ("cos^2 psi", "sin 2psi")
@@ -215,6 +183,20 @@ def headings(psi: Any) -> dict[str, Any]:
 
 
 # Regressors of an unknown steady current, exact to first order around a first guess of it.
+#
+# The acceleration over ground is that through water, Phi(nu - R(psi)^T c)^T theta with the current c to north and east,
+# and the change of the current's components along the axes of a ship that turns, r S R^T c with S = [[0, 1], [-1, 0]].
+# Around c_0 and theta_0
+#
+#     Phi(nu - R^T c)^T theta + r S R^T c ~ Phi(nu - R^T c_0)^T theta + r S R^T c_0 + J(c_0, theta_0) (c - c_0),
+#
+# with J = d(Phi^T theta) / dc + r S R^T. So two columns stand for all that the current does, whatever the terms are,
+# and the estimate is repeated around what it found until the current stays. Beside the regressors of (5.68)-(5.70),
+# which leave every product of a parameter and the current free, the two cost less information; they need no excitation
+# condition.
+#
+# Source: Gauss's and Newton's linearisation of the model of T. I. Fossen, Handbook of Marine Craft Hydrodynamics and
+# Motion Control (2011), 8.3; the predictor of F. Ljungberg, doctoral thesis, Linköping University, (5.63), with it.
 
 STEADY_CURRENT = ("current to north", "current to east")
 """Names of the nuisance parameters [m/s]."""
@@ -278,6 +260,17 @@ def _accelerations(model: VesselModel, parameters: Array, table: Table) -> Array
 
 
 # Terms of the wind from a vane: unbiased for noise on its angle.
+#
+# Gaussian noise of standard deviation s on an angle shrinks its n-th harmonic by exp(-n**2 s**2 / 2). Components of the
+# wind, n = 1, come divided by exp(-s**2 / 2). In a term of second degree, such as u_q v_q, or |u_q| u_q where u_q keeps
+# its sign, that leaves the mean over the angle, n = 0, too large by exp(s**2) and the rest, n = 2, too small by as
+# much. Both are known from the term at the wind turned by 90 degrees.
+#
+# That is right for instruments. Least squares is biased towards zero by the noise left in its regressors, and more so
+# the more they are enlarged; it uses the wind as measured.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (5.47)-(5.50), for components; K. V. Mardia and P. E.
+# Jupp, Directional Statistics (2000), 3.5.7, for the harmonics of an angle with Gaussian noise.
 
 
 def with_wind_as_measured(record: Record) -> Record:

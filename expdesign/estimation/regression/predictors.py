@@ -20,12 +20,6 @@ left side.
 Fewer regressors leave more information about the ship, and a bias where the disturbance is there after all.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (5.63)-(5.76), (6.5)-(6.10).
-
-Rows of a regression where velocities are read less often than they are sampled.
-
-Between two readings a velocity is interpolated, and its differences from sample to sample are those of the
-interpolation. Their sum from one reading to the next is a difference of readings. Every row therefore becomes the mean
-of the rows between two readings, for each output by itself; equations that hold for rows hold for their means.
 """
 
 from __future__ import annotations
@@ -297,6 +291,10 @@ def _merged_note(name: str, partners: Mapping[str, str]) -> str:
 
 
 # Rows of a regression where velocities are read less often than they are sampled.
+#
+# Between two readings a velocity is interpolated, and its differences from sample to sample are those of the
+# interpolation. Their sum from one reading to the next is a difference of readings. Every row therefore becomes the
+# mean of the rows between two readings, for each output by itself; equations that hold for rows hold for their means.
 
 
 def mean_between_readings(rows: Array, interpolated: Array) -> Array:

@@ -4,13 +4,6 @@ Arrays put samples first: `Phi` is (k, n, p), so that sample k's regression matr
 transpose of `Phi[k]`. Instruments have the same layout, (k, n, q).
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (2.14)-(2.21).
-
-Zero-mean instruments: without their mean, constants and even moments of the noise drop out of the IV equations.
-
-Subtracting the mean over the complete data equals adding one constant nuisance parameter per output, subtracting it
-per batch equals one constant per output and batch (Lemmas 7.1 and 7.2). The complete way never has more variance.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (4.40), (7.19), (7.20).
 """
 
 from __future__ import annotations
@@ -134,6 +127,11 @@ def _count(batch: Integers) -> Integers:
 
 
 # Zero-mean instruments: without their mean, constants and even moments of the noise drop out of the IV equations.
+#
+# Subtracting the mean over the complete data equals adding one constant nuisance parameter per output, subtracting it
+# per batch equals one constant per output and batch (Lemmas 7.1 and 7.2). The complete way never has more variance.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (4.40), (7.19), (7.20).
 
 MEANS = ("none", "batch", "complete")
 

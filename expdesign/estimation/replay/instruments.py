@@ -18,21 +18,6 @@ Simulations start from the first measured velocity, whose noise is in the first 
 batch is therefore not used: with it, many short batches are biased by half a standard deviation.
 
 Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39), for velocities.
-
-Samples whose inputs follow the ship's motion: left out, or with instruments from the commands as planned.
-
-Instruments simulated from inputs are valid where those inputs owe nothing to the disturbances. An autopilot, or a
-helmsman on a track, answers with the inputs to what the disturbances did: with a current that lasts, instruments from
-such inputs are correlated with the residual for as long as the current lasts. The commands as planned do not depend on
-it, and drive the same ship. How the ship was steered is not known here, so the planned commands drive the model in
-open loop; with a known controller they would drive the closed loop. That changes how strong instruments are, not
-whether they are valid. Headings and winds of instruments stay the measured ones, as elsewhere.
-
-Where steered samples are left out, what remains of a batch is simulated from its own first measured velocity, as every
-batch is.
-
-Source: closed-loop instrumental variables from an external signal, T. Söderström and P. Stoica, Instrumental Variable
-Methods for System Identification (1983), and M. Gilson and P. Van den Hof, Automatica 41 (2005), 241-249.
 """
 
 from __future__ import annotations
@@ -201,6 +186,19 @@ def _last_seen(seen: NDArray[np.bool_]) -> Integers:
 
 
 # Samples whose inputs follow the ship's motion: left out, or with instruments from the commands as planned.
+#
+# Instruments simulated from inputs are valid where those inputs owe nothing to the disturbances. An autopilot, or a
+# helmsman on a track, answers with the inputs to what the disturbances did: with a current that lasts, instruments from
+# such inputs are correlated with the residual for as long as the current lasts. The commands as planned do not depend
+# on it, and drive the same ship. How the ship was steered is not known here, so the planned commands drive the model in
+# open loop; with a known controller they would drive the closed loop. That changes how strong instruments are, not
+# whether they are valid. Headings and winds of instruments stay the measured ones, as elsewhere.
+#
+# Where steered samples are left out, what remains of a batch is simulated from its own first measured velocity, as
+# every batch is.
+#
+# Source: closed-loop instrumental variables from an external signal, T. Söderström and P. Stoica, Instrumental Variable
+# Methods for System Identification (1983), and M. Gilson and P. Van den Hof, Automatica 41 (2005), 241-249.
 
 AUTO, USE, LEAVE_OUT, PLANNED = "auto", "use", "leave-out", "planned"
 STEERED = (AUTO, USE, LEAVE_OUT, PLANNED)

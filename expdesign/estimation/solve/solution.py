@@ -1,35 +1,4 @@
-"""LS and IV: the estimate, its covariance and its residuals; refined IV, with instruments simulated again.
-
-LS and IV: the estimate, its covariance and its residuals, from a regression and instruments.
-
-    theta = (sum Z Phi^T)^-1 sum Z y                          LS is IV with Z = Phi
-    P = G^-1 Omega G^-T,   G = sum Z Phi^T,   Omega = covariance of sum Z(k) eps(k), see `sandwich`
-
-With one block of instruments per batch there are more equations than unknowns; they are weighted by the inverse second
-moments of the instruments (two-stage least squares), which keeps the estimate free of the scale of parameters, or by
-weights of the caller.
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (2.17), (2.21), (4.45); L. P. Hansen, Econometrica 50
-(1982), 1029-1054.
-
-Refined IV: simulate the instruments, estimate, simulate them again with the estimate, until it stops moving.
-
-From few data an estimate may be an unstable model, which gives no instruments. They are then simulated with the
-estimate drawn towards the first model,
-
-    theta(w) = (P^-1 + w D^-1)^-1 (P^-1 theta + w D^-1 theta_0),    D = diag(spread^2),
-
-by the least of some weights w at which the simulation stays bounded. Combinations that the data show stay as estimated,
-others come near the first model. With such instruments the estimate itself is not biased, as they depend on the noise
-no more than others do; most become stable. One that stays unstable is given as drawn, with the covariance before that.
-
-From few data refinement may also wander: a poor estimate simulates weak instruments, which give a poor estimate.
-Outputs whose parameters do not settle keep the first instruments, which do not depend on the noise at all where they
-come from the vessel file. (The strongest instruments met would: they follow what disturbances did to the ship.)
-
-Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39); P. C. Young, refined instrumental variables,
-Automatica 51 (2015), 35-46.
-"""
+"""LS and IV: the estimate, its covariance and its residuals; refined IV, with instruments simulated again."""
 
 from __future__ import annotations
 
@@ -52,6 +21,16 @@ STABILISING_WEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
 
 
 # LS and IV: the estimate, its covariance and its residuals, from a regression and instruments.
+#
+#     theta = (sum Z Phi^T)^-1 sum Z y                          LS is IV with Z = Phi
+#     P = G^-1 Omega G^-T,   G = sum Z Phi^T,   Omega = covariance of sum Z(k) eps(k), see `sandwich`
+#
+# With one block of instruments per batch there are more equations than unknowns; they are weighted by the inverse
+# second moments of the instruments (two-stage least squares), which keeps the estimate free of the scale of parameters,
+# or by weights of the caller.
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (2.17), (2.21), (4.45); L. P. Hansen, Econometrica 50
+# (1982), 1029-1054.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -194,6 +173,23 @@ def _check(regression: Regression, weighting: Weighting) -> None:
 
 
 # Refined IV: simulate the instruments, estimate, simulate them again with the estimate, until it stops moving.
+#
+# From few data an estimate may be an unstable model, which gives no instruments. They are then simulated with the
+# estimate drawn towards the first model,
+#
+#     theta(w) = (P^-1 + w D^-1)^-1 (P^-1 theta + w D^-1 theta_0),    D = diag(spread^2),
+#
+# by the least of some weights w at which the simulation stays bounded. Combinations that the data show stay as
+# estimated, others come near the first model. With such instruments the estimate itself is not biased, as they depend
+# on the noise no more than others do; most become stable. One that stays unstable is given as drawn, with the
+# covariance before that.
+#
+# From few data refinement may also wander: a poor estimate simulates weak instruments, which give a poor estimate.
+# Outputs whose parameters do not settle keep the first instruments, which do not depend on the noise at all where they
+# come from the vessel file. (The strongest instruments met would: they follow what disturbances did to the ship.)
+#
+# Source: F. Ljungberg, doctoral thesis, Linköping University, (4.37)-(4.39); P. C. Young, refined instrumental
+# variables, Automatica 51 (2015), 35-46.
 
 First = Callable[[], Array]
 """The first instruments (k, n, p), each time anew: not kept, as they are among the largest of arrays."""

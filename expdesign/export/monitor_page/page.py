@@ -1,10 +1,4 @@
-"""The page of a watch over a ship in operation.
-
-What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
-
-Source of the idea: a master's thesis on the estimation of a ship's yaw dynamics in operation, section on the influence
-of terms (absolute contributions beside each other, by manoeuvre).
-"""
+"""The page of a watch over a ship in operation."""
 
 from __future__ import annotations
 
@@ -32,6 +26,9 @@ from expdesign.monitoring import KINDS
 from expdesign.values import Array
 
 # What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
+#
+# Source of the idea: a master's thesis on the estimation of a ship's yaw dynamics in operation, section on the
+# influence of terms (absolute contributions beside each other, by manoeuvre).
 
 EQUATIONS = ("surge", "sway", "yaw")
 WHOLE = ("inertia:", "yaw:I_r")

@@ -1,18 +1,4 @@
-"""A yaw model learnt from a reference, and whether the reference was informative enough for it, in plain words.
-
-Yaw models by instrumental variables: noise of the inputs leaves no bias. The thesis only suggests this.
-
-Samples of even and of odd number have noise of their own and the same motion. The model driven by the one half gives
-the error, driven by the other the sensitivities that the error has to be orthogonal to, and the other way round:
-
-    sum Z_odd' (r_even - r_hat_even(theta)) + sum Z_even' (r_odd - r_hat_odd(theta)) = 0
-
-Output error has the same sensitivities on both sides, so that their noise correlates with the error's. What is given up
-is half of the samples on either side: the spread is larger. The noise must be without memory from sample to sample.
-
-Source: T. Söderström, Errors-in-Variables Methods in System Identification (2018), chapter 6; J. Linder and M. Enqvist
-(2015) for instruments in ship models; A. Savitzky and M. J. E. Golay, Analytical Chemistry 36 (1964), 1627-1639.
-"""
+"""A yaw model learnt from a reference, and whether the reference was informative enough for it, in plain words."""
 
 from __future__ import annotations
 
@@ -39,6 +25,19 @@ from expdesign.values import Array
 from expdesign.vessel import VesselModel
 
 # Yaw models by instrumental variables: noise of the inputs leaves no bias. The thesis only suggests this.
+#
+# Samples of even and of odd number have noise of their own and the same motion. The model driven by the one half gives
+# the error, driven by the other the sensitivities that the error has to be orthogonal to, and the other way round:
+#
+#     sum Z_odd' (r_even - r_hat_even(theta)) + sum Z_even' (r_odd - r_hat_odd(theta)) = 0
+#
+# Output error has the same sensitivities on both sides, so that their noise correlates with the error's. What is given
+# up is half of the samples on either side: the spread is larger. The noise must be without memory from sample to
+# sample.
+#
+# Source: T. Söderström, Errors-in-Variables Methods in System Identification (2018), chapter 6; J. Linder and M.
+# Enqvist (2015) for instruments in ship models; A. Savitzky and M. J. E. Golay, Analytical Chemistry 36 (1964),
+# 1627-1639.
 
 STEPS = 15
 LARGEST_STEP = 0.5

@@ -319,7 +319,8 @@ class VesselTable(Table):
     std: dict[str, NonNegative] = Field(
         default={},
         description="the standard deviations of what [sensors] and [[actuators]] state, by the key of the sensor, or "
-        "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_rate; 0, for known, when not given",
+        "by signal and quantity: heading_bias_rad, n1_lag_s, a1_delay_s, rudder1_rate; 0, for known, when not given. "
+        "diagnose counts all of them, estimate those of dead times, lags and slew rates, and names the others",
     )
     roll: PendulumTable | None = Field(
         default=None,

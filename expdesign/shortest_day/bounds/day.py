@@ -1,15 +1,4 @@
-"""A lower bound on the day: by what must be told, and by the way to the goal.
-
-The least time of a way from rest to rest: no ship gains or loses speed faster than its model and limits allow.
-
-The speed S through water changes by dS/dt = cos(b) du/dt + sin(b) dv/dt at the drift angle b, u = S cos(b) and
-v = S sin(b). The most and the least of it that the nominal model allows are bounded over boxes of speed, drift angle,
-yaw rate, heading and inputs by affine arithmetic; boxes where a bound is far above the best sample are halved. A speed
-that gains and loses at these rates is never below that of a motion (comparison principle), so it covers the way first.
-
-Source: F. Clarke, Functional Analysis, Calculus of Variations and Optimal Control (2013), for the comparison; combined
-here with `affine`.
-"""
+"""A lower bound on the day: by what must be told, and by the way to the goal."""
 
 from __future__ import annotations
 
@@ -39,6 +28,15 @@ SLOW_START = 0.01  # share of the way's time that gaining speed must take for th
 
 
 # The least time of a way from rest to rest: no ship gains or loses speed faster than its model and limits allow.
+#
+# The speed S through water changes by dS/dt = cos(b) du/dt + sin(b) dv/dt at the drift angle b, u = S cos(b) and v = S
+# sin(b). The most and the least of it that the nominal model allows are bounded over boxes of speed, drift angle, yaw
+# rate, heading and inputs by affine arithmetic; boxes where a bound is far above the best sample are halved. A speed
+# that gains and loses at these rates is never below that of a motion (comparison principle), so it covers the way
+# first.
+#
+# Source: F. Clarke, Functional Analysis, Calculus of Variations and Optimal Control (2013), for the comparison;
+# combined here with `affine`.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

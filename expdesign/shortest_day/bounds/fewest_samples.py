@@ -11,18 +11,6 @@ tells most per time, by the equivalence theorem. The measure is searched, the ma
 Source: J. Kiefer and J. Wolfowitz, The equivalence of two extremum problems, Canad. J. Math. 12 (1960), 363-366;
 S. D. Silvey, D. M. Titterington and B. Torsney, An algorithm for optimal designs on a finite design space, Commun.
 Statist. A7 (1978), 1379-1389 (weights); combined here.
-
-The sample that tells most by a multiplier, over all motions of a class: a number found, and one proved.
-
-With B(x) the information of one sample and G positive semidefinite, <G, B(x)> is a convex function of the regressors.
-Over a box they are an affine function of its coordinates but for an error. A convex function of an affine one is
-largest at a corner of the box, and of an affine function of the force at a corner of the forces. So
-
-    <G, B(x)> <= (sqrt(max over corners of the affine part) + sqrt(e^T |G| e))^2
-
-with the errors e, for all x in the box. Boxes where this is much above the best sample found are halved.
-
-Source: A. H. Land and A. G. Doig 1960 (branch and bound); combined here.
 """
 
 from __future__ import annotations
@@ -58,6 +46,16 @@ SEARCHES = 5  # for the sample that tells most, each with a better measure
 
 
 # The sample that tells most by a multiplier, over all motions of a class: a number found, and one proved.
+#
+# With B(x) the information of one sample and G positive semidefinite, <G, B(x)> is a convex function of the regressors.
+# Over a box they are an affine function of its coordinates but for an error. A convex function of an affine one is
+# largest at a corner of the box, and of an affine function of the force at a corner of the forces. So
+#
+#     <G, B(x)> <= (sqrt(max over corners of the affine part) + sqrt(e^T |G| e))^2
+#
+# with the errors e, for all x in the box. Boxes where this is much above the best sample found are halved.
+#
+# Source: A. H. Land and A. G. Doig 1960 (branch and bound); combined here.
 
 Indices = NDArray[np.intp]
 

@@ -2,16 +2,6 @@
 
 A motion may take any velocity with any input at any time. What cannot follow from each other in a real motion counts
 as possible, so the class is wider than what the ship can do, and a bound for it holds for the ship.
-
-Affine arithmetic: what an expression can be over many boxes at once, with the correlation of its parts kept.
-
-A quantity over a box is c + sum_i g_i s_i + e with all s_i in [-1, 1] and |e| at most a stated error. Sums are exact;
-products, moduli, sines and cosines keep their linear part and add the rest to the error, which falls with the square of
-the size of the box. The rounding of numbers is not counted.
-
-Source: J. L. D. Comba and J. Stolfi, Affine arithmetic and its applications to computer graphics, SIBGRAPI (1993),
-9-18; L. H. de Figueiredo and J. Stolfi, Affine arithmetic: concepts and applications, Numer. Algorithms 37 (2004),
-147-158.
 """
 
 from __future__ import annotations
@@ -33,6 +23,14 @@ FEWEST_SIDES, MOST_SIDES = 4, 24  # of the polygon that holds the force of an az
 
 
 # Affine arithmetic: what an expression can be over many boxes at once, with the correlation of its parts kept.
+#
+# A quantity over a box is c + sum_i g_i s_i + e with all s_i in [-1, 1] and |e| at most a stated error. Sums are exact;
+# products, moduli, sines and cosines keep their linear part and add the rest to the error, which falls with the square
+# of the size of the box. The rounding of numbers is not counted.
+#
+# Source: J. L. D. Comba and J. Stolfi, Affine arithmetic and its applications to computer graphics, SIBGRAPI (1993),
+# 9-18; L. H. de Figueiredo and J. Stolfi, Affine arithmetic: concepts and applications, Numer. Algorithms 37 (2004),
+# 147-158.
 
 
 @dataclass(frozen=True, eq=False)

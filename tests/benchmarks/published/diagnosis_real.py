@@ -214,7 +214,7 @@ def fault(data: Path, hull: str, place: int, number: int, seed: int) -> dict[str
     except NoAnswer as error:
         return row | {"named": "", "verdict": f"no answer: {error}", "findings": [], "seconds": 0.0, "seen": None}
     row |= row_of(found, time.process_time() - begin)
-    own_size = of_instruments(trial.judged) | (of_model(vessel, clean) if {*OF_MODEL} & {*dict(effects)} else {})
+    own_size = of_instruments(trial.judged) | of_model(vessel, clean, {*OF_MODEL} & {*dict(effects)})
     row["named"], row["off"] = answer(injected, found, effects, own_size)
     row["doubts"] = list(getattr(own, "faults", ()))
     row["seen"] = [kinematics_see(clean, faulty) if injected.batch else False, None]

@@ -9,7 +9,7 @@ Beside the diagnosis stand two tests that know what to look for, and say whether
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,7 +38,7 @@ SEEN = 0.05
 """p-value of an oracle that sees: six stretches give no less than 0.016."""
 STD = 2.5
 """Standard errors within which a size is right."""
-OF_MODEL = ("delay:all",)
+OF_MODEL = ("delay:all", "offset:rudder", "offset:a")
 """Effects that a model may lack before a fault."""
 
 
@@ -248,16 +248,16 @@ def of_instruments(record: Record) -> dict[str, float]:
     return {"gyro": gyro - 1.0, "log": float(scale) - 1.0, "lever:forward": float(-arm), "late:u": float(-late)}
 
 
-def of_model(vessel: Vessel, record: Record) -> dict[str, float]:
-    """The dead time that a model lacks on untouched records already, by the likelihood: least squares make one.
+def of_model(vessel: Vessel, record: Record, effects: Iterable[str]) -> dict[str, float]:
+    """What of these a model lacks on untouched records already, each by the likelihood alone.
 
-    Their differences from sample to sample are those of a ship a little later than she is.
+    A ship needs some angle to sail straight, another one on another day. Least squares make a dead time: their
+    differences from sample to sample are those of a ship a little later than she is.
     """
     ship = extended_model(vessel, record)
     windows = stable_windows(ship, record)
-    return {
-        "delay:all": float(fit(ship, windows, ("delay:all",), starts=fitted_start(ship, windows)).value("delay:all"))
-    }
+    starts = fitted_start(ship, windows)
+    return {key: float(fit(ship, windows, (key,), starts=starts).value(key)) for key in effects}
 
 
 def _changes(batch: Batch) -> tuple[Array, Array, Array, Array]:
