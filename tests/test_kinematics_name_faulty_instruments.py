@@ -1,6 +1,7 @@
 """Instruments are compared before any model: faults are named with their size, clean records give no note."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -295,3 +296,12 @@ def test_tank_records_are_not_doubted() -> None:
     ship = load_vessel(outside("field/crash/vessel.toml"))
     for path in sorted(outside("kvlcc2-hsva-7m").glob("*.csv")):
         assert measured([path], ship).doubts == ()
+
+
+@pytest.mark.parametrize("name", ["velocity_scale", "surge_scale", "yaw_rate_scale", "yaw_rate_bias_radps"])
+def test_a_fault_that_the_vessel_file_states_is_not_told_again(tmp_path: Path, ship: Vessel, name: str) -> None:
+    spoil, truth = FAULTS[name]
+    (log,) = voyages(1, "random", sample_s=0.4, seed=3)
+    stating = replace(ship, sensors=replace(ship.sensors, **{name: truth}))
+    assert len(read(tmp_path, spoil(log), ship).faults) == 1
+    assert read(tmp_path, spoil(log), stating).faults == ()
