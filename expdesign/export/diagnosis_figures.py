@@ -297,6 +297,10 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     ]
 
 
+RIGHT_EDGE = 0.94
+"""Of the axes of a figure that takes the places of another, in its width: room for half of a number at their end."""
+
+
 @page_figure
 def _residual_figure(
     name: str,
@@ -327,7 +331,7 @@ def _residual_figure(
     rows[-1].set_xlabel(variable_label(name), fontsize=9)
     figure.align_ylabels()
     for axes, place in zip(rows, places, strict=False):
-        axes.set_position(place)
+        axes.set_position((place.x0, place.y0, min(place.x1, RIGHT_EDGE) - place.x0, place.height))
     label = f"Acceleration that the model lacks against {variable_label(name)}"
     drawn = svg(figure, key=f"residual-{name}", label=label)
     places += [] if places else [axes.get_position() for axes in rows]

@@ -124,9 +124,14 @@ def plan_files(case: Scenario, plan: Plan, accuracy: PlannedAccuracy) -> dict[st
 
 def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
     """What the files state and the trial does not use, or takes as certain; one line each."""
-    what = "run or leg of this plan"
-    told = actuation_remarks(case.vessel, [plan.commands], what), speed_remarks(case.vessel, [plan.trajectory], what)
-    return (*case.remarks, *leg_remarks(case), *told[0], *told[1])
+    values, runs = plan.commands.values, [leg for leg in plan.legs if leg.kind == "primitive"]
+    sailed = [replace(plan.commands, values=values[leg.first : leg.last]) for leg in runs]
+    return (
+        *case.remarks,
+        *leg_remarks(case),
+        *(actuation_remarks(case.vessel, sailed, "run of this plan") if sailed else ()),
+        *speed_remarks(case.vessel, [plan.trajectory], "run or leg of this plan"),
+    )
 
 
 def leg_remarks(case: Scenario) -> tuple[str, ...]:

@@ -24,6 +24,8 @@ SPEED_SLACK = 0.1
 """Share of the largest speed of the data by which a run may go beyond them."""
 FAR_FROM_LIMIT = 0.5
 """Share of an actuator's limit below which no run comes near it."""
+IDLE = 1e-9
+"""Share of an actuator's limit, or command where it has none, up to which it is not used: what rounding leaves."""
 
 
 def scored(case: Scenario, *, progress: Progress = silent) -> tuple[PrimitiveInformation, ...]:
@@ -81,6 +83,8 @@ def speed_remarks(vessel: Vessel, runs: Iterable[Trajectory], what: str) -> tupl
 def actuation_remarks(vessel: Vessel, runs: Iterable[Commands], what: str) -> tuple[str, ...]:
     """Actuators that no run uses, and limits that none comes near; one line each."""
     peaks = np.max([np.abs(commands.values).max(axis=0) for commands in runs], axis=0)
+    sizes = np.array([max(abs(limit.low), abs(limit.high)) for limit in vessel.limits])
+    peaks[peaks <= IDLE * np.where(np.isfinite(sizes), sizes, 1.0)] = 0.0
     used = dict(zip(vessel.model.inputs, peaks.tolist(), strict=True))
     idle = [
         column_name(signal)
@@ -88,7 +92,6 @@ def actuation_remarks(vessel: Vessel, runs: Iterable[Commands], what: str) -> tu
         if not any(used[signal] for signal in actuator.signals)
         for signal in actuator.signals
     ]
-    sizes = [max(abs(limit.low), abs(limit.high)) for limit in vessel.limits]
     far = [
         f"{column_name(signal)} ({used[signal] / size:.0%})"
         for signal, size in zip(vessel.model.inputs, sizes, strict=True)

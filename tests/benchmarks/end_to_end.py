@@ -1,0 +1,210 @@
+"""Published ships from particulars to a diagnosis: planned, sailed by their published models, estimated and diagnosed.
+
+Of each ship her particulars, one circle and one speed are known. Her candidates and her bay are those of
+`expdesign new`, scaled to her length and speed. The runs that the plan chooses are sailed by the published model, which
+has another structure than the vessel file, and measured with noise. The vessel that `estimate` then finds predicts
+circles and zig-zags with intervals; they are compared with those of the published model.
+
+    PYTHONPATH=tests/benchmarks python tests/benchmarks/end_to_end.py kcs mariner
+    PYTHONPATH=tests/benchmarks python tests/benchmarks/end_to_end.py kcs --unplanned
+
+Without ships all of them; with --unplanned every candidate is sailed once, which takes a tenth of the time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import re
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import published_models as published
+from expdesign.cli import main as expdesign
+from expdesign.dictionary import Primitive, build_dictionary
+from expdesign.export import vessel_toml
+from expdesign.particulars import Stated, nominal
+from expdesign.particulars.trials import Fleet
+from expdesign.scenario import Scenario, load_scenario, load_vessel
+from expdesign.simulation import steady_ahead
+from expdesign.vessel import Sensors, Vessel
+from expdesign.workflows import new
+from particulars import MODELS, case, known_of
+
+SHIPS = tuple(name for name in MODELS if name != "otter")  # of one propeller and one rudder
+TEMPLATE_M, TEMPLATE_MPS = 80.0, 6.5  # length and top speed of the ship that the template is of
+DRAWS = 300
+METHODS = ("ls", "iv", "oe")
+STEPS = 10  # of the published model in a sample
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one ship."""
+
+    ship: str
+    plan: str  # verified or not, and why
+    inside: int  # trial values of the published model in the 95 % intervals of the estimated vessel
+    values: int
+    error: float  # median of the sizes of logarithms of predicted by true
+    before: float  # the same of the vessel of particulars
+    said: str  # by the diagnosis, first
+    seconds: float  # of processor
+
+
+def folder_of(name: str, folder: Path) -> Scenario:
+    """The files of `new`, scaled to the ship, with her nominal vessel."""
+    one = case(name)
+    found = nominal(replace(one.card, stated=known_of(one))).vessel
+    size, swift = found.length_m / TEMPLATE_M, MODELS[name]().speed_mps / TEMPLATE_MPS
+    sample_s = max(0.1, round(size / swift, 1))
+    noise = Sensors(
+        position_m=0.01 * size * TEMPLATE_M / 2, heading_rad=0.003, velocity_mps=0.01 * swift * TEMPLATE_MPS / 2,
+        yaw_rate_radps=0.003 * swift * TEMPLATE_MPS / found.length_m,
+    )  # fmt: skip
+    new(folder, kind="propeller-rudder")
+    found = replace(found, sample_time_s=sample_s, model=replace(found.model, sample_time_s=sample_s), sensors=noise)
+    (folder / "vessel.toml").write_text(vessel_toml(found), "utf-8")
+    scaled(folder / "dictionary.toml", {"speed_mps": swift, "from_speed_mps": swift, "_s": size / swift})
+    scaled(folder / "scenario.toml", {"_m": size, "_mps": swift, "total_s": size / swift})
+    outline = json.loads((folder / "area.geojson").read_text("utf-8"))
+    for feature in outline["features"]:
+        for ring in feature["geometry"]["coordinates"]:
+            ring[:] = [[m + size * (x - m) for x, m in zip(place, (11.0, 58.0), strict=True)] for place in ring]
+    (folder / "area.geojson").write_text(json.dumps(outline), "utf-8")
+    return load_scenario(folder / "scenario.toml")
+
+
+def scaled(path: Path, factors: dict[str, float]) -> None:
+    """Numbers of keys that end so, in a file, times factors; the first ending that fits counts."""
+
+    def number(match: re.Match[str]) -> str:
+        factor = next((by for end, by in factors.items() if match[1].endswith(end)), 1.0)
+        numbers = re.sub(r"-?\d+\.\d+", lambda one: repr(float(one[0]) * factor), match[2])
+        return f"{match[1]} = {numbers}"
+
+    path.write_text(re.sub(r"(\w+) = ([-\d.\[][-\d., \]]*)", number, path.read_text("utf-8")), "utf-8")
+
+
+def sailed(model: published.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """What the sensors read of the published model under the commands of a run, which it begins steadily."""
+    approach = steady_ahead(vessel, float(np.hypot(*run.entry_velocity[:2])))
+    drive, helm = (vessel.model.inputs.index(name) for name in ("n1", "rudder1"))
+    begin = published.order_for(model, approach.speed_mps)
+    per_rps = begin / approach.inputs[drive]  # the engine order that holds the speed is her own
+    values, sample_s = run.commands.values, vessel.sample_time_s
+    state = np.array([*run.entry_velocity, 0.0, 0.0, 0.0])
+    angle, states = 0.0, []
+    for row in values:
+        states.append(state)
+        wanted = approach.starboard * float(row[helm])
+        for _ in range(STEPS):
+            step = sample_s / STEPS
+            angle += float(np.clip(wanted - angle, -model.helm_rate_radps * step, model.helm_rate_radps * step))
+            state = stepped(model, state, angle, per_rps * float(row[drive]), step)
+    u, v, r, north, east, heading = np.array(states).T
+    noise, count = vessel.sensors, len(values)
+
+    def read(signal: np.ndarray, std: float) -> np.ndarray:
+        return np.asarray(signal + std * rng.standard_normal(count))
+
+    return {
+        "time_s": sample_s * np.arange(count),
+        "north_m": read(north, noise.position_m), "east_m": read(east, noise.position_m),
+        "heading_rad": read(heading, noise.heading_rad), "u_mps": read(u, noise.velocity_mps),
+        "v_mps": read(v, noise.velocity_mps), "r_radps": read(r, noise.yaw_rate_radps),
+        "n1_rps": values[:, drive], "rudder1_rad": values[:, helm],
+    }  # fmt: skip
+
+
+def stepped(model: published.Model, state: np.ndarray, angle: float, order: float, step: float) -> np.ndarray:
+    """One Runge-Kutta step of a state (6,)."""
+
+    def rates(x: np.ndarray) -> np.ndarray:
+        c, s = math.cos(x[5]), math.sin(x[5])
+        return np.array([*model.rates(x[:3], angle, order), x[0] * c - x[1] * s, x[0] * s + x[1] * c, x[2]])
+
+    k1 = rates(state)
+    k2 = rates(state + step / 2 * k1)
+    k3 = rates(state + step / 2 * k2)
+    k4 = rates(state + step * k3)
+    return np.asarray(state + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def deviations(vessel: Vessel, values: Iterable[Stated]) -> tuple[np.ndarray, np.ndarray]:
+    """Logarithms of predicted by true values, and whether the true ones lie in 95 % intervals of drawn vessels."""
+    drawn = vessel.model.drawn_parameters(DRAWS, np.random.default_rng(0))
+    fleet = Fleet(vessel, np.vstack([vessel.model.parameters, drawn]), fastest_mps=30.0)
+    errors, inside = [], []
+    results = {trial: fleet.results(trial) for trial in dict.fromkeys(one.trial for one in values)}
+    for one in values:
+        found = results[one.trial].get(one.quantity, np.full(DRAWS + 1, np.nan))
+        low, high = np.nanquantile(np.where(np.isnan(found[1:]), np.inf, found[1:]), [0.025, 0.975])
+        errors.append(math.log(found[0] / one.value) if np.isfinite(found[0]) and found[0] > 0 else math.inf)
+        inside.append(low <= one.value <= high)
+    return np.array(errors), np.array(inside)
+
+
+def outcome(
+    name: str, folder: Path, *, planned: bool = True, diagnosed: bool = True, methods: Iterable[str] = METHODS
+) -> Outcome:
+    """One ship, in a folder that is made."""
+    began = time.process_time()
+    files, one, rng = folder_of(name, folder), case(name), np.random.default_rng(0)
+    runs, plan = build_dictionary(files.vessel, files.dictionary), "not asked for"
+    if planned:
+        status = expdesign(["run", str(folder / "scenario.toml"), "--out", str(folder / "plan"), "--quiet"])
+        plan = f"refused ({status})"
+        if status == 0:
+            told = json.loads((folder / "plan" / "plan.json").read_text("utf-8"))
+            plan = "verified" if told["verified"] else "not verified"
+            chosen = {leg["name"] for leg in told["legs"]}
+            runs = tuple(run for run in runs if run.name in chosen)
+    data = []
+    for run in runs:
+        columns = sailed(MODELS[name](), files.vessel, run, rng)
+        data.append(folder / f"{run.name}.csv")
+        np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
+    common = [*map(str, data), "--vessel", str(folder / "vessel.toml"), "--quiet"]
+    told = expdesign(["estimate", *common, "--method", *methods, "--out", str(folder / "estimate")])
+    error = before = math.nan
+    inside = np.array([], dtype=bool)
+    if told == 0:
+        before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
+        errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
+        error = float(np.median(np.abs(errors)))
+    said = "not asked for"
+    if diagnosed:
+        status = expdesign(["diagnose", *common, "--out", str(folder / "diagnosis")])
+        said = f"status {status}"
+    if diagnosed and status == 0:
+        said = str(json.loads((folder / "diagnosis" / "diagnosis.json").read_text("utf-8"))["verdict"])
+    return Outcome(
+        ship=name, plan=plan, inside=int(inside.sum()), values=len(inside), error=error, before=before, said=said,
+        seconds=time.process_time() - began,
+    )  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("ships", nargs="*", default=SHIPS)
+    parser.add_argument("--unplanned", action="store_true", help="sail every candidate once, without a plan")
+    asked = parser.parse_args()
+    print("| ship | plan | in 95 % | median error: particulars | estimate | diagnosis | processor |")
+    print("|---|---|---|---|---|---|---|")
+    for name in asked.ships:
+        with tempfile.TemporaryDirectory() as folder:
+            row = outcome(name, Path(folder) / name, planned=not asked.unplanned)
+        share = f"{row.inside} of {row.values}" if row.values else "-"
+        errors = f"{math.expm1(row.before):.0%} | {math.expm1(row.error):.0%}" if row.values else "- | -"
+        print(f"| {name} | {row.plan} | {share} | {errors} | {row.said} | {row.seconds:.0f} s |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
