@@ -237,3 +237,27 @@ def test_held_out_parts_tell_of_two_runs_what_one_degree_of_freedom_cannot(monke
     windows = SimpleNamespace(batch=np.repeat(np.arange(float(runs)), 4))
     (after,) = backward_elimination.two_runs_by_predictions(found, (None, None), windows).steps  # type: ignore[arg-type]
     assert after.p_value == pytest.approx(1e-3 if told else 0.11, rel=0.01)
+
+
+def test_what_gains_nothing_beside_a_cause_of_which_nothing_is_left_is_asked_again(monkeypatch):
+    """A change of the ship takes the gain of a rudder's scale, and how runs differ leaves nothing of the change."""
+
+    def step(cause: str, p_value: float) -> Step:
+        chosen = SimpleNamespace(candidate=Candidate(cause=cause, free={cause: 0.0}), fit=cause)
+        return Step(chosen=chosen, p_value=p_value, alternatives=(), before=None, tests=())  # type: ignore[arg-type]
+
+    def improves(found: Selection, *_: object) -> list[bool]:
+        return [index == 0 for index, _ in enumerate(found.steps)]
+
+    steps = step("change_point", 1.0), step("actuator_scale", 1e-9), step("lever_arm", 0.5)
+    found = Selection(steps=steps, first=None, last=None, last_tests=())  # type: ignore[arg-type]
+    for name, instead in {
+        "improves_held_out": improves,
+        "open_candidates": lambda *_: [],
+        "with_runs_counted": lambda selection, *_: selection,
+        "without_step": lambda given, index, _windows: [*given[:index], *given[index + 1 :]],
+    }.items():
+        monkeypatch.setattr(backward_elimination, name, instead)
+    windows = SimpleNamespace(batch=np.arange(3.0))
+    kept, _ = backward_elimination.eliminate_backward(found, windows, lambda one: (one, []), 0)  # type: ignore[arg-type]
+    assert [one.chosen.candidate.cause for one in kept.steps] == ["actuator_scale"]

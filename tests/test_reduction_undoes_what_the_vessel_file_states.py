@@ -47,14 +47,15 @@ FAULTS = {
     **{fault.key: ship(**{fault.key: fault.neutral + 5 * fault.matters}) for fault in GAINS_AND_OFFSETS},
     "late log": ship(velocity_delay_s=2.0),
     "late gyro": ship(yaw_rate_delay_s=1.0, velocity_forward_m=6.0),
-    "wind": ship(wind_forward_m=8.0, wind_starboard_m=-1.0, heading_delay_s=1.0, **TIMED),
+    "wind": ship(wind_forward_m=8.0, wind_starboard_m=-1.0, wind_axis_rad=0.2, heading_delay_s=1.0, **TIMED),
 }
 HELD = ship(*LAG, yaw_rate_interval_s=2.0, **TWICE)
 ALL = ship(
     Response(rate=0.5, lag_s=3.0, delay_s=1.0), Response(rate=0.1, lag_s=2.0, deadband=0.3, offset=0.03),
     heading_bias_rad=0.05, velocity_angle_rad=0.05, yaw_rate_scale=1.1, yaw_rate_bias_radps=0.01,
     position_forward_m=5.0, position_starboard_m=-1.5, position_delay_s=1.0, heading_delay_s=1.0,
-    velocity_forward_m=6.0, velocity_starboard_m=2.0, yaw_rate_delay_s=1.0, wind_forward_m=8.0, **TIMED, **TWICE,
+    velocity_forward_m=6.0, velocity_starboard_m=2.0, yaw_rate_delay_s=1.0, wind_forward_m=8.0, wind_axis_rad=0.2,
+    **TIMED, **TWICE,
 )  # fmt: skip
 
 
@@ -238,7 +239,7 @@ def test_remarks_say_what_was_undone():
         "n1, a1, n2, a2 answer commands", "positions are 1 s late", "velocities are measured 6 m forward and 2 m to",
         "velocities are 2 s late; they are moved to their own time, and velocities are read every 2 s",
         "0.05 rad is taken off the headings", "axes 0.05 rad to starboard", "the yaw rate is divided by 1.1",
-        "winds are measured 8 m forward",
+        "winds are measured 8 m forward", "winds are measured along axes 0.2 rad to starboard; they are turned",
     ):  # fmt: skip
         assert sum(words in note for note in record.notes) == 1, words
 

@@ -45,6 +45,8 @@ def remarks(stated: Stated) -> Iterator[str]:
         value = getattr(sensors, row.key)
         if row.sensor in signals and value != row.neutral:
             yield f"{STATED}{row.undone(value)}."
+    if "wind" in signals and sensors.wind_axis_rad:
+        yield f"{STATED}winds are measured along axes {sensors.wind_axis_rad:.4g} rad to starboard; they are turned."
     if "wind" in signals and (shrunk := shrinkage(sensors)) < 1.0:
         yield f"{STATED}noise on the vane's angle shrinks the wind to {shrunk:.4g}; it is divided by that."
 

@@ -234,7 +234,8 @@ def _wind(stated: Stated, wind: Array, velocity: Array, pose: Array | None) -> A
 
     Where no heading is measured, the relative wind is.
     """
-    place, wind = stated.sensors.place("wind"), wind / shrinkage(stated.sensors)
+    place, axis, wind = stated.sensors.place("wind"), stated.sensors.wind_axis_rad, wind / shrinkage(stated.sensors)
+    wind = turned(wind, np.full(len(wind), axis)) if axis else wind
     if not any(stated.sensors.timing("wind")) or pose is None or not measured(pose[:, 2]):
         return _at_centre(stated.in_time("wind", wind)[0], place, velocity[:, 2])
     found, _ = stated.readings("wind", wind)

@@ -39,7 +39,7 @@ def observe(sensors: Sensors, states: Array, air: Array, noise: Array, *, sample
         position = north/east + R(heading) (forward, starboard)       heading = heading + bias
         u = u - r starboard     v = v + r forward     along axes turned from the ship's by an angle
         of u, v and r: gain * true + offset (`GAINS_AND_OFFSETS`)
-        (u_q, v_q) likewise for the place of the wind sensor
+        (u_q, v_q) likewise for the place and the axes of the wind sensor
 
     all late by each sensor's delay, held over its interval, plus noise; a vane's noise is on speed and angle, and
     (u_q, v_q) = V (cos angle, sin angle). Before the first sample all was as at the first sample.
@@ -79,10 +79,8 @@ def _heading(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
 
 
 def _velocity(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    u, v = _moved(sensors.place("velocity"), states[:, 3], states[:, 4], states[:, 5])
-    if sensors.velocity_angle_rad:
-        c, s = np.cos(sensors.velocity_angle_rad), np.sin(sensors.velocity_angle_rad)
-        u, v = c * u + s * v, c * v - s * u
+    at_sensor = _moved(sensors.place("velocity"), states[:, 3], states[:, 4], states[:, 5])
+    u, v = _along_axes(sensors.velocity_angle_rad, *at_sensor)
     return _shown(sensors, "u", u), _shown(sensors, "v", v)
 
 
@@ -96,7 +94,7 @@ def _shown(sensors: Sensors, signal: str, true: Array) -> Array:
 
 
 def _wind(sensors: Sensors, states: Array, air: Array) -> tuple[Array, ...]:
-    return _moved(sensors.place("wind"), air[:, 0], air[:, 1], states[:, 5])
+    return _along_axes(sensors.wind_axis_rad, *_moved(sensors.place("wind"), air[:, 0], air[:, 1], states[:, 5]))
 
 
 _SIGNALS: dict[str, Any] = {
@@ -112,6 +110,14 @@ def _moved(place: tuple[float, float], u: Array, v: Array, r: Array) -> tuple[Ar
     """Velocity of a place on the ship, from that of the origin, in the b-frame."""
     forward, starboard = place
     return (u - r * starboard, v + r * forward) if forward or starboard else (u, v)
+
+
+def _along_axes(angle_rad: float, u: Array, v: Array) -> tuple[Array, Array]:
+    """Components along axes that are turned clockwise from the ship's by an angle."""
+    if not angle_rad:
+        return u, v
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return c * u + s * v, c * v - s * u
 
 
 def _readings(timing: tuple[float, float], count: int, sample_time_s: float) -> tuple[Array | None, Any]:

@@ -313,6 +313,10 @@ class Sensors:
     velocity_interval_s: float = _interval("velocity")
     yaw_rate_delay_s: float = _delay("yaw_rate", ("late:r",), GYRO)
     yaw_rate_interval_s: float = _interval("yaw_rate")
+    wind_axis_rad: float = _row(
+        stage=SENSOR, sensor="wind", takes=ANGLE, unit="rad",
+        words="the angle from the bow to the wind sensor's forward axis, or its zero [rad], clockwise",
+    )  # fmt: skip
     wind_forward_m: float = _place("wind", "forward")
     wind_starboard_m: float = _place("wind", "starboard")
     wind_delay_s: float = _delay("wind")

@@ -40,6 +40,8 @@ def eliminate_backward(
 ) -> tuple[Selection, list[HeldOut]]:
     """Drop causes without held-out gain, and causes whose size is indistinguishable from zero.
 
+    What gains nothing beside a cause of which nothing is left is asked again without it.
+
     Args:
         found: the selection.
         windows: data.
@@ -59,14 +61,14 @@ def eliminate_backward(
         if later is not None:
             found = later
             continue
-        found = before_first_without_gain(found, improves)
+        whole, found = found, before_first_without_gain(found, improves)
         counted = with_runs_counted(found, open_candidates(found.last, windows), np.random.default_rng(seed))
         counted = two_runs_by_predictions(counted, held, windows)
         index = least_significant_step(counted.steps)
-        others = None if index is None else without_step(list(found.steps), index, windows)
+        others = None if index is None else without_step(list(whole.steps), index, windows)
         if others is None:
             return counted, held
-        found = found.with_steps(tuple(others))
+        found = whole.with_steps(tuple(others))
 
 
 def two_runs_by_predictions(found: Selection, held: Sequence[HeldOut], windows: Windows) -> Selection:
