@@ -159,6 +159,7 @@ def test_a_finger_draws_a_zone_and_then_moves_the_start(browser, address: str, f
     tablet.goto("/sea")
     box = chart(tablet)
     tablet.get_by_role("button", name="Draw a no-go zone").tap()
+    tablet.locator(".leaflet-draw-tooltip").first.wait_for()  # the chart is ready to draw
     corners = [(0.45, 0.2), (0.6, 0.2), (0.6, 0.35), (0.45, 0.35)]
     for right, down in [*corners, corners[0]]:
         tablet.touchscreen.tap(box["x"] + right * box["width"], box["y"] + down * box["height"])
