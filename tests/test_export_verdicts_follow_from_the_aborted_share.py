@@ -93,9 +93,11 @@ def test_a_plan_often_aborted_can_be_sailed_and_one_that_failed_its_checks_canno
 def test_an_actuator_that_a_plan_never_uses_is_named(tmp_path) -> None:
     scenario, plan = replace(load_scenario(write_scenario(tmp_path)), vessel=case.tug()), case.plan()
     columns = [column_name(name) for name in plan.commands.names]
-    assert not [line for line in trial_remarks(scenario, plan) if "no run or leg" in line]
+    assert not [line for line in trial_remarks(scenario, plan) if "no run of this plan uses" in line]
     for actuator in case.tug().actuators:
         own = [name in actuator.signals for name in plan.commands.names]
         idle = replace(plan.commands, values=np.where(own, 0.0, plan.commands.values))
-        (line,) = [line for line in trial_remarks(scenario, replace(plan, commands=idle)) if "no run or leg" in line]
+        (line,) = [
+            line for line in trial_remarks(scenario, replace(plan, commands=idle)) if "no run of this plan uses" in line
+        ]
         assert [name in line for name in columns] == own

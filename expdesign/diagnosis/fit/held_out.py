@@ -329,12 +329,18 @@ def _mean_change(before: HeldOut, after: HeldOut, windows: Windows, noise: Noise
     """Mean logarithm of the ratio of squared errors over blocks, its standard error and degrees of freedom."""
     if not before.models or not after.models:
         return np.nan, np.nan, 1
-    lost, left = (np.concatenate([_squares(*one, windows, noise) for one in held.models]) for held in (before, after))
+    lost, left = (_all_squares(held, windows, noise) for held in (before, after))
     if lost.shape != left.shape or len(lost) < 2:
         return np.nan, np.nan, 1
     with np.errstate(invalid="ignore"):
         ratios = np.log(left / lost)  # nan where both models run away
     return float(ratios.mean()), float(ratios.std(ddof=1) / np.sqrt(len(ratios))), len(ratios) - 1
+
+
+@lru_cache(maxsize=16)
+def _all_squares(held: HeldOut, windows: Windows, noise: Noise) -> Array:
+    """(blocks,) of all folds; passes of the elimination ask for the same again."""
+    return np.concatenate([_squares(*one, windows, noise) for one in held.models])
 
 
 def _current(grams: GramMatrices, found: Sensitivities, noise: Noise) -> Array:
