@@ -297,6 +297,33 @@ def test_what_is_wrong_in_a_file_is_said_in_the_page(page, folder: Path) -> None
         page.locator(".wrong", has_text="elsewhere.toml").first.wait_for()
 
 
+CONTRASTS = """() => {
+    const parts = (colour) => colour.match(/[\\d.]+/g).map((x) => (colour.startsWith("color(") ? 255 : 1) * x);
+    const light = (colour) => parts(colour).slice(0, 3).map((x) => x / 255)
+        .map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4))
+        .reduce((sum, x, k) => sum + x * [0.2126, 0.7152, 0.0722][k], 0);
+    const behind = (e) => { for (; e; e = e.parentElement) {
+        const colour = getComputedStyle(e).backgroundColor;
+        if (parts(colour)[3] !== 0) return colour; } return "rgb(255, 255, 255)"; };
+    return [...document.querySelectorAll("button, a, .quiet, .wrong, .good, .help")]
+        .filter((e) => e.checkVisibility() && e.innerText && !e.closest(".leaflet-control, .unused, .q-uploader"))
+        .map((e) => { const [a, b] = [light(getComputedStyle(e).color), light(behind(e))].sort((x, y) => y - x);
+            return [e.innerText, (a + 0.05) / (b + 0.05)]; })
+        .filter(([, ratio]) => ratio < 4.5); }"""
+"""Words with less contrast to what is behind them than WCAG 2.1 asks for, section 1.4.3."""
+
+
+def test_words_have_contrast_by_day_and_by_night(page) -> None:
+    for _ in ("day", "night"):
+        for screen in SCREENS:
+            page.goto(f"/{screen}")
+            page.locator("nav .here").wait_for()
+            page.wait_for_timeout(500)
+            assert not page.evaluate(CONTRASTS), screen
+        page.get_by_role("button", name="Night").click()
+        page.wait_for_timeout(300)
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_screen_is_wider_than_its_window(page, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})

@@ -212,9 +212,9 @@ def result_document(content: ResultContent) -> Document:
                     rows=[parameter_row(content, name)[: 6 if asked else 4] for name in content.plan.parameters],
                 ),
                 "Before is the vessel file that the trial was planned with. Planned is the standard deviation that the "
-                f"plan promises of {'the whole track' if _whole(content) else 'the runs alone'}, asked the largest "
-                "that the scenario allows. Parameters are in m, s and rad, and the "
-                "model's units of force.",
+                f"plan promises of {'the whole track' if _whole(content) else 'the runs alone'}"
+                f"{', asked the largest that the scenario allows' if asked else ''}. Parameters are in m, s and rad, "
+                "and the model's units of force.",
             ),
         ),
         notes=_left_out(content),
