@@ -13,6 +13,7 @@ from expdesign.scenario.dictionaries import load_dictionary
 from expdesign.scenario.instruments_file import INSTRUMENTS, equipped_vessel
 from expdesign.scenario.loads_file import LoadCases, load_cases
 from expdesign.scenario.mapping_file import load_mapping
-from expdesign.scenario.scenario_file import Variant, load_scenario, load_variant
+from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import DesignSettings, Scenario
+from expdesign.scenario.variants import Variant, load_variant
 from expdesign.scenario.vessels import load_vessel

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
-from expdesign.scenario.scenario_file import changed_entries
 from expdesign.scenario.tables import read_toml
+from expdesign.scenario.variants import changed_entries
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 
