@@ -177,10 +177,10 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         tilts = None
         if unmeasured and TILT not in added and looked and scans < MOST_SCANS:
             scans += 1
-            tilts = tilts_of(problem, weighted, theta, held)
+            tilts = tilts_of(problem, weighted, theta, held, by)
             if tilts.other:
+                problem = with_effects(without_effects(problem, added), [TILT], np.array([tilts.best_rad]))
                 added, unseen_before, theta = [TILT], [], tilts.theta
-                problem = with_effects(problem, added, np.array([tilts.best_rad]))
                 values, settled = [*sampled(problem, theta)], False
                 continue
         if weighed and len(history) >= LEAST_ROUNDS:
@@ -188,16 +188,18 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
             problem, unseen_before = without_effects(problem, unseen), [*unseen_before, *unseen]
             added = [place for place in added if place not in unseen]
             banned = [place for place in unseen_before if unseen_before.count(place) >= MOST_TRIES]
+            banned += [TILT] * unmeasured  # it is found by looking at all tilts
             new = [] if unseen else missed_effects(problem, by, sensed, left, added, banned)
             added, settled = [*added, *new], settled and not new and not unseen
-        if settled or len(history) == MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
+        if settled or len(history) >= MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
             break
+        share = 0.5 if len(history) > MOST_ROUNDS and len(history) % 2 else 1.0  # rounds may go back and forth
         if added:
             more, _ = missing_sizes(problem, by, sensed, left, added)
-            problem = with_effects(problem, added, more)
-        values = [*sampled(problem, theta)]
+            problem = with_effects(problem, added, share * more)
+        values = [*sampled(problem, before + share * (theta - before))]
     if unmeasured and tilts is None:
-        tilts = tilts_of(problem, weighted, theta, held)
+        tilts = tilts_of(problem, weighted, theta, held, by)
     _, std = missing_sizes(problem, by, sensed, left, added)
     effects = dict(zip([EFFECT_NAMES[place] for place in added], zip(
         [problem.cases[0].runs[0].effects[place] for place in added], std.tolist(), strict=True

@@ -173,16 +173,16 @@ def weighted_equations(
         model = noise_model([one.residuals(values) for one in plain], values[:2], NOISE_ORDER)
         rows = tuple(build_rows(run, model) for run in case.runs)
         left = spectrum([one.residuals(values) for one in rows])
+    hidden: tuple[Array, ...] = ()
     if instruments is None:
-        basis, hidden = _basis([one.X for one in rows], left), ()
+        basis = _basis([one.X for one in rows], left)
     else:
         # through 1 / spectrum are the weights of least variance; the equation is whitened too, as instruments that end
         # suddenly would pick up the noise of high frequencies, which is many times stronger
         white = [whitened_columns(own, model) for own in instruments]
-        by = [stitched(own, [*map(left.divided, one)], model) for own, one in zip(instruments, white, strict=True)]
-        basis = _basis(by, left)
-        own_rows = [stitched(own, one, model) for own, one in zip(instruments, white, strict=True)]
-        hidden = _hidden(rows, own_rows) if follows else ()
+        pairs = list(zip(instruments, white, strict=True))
+        basis = _basis([stitched(own, [left.divided(part) for part in one], model) for own, one in pairs], left)
+        hidden = _hidden(rows, [stitched(own, one, model) for own, one in pairs]) if follows else ()
     parts = list(zip(basis, rows, strict=True))
     return Weighted(
         rows,

@@ -49,12 +49,13 @@ class Tilts:
         return self.lead > CLEAR >= self.gain
 
 
-def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str]) -> Tilts:
-    """The sum of squares over all tilts, each with the parameters that it makes best.
+def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str], by: Array) -> Tilts:
+    """The sum of squares over all tilts, each with the parameters and other effects (`by`, (q, 3)) that it makes best.
 
     The search at a tilt begins with the parameters of the tilt beside it; in the deepest valleys it is tried as well
     from the parameters without more tilt, as there may be several.
     """
+    beside = np.linalg.qr(np.delete(by, TILT, axis=1))[0]
     found: dict[float, tuple[float, Array]] = {}  # tilt -> least sum of squares, parameters
 
     def cost(more: float, begin: Array) -> float:
@@ -66,7 +67,7 @@ def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, h
             )
             for part in weighted
         ]
-        values, _, left = solved(problem, tilted, begin, held, within=ROUGHLY)
+        values, _, left = solved(problem, tilted, begin, held, beside=beside, within=ROUGHLY)
         now = float(left @ left), values
         found[more] = min(found.get(more, now), now, key=lambda one: one[0])
         return found[more][0]
