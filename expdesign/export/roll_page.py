@@ -361,7 +361,7 @@ def roll_document(content: RollContent) -> Document:
         about=EQUATION,
         mark=None if estimate.trusted else Mark(text=f"None to be trusted: {headline(content)}", good=False),
         findings=roll_sentences(content),
-        facts={"rank": report.rank, "free": len(report.free)},
+        facts={"parameters_sought": len(report.free), "of_these_determined": report.rank},
         values={
             "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
             "parameters": estimate.values,
