@@ -114,6 +114,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
         effects=known,
         stated=known,
         stated_std=stated_std(vessel, model.inputs, derived, known),
+        shown=record.shown,
     )
 
 
