@@ -143,7 +143,7 @@ def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
     path = variant(tmp_path, "model-ship", "[design]\n")
     with pytest.raises(InputError, match="'model-ship' is given to 2 cases"):
         workflows.whatif(MODEL_SHIP, [path], tmp_path, jobs=1)
-    with pytest.raises(InputError, match="no variant files"):
+    with pytest.raises(InputError, match="no VARIANT"):
         workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)
     with pytest.raises(FileError, match="does not exist"):
         workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)

@@ -42,10 +42,12 @@ class Monitor(Request):
     ] = ()
     learn_h: Annotated[
         float,
-        Option("--learn-h", metavar="H", help="Hours of the data that are the reference, where none is given."),
+        Option(
+            "--learn-h", metavar="H", over=0.0, help="Hours of the data that are the reference, where none is given."
+        ),
     ] = 24.0
     false_alarm_days: Annotated[
-        float, Option("--false-alarm-days", metavar="D", help="Days between false alarms, on average.")
+        float, Option("--false-alarm-days", metavar="D", over=0.0, help="Days between false alarms, on average.")
     ] = 30.0
     size: Annotated[
         float,
@@ -55,9 +57,9 @@ class Monitor(Request):
             help="Relative change of parameters, thrust and inertia that matters; of angles and gyro in proportion.",
         ),
     ] = 0.1
-    every_s: Annotated[float, Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")] = (
-        3600.0
-    )
+    every_s: Annotated[
+        float, Option("--every-s", metavar="T", over=0.0, help="Seconds of a stream between looks at it.")
+    ] = 3600.0
     model: Annotated[
         str,
         Option(
@@ -111,6 +113,7 @@ class WatchSteps(Request):
         Option(
             "--learn-s",
             metavar="T",
+            over=0.0,
             help="Seconds of the first hold, from which the noise is learnt. Default: 120, or 80 % of the hold where "
             "it is planned to be shorter.",
         ),

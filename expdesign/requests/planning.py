@@ -238,7 +238,10 @@ class RollPlan(Request):
     minutes: Annotated[
         float,
         Option(
-            "--minutes", metavar="M", help="By the clock, after which it gives up with status 3 and writes nothing."
+            "--minutes",
+            metavar="M",
+            over=0.0,
+            help="By the clock, after which it gives up with status 3 and writes nothing.",
         ),
     ] = 30.0
     out: Out = None

@@ -63,12 +63,15 @@ class Import(Request):
         Option(
             "--sample-time",
             metavar="S",
+            over=0.0,
             help="Time between rows that are written [s]. Default: that of the slowest main sensor, at most 1.",
         ),
     ] = None
     length_m: Annotated[
         float | None,
-        Option("--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."),
+        Option(
+            "--length-m", metavar="L", over=0.0, help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."
+        ),
     ] = None
     out: OutByLog = None
 
@@ -294,7 +297,7 @@ class Mine(Request):
     vessel: Annotated[
         Path, Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
     ]
-    keep: Annotated[int, Option("--keep", metavar="K", help="How many batches, or pieces, to choose.")]
+    keep: Annotated[int, Option("--keep", metavar="K", min=1, help="How many batches, or pieces, to choose.")]
     piece_s: Annotated[
         float | None,
         Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
@@ -312,6 +315,8 @@ class Mine(Request):
             "of a file's name (file).",
         ),
     ] = None
-    draws: Annotated[int, Option("--draws", metavar="N", help="With --labels: subsets drawn of each design.")] = 500
+    draws: Annotated[
+        int, Option("--draws", metavar="N", min=2, help="With --labels: subsets drawn of each design.")
+    ] = 500
     out: OutByData = None
     seed: Seed = 0

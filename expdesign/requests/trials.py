@@ -75,7 +75,7 @@ class Simulate(Request):
     ]
     until_s: Annotated[
         float | None,
-        Option("--until", metavar="S", help="End the data after S seconds, as if the trial were aborted."),
+        Option("--until", metavar="S", over=0.0, help="End the data after S seconds, as if the trial were aborted."),
     ] = None
     out: OutBesidePlan = None
     seed: Seed = 0
@@ -227,7 +227,7 @@ class Roll(Request):
     ] = None
     scale: Annotated[
         float | None,
-        Option("--scale", metavar="S", help="Ship length by model length, for results of the ship too."),
+        Option("--scale", metavar="S", over=0.0, help="Ship length by model length, for results of the ship too."),
     ] = None
     out: OutByData = None
 

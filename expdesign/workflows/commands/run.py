@@ -7,9 +7,9 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.progress import Progress, in_phases, silent
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -22,7 +22,7 @@ from expdesign.workflows.steps.planned import (
     trial_files,
 )
 from expdesign.workflows.steps.scored import growth_summary, ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 WORK = (0.05, 0.08, 0.02, 0.68, 0.17)
 """Share of the work: scoring, durations, comparing criteria, planning, and writing."""
@@ -30,46 +30,29 @@ WORK_OF_SEARCH = (0.01, 0.02, 0.01, 0.90, 0.06)
 """The same where the shortest day is searched for."""
 
 
-def run(
-    scenario: Path,
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    draft: bool = False,
-    seed: int = 0,
-    jobs: int = 1,
-    scheduler: str | None = None,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
 
     A draft is the first plan that the whole job tries, or a day with fewer manoeuvres searched for, without drawn
     trials and bounds. It is written into `out` or runs/<scenario>-draft, without anything that could be sailed.
 
-    Args:
-        scenario: the scenario file.
-        out: folder.
-        vessel: a vessel file in place of the one that the scenario names.
-        draft: whether a draft is enough.
-        seed: of everything drawn.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        scheduler: address of a Dask scheduler whose workers share the work instead.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
-
     Raises:
         InputError: a draft would stand beside files of a trial that may be sailed.
     """
-    case = loaded(scenario, progress, vessel=vessel)
-    if draft:
+    case = loaded(request.scenario, progress, vessel=request.vessel)
+    out = request.out
+    if request.draft:
         case = replace(case, plan=replace(case.plan, draft=True))
         out = out or Path("runs") / f"{case.name}-draft"
         check_no_trial(out)
     check_plannable(case)
-    words = command_text(requests.Run(scenario=scenario, vessel=vessel, draft=draft, seed=seed))
-    with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
-        return _run(case, out, words, seed, progress)
+    words = repeating(request)
+    with (
+        shared(request),
+        drafted(case, out, command=words),
+    ):
+        return _run(case, out, words, request.seed, progress)
 
 
 def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Progress) -> Outcome:

@@ -14,7 +14,7 @@ from expdesign.export import Content, write_files
 from expdesign.export.document import Document
 from expdesign.progress import Progress
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, document_of, note_on_roll
+from expdesign.workflows.outcome import Outcome, document_of, finished, note_on_roll
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
@@ -49,13 +49,11 @@ def written(
 ) -> Outcome:
     """Write files into `out` or runs/<scenario>, and report them. A plan takes an earlier draft away."""
     folder = out or Path("runs") / case.name
-    paths = write_files(folder, files)
-    left = _undeleted(folder) if PLAN in files else ()
-    progress("done", 1.0)
-    if left:
+    outcome = finished(folder, files, document, progress)
+    if left := _undeleted(folder) if PLAN in files else ():
         said = document_of({"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"})
         document = replace(document, values={**document.values, **said.values}, notes=(*document.notes, *said.notes))
-    return Outcome(files=paths, document=document)
+    return replace(outcome, document=document)
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:
