@@ -106,7 +106,7 @@ def test_values_out_of_range_are_refused_in_python_too() -> None:
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:
     told: list[str] = []
-    monkeypatch.setattr(run, "_run", lambda case, out, words, *_: told.append(words))
+    monkeypatch.setattr(run, "_run", lambda request, *_: told.append(repeating(request)))
     scenario, vessel = SCENARIOS / "story.toml", SCENARIOS / "vessels" / "tender-20m-true.toml"
     workflows.run(scenario, tmp_path, vessel=vessel, seed=3)
     assert told == [f"expdesign run {scenario} --vessel {vessel} --seed 3"]

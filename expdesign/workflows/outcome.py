@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import wraps
+from dataclasses import dataclass, replace
+from functools import partial, wraps
 from pathlib import Path
 
 from expdesign.export import Content, write_files
 from expdesign.export.document import Document, Section, Table, fact_text
 from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
-from expdesign.requests import COMMANDS, Request, command_of
+from expdesign.requests import COMMANDS, Request, command_of, repeating
 from expdesign.requests.options import Argument
 from expdesign.vessel import NOT_ACTING_BACK, Vessel
 
@@ -36,9 +36,33 @@ class Outcome:
         return self.document.summary
 
 
-def finished(folder: Path, files: Mapping[str, Content], document: Document, progress: Progress) -> Outcome:
-    """Write all files into a folder, or none, and end."""
-    paths = write_files(folder, files)
+def finished(
+    request: Request,
+    usual: Path,
+    files: Mapping[str, Content],
+    document: Document,
+    progress: Progress,
+    *,
+    page: str = "",
+    drawing: Progress = silent,
+) -> Outcome:
+    """Write all files into the folder asked for, or the usual one, and end.
+
+    Args:
+        request: what was asked; the document states the command that repeats it.
+        usual: folder where none is asked for.
+        files: their contents by name.
+        document: what they hold.
+        progress: of the command.
+        page: name of the document as a page, where it has one.
+        drawing: progress of its figures.
+    """
+    document = document if document.command else replace(document, command=repeating(request))
+    if page:
+        from expdesign.export.pages import document_html  # commands without a page do not wait for it
+
+        files = {**files, page: partial(document_html, document, progress=drawing)}
+    paths = write_files(getattr(request, "out", None) or usual, files)
     progress("done", 1.0)
     return Outcome(files=paths, document=document)
 

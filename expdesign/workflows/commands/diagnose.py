@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
@@ -69,13 +69,13 @@ def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outc
     files: dict[str, Content] = {
         "diagnosis.json": diagnosis_json(found, roll),
         "diagnosis.html": partial(
-            diagnosis_html, found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
+            diagnosis_html, found, command=command, roll=roll, progress=reported.part(drawing, 0.0)
         ),
         "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
     }
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
     document = document_of(summary, _tables(found), diagnosis_notes(found))
-    return finished(request.out or Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
 def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -142,7 +141,7 @@ def durations(request: requests.Durations, *, progress: Progress = silent) -> Ou
         if request.grow or case.design.grow is not None:
             raise InputError("--monte-carlo takes the dictionary as it is, expected neither --grow nor [design.grow]")
         with shared(request, load=None):
-            return _from_covariances(case, request.out, request.monte_carlo, request.seed, progress)
+            return _from_covariances(request, case, progress)
     information, growth = ready(case, grow=request.grow, seed=request.seed, progress=within(progress, 0.05, 0.6))
     design = designed(case, information, seed=request.seed, progress=within(progress, 0.6, 0.9))
     progress("comparing criteria", 0.9)
@@ -153,12 +152,13 @@ def durations(request: requests.Durations, *, progress: Progress = silent) -> Ou
     }
     summary = {**growth_summary(growth, case), **design_summary(design)}
     tables = (*growth_tables(growth), *design_tables(design, compared))
-    return written(case, request.out, files, noted(case, document_of(summary, tables)), progress)
+    return written(request, case, files, noted(case, document_of(summary, tables)), progress)
 
 
-def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, progress: Progress) -> Outcome:
+def _from_covariances(request: requests.Durations, case: Scenario, progress: Progress) -> Outcome:
+    trials = request.monte_carlo
     primitives = build_dictionary(case.vessel, case.dictionary)
-    tried = tried_alone(case, primitives, trials=trials, seed=seed, progress=within(progress, 0.05, 0.9))
+    tried = tried_alone(case, primitives, trials=trials, seed=request.seed, progress=within(progress, 0.05, 0.9))
     design = solve_durations(fused_problem(case, tried))
     compared = efficiencies(design)
     files = {"durations.json": durations_json(design, compared=compared), "covariances.json": covariances_json(tried)}
@@ -168,4 +168,4 @@ def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, 
         **design_summary(design),
     }
     document = document_of(summary, (covariance_table(tried), *design_tables(design, compared)))
-    return written(case, out, files, noted(case, document), progress)
+    return written(request, case, files, noted(case, document), progress)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled
 from expdesign.errors import InputError
 from expdesign.export import Content, estimate_json, estimated_vessel
 from expdesign.export.estimate_page import EstimateContent, estimate_document
-from expdesign.export.pages import document_html
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
 from expdesign.workflows.outcome import Outcome, finished, workflow
@@ -51,11 +49,18 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
         found = assess(now, record, options, tests=apart, stated=ship, progress=within(progress, begun, 0.7))
     progress("drawing the report", 0.7)
     command = repeating(request)
-    content = EstimateContent(vessel=ship, found=found, command=command, version=__version__)
+    content = EstimateContent(vessel=ship, found=found)
     document = estimate_document(content)
     files: dict[str, Content] = {
         "estimate.json": estimate_json(found, ship),
         "vessel-estimated.toml": estimated_vessel(found, ship, command=command),
-        "estimate.html": partial(document_html, document, progress=within(progress, 0.7, 0.98)),
     }
-    return finished(request.out or Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(
+        request,
+        Path("runs") / request.data[0].stem,
+        files,
+        document,
+        progress,
+        page="estimate.html",
+        drawing=within(progress, 0.7, 0.98),
+    )

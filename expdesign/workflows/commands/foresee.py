@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
 from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
 from expdesign.export.operation_page import OperationContent, operation_document, operation_json
-from expdesign.export.pages import document_html
 from expdesign.export.routes import read_plan
 from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
-from expdesign.requests import repeating
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
 from expdesign.workflows.outcome import Outcome, workflow
@@ -57,16 +54,13 @@ def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcom
         vessel=case.vessel.name,
         source=OF_PLAN if request.plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN,
         found=found,
-        command=repeating(request),
-        version=__version__,
     )
     progress("writing the page", 0.95)
     document = noted(case, foresight_document(content))
     files: dict[str, Content] = {
         "foresee.json": foresight_json(content),
-        "foresee.html": partial(document_html, document),
     }
-    return written(case, request.out, files, document, progress)
+    return written(request, case, files, document, progress, page="foresee.html")
 
 
 def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> Outcome:
@@ -80,15 +74,12 @@ def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> O
         scenario=case.name,
         vessel=case.vessel.name,
         found=found,
-        command=repeating(request),
-        version=__version__,
     )
     document = noted(case, operation_document(content))
     files: dict[str, Content] = {
         "operation.json": operation_json(content),
-        "operation.html": partial(document_html, document),
     }
-    return written(case, request.out, files, document, progress)
+    return written(request, case, files, document, progress, page="operation.html")
 
 
 def _trial(

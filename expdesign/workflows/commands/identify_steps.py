@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError
 from expdesign.export import Content, vessel_toml
-from expdesign.export.pages import document_html
 from expdesign.export.step_trial_content import StepTrialContent, Validated, step_model_json
 from expdesign.export.step_trial_page import step_trial_document
 from expdesign.progress import Progress, silent, within
@@ -66,17 +64,15 @@ def identify_steps(request: requests.IdentifySteps, *, progress: Progress = sile
         tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
         notes=(*told, *record.notes),
         command=repeating(request),
-        version=__version__,
     )
     progress("drawing the page", 0.9)
     document = step_trial_document(content)
     files: dict[str, Content] = {
         "step-model.json": step_model_json(content),
-        "step-trial.html": partial(document_html, document),
     }
     if content.nominal is not None:
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
-    return finished(request.out or Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="step-trial.html")
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:

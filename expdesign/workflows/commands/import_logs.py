@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.conventions import OUTPUTS, whole_turns
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, read_plan, write_files
@@ -156,7 +156,7 @@ def import_logs(request: requests.Import, *, progress: Progress = silent) -> Out
             logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(tables),
             rejected=tuple(rejected), followed=answers, sensors=sensors, notes=tuple(notes),
             origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-            version=__version__, vessel=str(request.vessel or "VESSEL.toml"),
+            vessel=str(request.vessel or "VESSEL.toml"),
         )  # fmt: skip
         progress("writing", 0.95)
         document = import_document(content, folder)

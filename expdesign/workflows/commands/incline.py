@@ -60,7 +60,7 @@ def incline(request: requests.Incline, *, progress: Progress = silent) -> Outcom
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     tests = Table(title="Inclining tests", header=HEADER, rows=tuple(table))
     document = document_of({**summary, "remarks": told}, (tests,))
-    return finished(request.out or Path("runs") / f"{ship.name}-incline", files, document, progress)
+    return finished(request, Path("runs") / f"{ship.name}-incline", files, document, progress)
 
 
 def _in_waves(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError
 from expdesign.export import Content
 from expdesign.export.document import Table
@@ -47,12 +47,12 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
         measured=seen,
         notes=(*told, *notes),
         command=repeating(request),
-        version=__version__,
         held=held,
     )
     files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
     return finished(
-        request.out or Path("runs") / f"{request.vessel.stem}-indices",
+        request,
+        Path("runs") / f"{request.vessel.stem}-indices",
         files,
         document_of(_summary(content), _tables(content), content.notes_in_words),
         progress,

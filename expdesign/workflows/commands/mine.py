@@ -61,10 +61,6 @@ def mine(request: requests.Mine, *, progress: Progress = silent) -> Outcome:
         return _mined(request, record, ship, progress)
 
 
-def _folder(request: requests.Mine) -> Path:
-    return request.out or Path("runs") / request.data[0].stem
-
-
 def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progress) -> Outcome:
     """A choice of batches, written."""
     windy = all(batch.wind is not None for batch in record.batches)
@@ -85,7 +81,11 @@ def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progr
         "chosen.csv": record_csv(chosen),
     }
     return finished(
-        _folder(request), files, document_of(_summary(content), (_table(subset, batches),), record.notes), progress
+        request,
+        Path("runs") / request.data[0].stem,
+        files,
+        document_of(_summary(content), (_table(subset, batches),), record.notes),
+        progress,
     )
 
 
@@ -117,7 +117,7 @@ def _designed(
     )
     files = labelled_files(found, names, model.outputs, repeating(request))
     document = document_of(labelled_summary(found), labelled_tables(found, model.outputs), record.notes)
-    return finished(_folder(request), files, document, progress)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:

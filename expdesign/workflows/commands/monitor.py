@@ -140,7 +140,7 @@ def monitor(request: requests.Monitor, *, progress: Progress = silent) -> Outcom
     if isinstance(now.phase, Ready):
         raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
     content = _content(now.phase, now, asked, command)
-    return finished(folder, _files(content, now, asked), monitor_document(content), progress)
+    return finished(request, folder, _files(content, now, asked), monitor_document(content), progress)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,7 +231,6 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
         unread_rows=now.reading.unread_rows,
         notes=(*asked.told, *now.reading.notes),
         command=command,
-        version=__version__,
         roll=None if asked.vessel.pendulum is None else now.roll,
     )
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.export import Content
 from expdesign.export.nominal_page import NominalContent, nominal_document, nominal_json, nominal_toml
-from expdesign.export.pages import document_html
 from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent
 from expdesign.requests import repeating
@@ -27,12 +25,12 @@ def nominal(request: requests.Nominal, *, progress: Progress = silent) -> Outcom
     found = fitted(load_card(request.card), seed=request.seed, progress=progress)
     content = NominalContent(
         nominal=found, command=repeating(request),
-        version=__version__,
     )  # fmt: skip
     document = nominal_document(content)
     files: dict[str, Content] = {
         "vessel.toml": nominal_toml(content),
         "nominal.json": nominal_json(content),
-        "nominal.html": partial(document_html, document),
     }
-    return finished(request.out or Path("runs") / f"{request.card.stem}-nominal", files, document, progress)
+    return finished(
+        request, Path("runs") / f"{request.card.stem}-nominal", files, document, progress, page="nominal.html"
+    )

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from expdesign import requests
 from expdesign.durations import with_repeats
 from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, silent, within
-from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
@@ -24,20 +21,20 @@ def plan(request: requests.Plan, *, progress: Progress = silent) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = loaded(request.scenario, progress, vessel=request.vessel)
     check_plannable(case)
-    words = repeating(request)
     with (
         shared(request),
-        drafted(case, request.out, command=words),
+        drafted(request, case),
     ):
-        return _plan(case, request.out, request.durations, request.seed, progress)
+        return _plan(request, case, progress)
 
 
-def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, progress: Progress) -> Outcome:
+def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome:
+    seed = request.seed
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     planning = within(progress, 0.1, 0.95)
-    if durations is not None:
-        design = with_repeats(design, load_repeats(durations, names=design.problem.names))
+    if request.durations is not None:
+        design = with_repeats(design, load_repeats(request.durations, names=design.problem.names))
         day = Day(
             information=information,
             design=design,
@@ -54,4 +51,4 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
     )
     files = {**plan_files(case, day.plan, accuracy), **day_files(case, day)}
     document = document_of({**plan_summary(case, day.plan), **day_summary(day)}, day_tables(day))
-    return written(case, out, files, noted(case, document), progress)
+    return written(request, case, files, noted(case, document), progress)

@@ -57,16 +57,15 @@ def replan(request: requests.Replan, *, progress: Progress = silent) -> Outcome:
         stopped=request.stopped,
         progress=within(progress, 0.0, 0.02),
     )
-    words = repeating(request)
     with (
         shared(request),
-        drafted(replace(state.first, start=state.pose, vessel=state.ship), request.out, command=words),
+        drafted(request, replace(state.first, start=state.pose, vessel=state.ship)),
     ):
-        return _replanned(state, request, words, progress)
+        return _replanned(state, request, progress)
 
 
-def _replanned(state: PresentState, request: requests.Replan, words: str, progress: Progress) -> Outcome:
-    """Plan the rest and write it; `words` are the command."""
+def _replanned(state: PresentState, request: requests.Replan, progress: Progress) -> Outcome:
+    """Plan the rest and write it."""
     seed = request.seed
     case, notes = rest_of(state, interest=request.interest)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.05))
@@ -86,7 +85,7 @@ def _replanned(state: PresentState, request: requests.Replan, words: str, progre
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, day.design, day.plan)
     route = built_route(case, day.plan)
     content = replace(
-        report_content(case, day.information, day.design, day.plan, words),
+        report_content(case, day.information, day.design, day.plan, repeating(request)),
         compared=compared,
         route=route,
         known=known,
@@ -102,7 +101,7 @@ def _replanned(state: PresentState, request: requests.Replan, words: str, progre
     summary = {"scenario": case.name, **_summary(known), **facts}
     notes = (*_notes(known), *day.plan.area.notes)
     document = document_of(summary, (_table(known), *day_tables(day)), notes)
-    return finished(request.out or Path("runs") / case.name, files, document, progress)
+    return finished(request, Path("runs") / case.name, files, document, progress)
 
 
 def _stated_before(

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from pydantic import RootModel
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
 from expdesign.export.files import strict_json
 from expdesign.export.files.text import read_json
-from expdesign.export.pages import document_html
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
 from expdesign.progress import Progress, silent
-from expdesign.requests import repeating
 from expdesign.workflows.outcome import Outcome, finished, workflow
 
 Estimates = RootModel[dict[str, Estimated]]
@@ -45,12 +41,9 @@ def trial_result(request: requests.TrialResult, *, progress: Progress = silent) 
         plan=planned,
         estimate=best,
         indices=judged,
-        command=repeating(request),
-        version=__version__,
     )
     document = result_document(content)
     files: dict[str, Content] = {
         "result.json": strict_json({"ship": planned.vessel.name, "trial": planned.scenario, **document.summary}),
-        "result.html": partial(document_html, document),
     }
-    return finished(request.out or request.plan.parent, files, document, progress)
+    return finished(request, request.plan.parent, files, document, progress, page="result.html")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import Content, vessel_toml
-from expdesign.export.pages import document_html
 from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.progress import Progress, silent
 from expdesign.records import load_records
@@ -70,15 +68,15 @@ def roll(request: requests.Roll, *, progress: Progress = silent) -> Outcome:
     notes += _turned(estimate)
     content = RollContent(
         estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
-        command=repeating(request), version=__version__,
+        command=repeating(request),
         scale=request.scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
     document = roll_document(content)
-    files: dict[str, Content] = {"roll.json": roll_json(content), "roll.html": partial(document_html, document)}
+    files: dict[str, Content] = {"roll.json": roll_json(content)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
-    return finished(request.out or Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="roll.html")
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:

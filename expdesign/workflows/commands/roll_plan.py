@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, NoAnswer, NoPlan, UnknownName
 from expdesign.export import Content, write_files
@@ -68,7 +68,6 @@ def roll_plan(request: requests.RollPlan, *, progress: Progress = silent) -> Out
             scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
             commands=_commands(request.scenario, folder, plan),
             command=command,
-            version=__version__,
         )  # fmt: skip
         placing = within(limited, 0.3, 1.0)
         placed = _placed(case, information, content, request.seed, placing) if request.place else ()

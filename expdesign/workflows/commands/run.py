@@ -41,21 +41,21 @@ def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
         InputError: a draft would stand beside files of a trial that may be sailed.
     """
     case = loaded(request.scenario, progress, vessel=request.vessel)
-    out = request.out
     if request.draft:
         case = replace(case, plan=replace(case.plan, draft=True))
-        out = out or Path("runs") / f"{case.name}-draft"
+        out = request.out or Path("runs") / f"{case.name}-draft"
         check_no_trial(out)
+        request = request.but(out=out)
     check_plannable(case)
-    words = repeating(request)
     with (
         shared(request),
-        drafted(case, out, command=words),
+        drafted(request, case),
     ):
-        return _run(case, out, words, request.seed, progress)
+        return _run(request, case, progress)
 
 
-def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Progress) -> Outcome:
+def _run(request: requests.Run, case: Scenario, progress: Progress) -> Outcome:
+    seed = request.seed
     work = WORK if case.design.accuracy is None else WORK_OF_SEARCH
     scoring, designing, comparing, planning, writing = in_phases(progress, *work)
     information, growth = ready(case, seed=seed, progress=scoring)
@@ -65,7 +65,7 @@ def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Prog
     day = planned_day(case, information, design, seed=seed, progress=planning)
     writing("writing routes, run cards and report", 0.0)
     route = None if day.plan.draft else built_route(case, day.plan)
-    content = report_content(case, day.information, day.design, day.plan, words)
+    content = report_content(case, day.information, day.design, day.plan, repeating(request))
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     summary = {
@@ -73,4 +73,4 @@ def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Prog
         **day_summary(day),
         **plan_summary(case, day.plan),
     }
-    return written(case, out, files, noted(case, document_of(summary, day_tables(day))), progress)
+    return written(request, case, files, noted(case, document_of(summary, day_tables(day))), progress)

@@ -35,4 +35,4 @@ def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
     if case.remarks or told:
         summary["remarks"] = [*case.remarks, *told]
     document = document_of(summary, (ranking(case, information),))
-    return written(case, request.out, score_files(case, information), noted(case, document), progress)
+    return written(request, case, score_files(case, information), noted(case, document), progress)

@@ -62,7 +62,7 @@ def simulate(request: requests.Simulate, *, progress: Progress = silent) -> Outc
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
     files = {"measured.csv": _csv(columns)}
-    return finished(request.out or request.plan.parent, files, document_of(summary), progress)
+    return finished(request, request.plan.parent, files, document_of(summary), progress)
 
 
 def _truth_weather(forecast: Environment, own: Environment) -> Environment:

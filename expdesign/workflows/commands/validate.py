@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import joblib
@@ -14,12 +13,10 @@ from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
 from expdesign.export import Content, vessel_toml
-from expdesign.export.pages import document_html
 from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
-from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
 from expdesign.workflows.outcome import Outcome, finished, workflow
@@ -81,15 +78,12 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
             for item, count in zip(information, design.repeats, strict=True)
             if count and not item.excitation_condition
         ),
-        command=repeating(request.but(method=method)),
-        version=__version__,
     )
     document = validation_document(content)
     files: dict[str, Content] = {
         "validation.json": validation_json(content),
-        "validation.html": partial(document_html, document),
     }
-    outcome = finished(folder, files, document, progress)
+    outcome = finished(request.but(method=method), folder, files, document, progress, page="validation.html")
     forget()
     return outcome
 

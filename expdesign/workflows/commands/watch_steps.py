@@ -100,7 +100,7 @@ def watch_steps(request: requests.WatchSteps, *, tell: Told = silently, progress
     _check_learnt(now.state, setup)
     content = _content(now, work)
     return finished(
-        folder, _files(now, work), document_of(_summary(content), _tables(content), content.notes), progress
+        request, folder, _files(now, work), document_of(_summary(content), _tables(content), content.notes), progress
     )
 
 
@@ -226,7 +226,7 @@ def _commands(steps: StepList) -> str:
 def _content(now: _Watch, work: _Work) -> LiveContent:
     return LiveContent(
         steps=work.setup.steps, state=now.state, constants_s=work.setup.constants_s, notes=now.notes,
-        command=work.command, version=__version__,
+        command=work.command,
     )  # fmt: skip
 
 

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign, efficiencies, optimal_shares
 from expdesign.durations.rounding import whole_runs
 from expdesign.errors import FileError, InputError, NoAnswer
 from expdesign.export import Content
-from expdesign.export.pages import document_html
 from expdesign.export.whatif_content import Case, WhatIfContent, whatif_json
 from expdesign.export.whatif_page import whatif_document
 from expdesign.information import PrimitiveInformation, estimated_parameters
@@ -27,7 +25,6 @@ from expdesign.plan.verify import track_covariance
 from expdesign.processes import as_finished, reported_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
-from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
 from expdesign.workflows.outcome import Outcome, finished, workflow
@@ -88,14 +85,12 @@ def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
         planned=request.with_plan,
-        command=repeating(request),
-        version=__version__,
     )
     if all(case.problem for case in content.cases):
         raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
     document = whatif_document(content)
-    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(document_html, document)}
-    return finished(request.out or Path("runs") / f"{base.name}-whatif", files, document, progress)
+    files: dict[str, Content] = {"whatif.json": whatif_json(content)}
+    return finished(request, Path("runs") / f"{base.name}-whatif", files, document, progress, page="whatif.html")
 
 
 def _check(case: Scenario, path: Path, seed: int) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.durations import Constraints, DurationDesign, build_recorded, pool_gains, solve_durations
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
@@ -179,9 +179,7 @@ def labelled_files(found: Labelled, parameters: Sequence[str], outputs: Sequence
             mean_subtraction=found.design.problem.mean_subtraction,
         ),
         "durations.json": durations_json(found.design),
-        "subsets.json": subsets_json(
-            found.drawn, outputs=outputs, pieces=names, labels=found.labels, command=command, version=__version__
-        ),
+        "subsets.json": subsets_json(found.drawn, outputs=outputs, pieces=names, labels=found.labels, command=command),
         "chosen.csv": record_csv([found.record.batches[place] for place in found.drawn[0].subsets[0]]),
     }
 
