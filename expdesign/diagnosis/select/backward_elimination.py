@@ -168,18 +168,18 @@ def improves_held_out(
         )
         for index, (step, gain) in enumerate(zip(found.steps, gains, strict=True))
     ]
-    shown = [
-        ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, low))
+    improves = [
+        is_better
+        and ((index == 0 and not found.beside_stated) or _is_certain_ahead(held, index, seed, low))
         and shows_for_certain(held[index], held[index + 1], seed)
-        for index, (_, (low, _)) in enumerate(gains)
+        for index, (is_better, (_, (low, _))) in enumerate(zip(better, gains, strict=True))
     ]
-    improves = [all(pair) for pair in zip(better, shown, strict=True)]
     if windows is None or not gains:
         return improves
     if not shows_for_certain(held[0], held[1], seed):
         improves[0] = _shows_otherwise(found, held, (better[0], gains[0]), (windows, re_estimated), seed)
     for index, step in enumerate(found.steps[1:], 1):
-        if better[index] and not shown[index] and _may_show_in_predictions(step):
+        if better[index] and not improves[index] and _may_show_in_predictions(step):
             share, (least, _) = prediction_gain(held[index], held[index + 1], windows, step.chosen.fit.noise)
             improves[index] = least > 0.0 and share >= TUNING.least_predicted
     return improves
