@@ -53,7 +53,6 @@ def finished(
         usual: folder where none is asked for.
         files: their contents by name.
         document: what they hold.
-        progress: of the command.
         page: name of the document as a page, where it has one.
         drawing: progress of its figures.
     """
@@ -100,7 +99,6 @@ def carry_out(request: Request, *, progress: Progress = silent, tell: Told = sil
 
     Args:
         request: one of those in `expdesign.requests`.
-        progress: of the command.
         tell: takes lines while the command works, of a command that has such.
 
     Raises:

@@ -87,7 +87,6 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
     """The design with its certificate, as durations.json; bounds are null where there are none.
 
     Args:
-        design: the durations.
         compared: the design under every criterion.
     """
     problem = design.problem
@@ -170,7 +169,6 @@ def dictionary_files(
 
     Args:
         specs: requests.
-        name: of the dictionary.
         stem: of the file names.
         comments: lines to go first.
     """

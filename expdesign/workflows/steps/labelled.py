@@ -59,7 +59,6 @@ def labelled_design(
         predictor: "basic" or "basic-wind".
         asked: keep, draws, labels, mean and seed count.
         piece_s: length of a piece [s].
-        progress: of the work.
 
     Raises:
         InputError: labels, lengths or numbers that are wrong.
