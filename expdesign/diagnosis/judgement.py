@@ -149,7 +149,6 @@ def found_by_predictions(
         compared: causes, by their predictions.
         data: as compared, and as measured.
         ship: the model in use.
-        seed: of the intervals.
         re_estimated: errors of the model with parameters re-estimated and no cause, where causes are compared beside
             the parameters of the file; None where they are compared beside re-estimated ones.
     """
@@ -194,7 +193,6 @@ def parameters_alone(kept: Selection, held: Sequence[HeldOut], validation: Cross
     beside the cause. None elsewhere.
 
     Args:
-        kept: the causes.
         held: errors on held-out units of the model before any cause, then after every one.
         validation: of other fits.
     """
@@ -270,7 +268,6 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
     they were found; this does not.
 
     Args:
-        found: the selection.
         held: errors on held-out units of the model before any cause, then after every step, and perhaps of more.
         validation: of other fits.
         windows: all data.
@@ -307,7 +304,6 @@ def harmless_beside_the_file(
         as_stated: its errors as its file states it.
         validation: of other fits.
         data: as compared, and as measured.
-        seed: of the intervals.
     """
     windows, record = data
     if not _re_estimates(kept) or not harms(ship, kept.last.ship, record):
@@ -365,10 +361,8 @@ def without_harm(
     """The first causes, as many as can be, with which the data are simulated no worse than by the model in use.
 
     Args:
-        kept: the causes.
         held: errors on held-out units of the model before any cause, then after every one.
         ship: the model in use.
-        record: data.
     """
     while kept.steps and harms(ship, kept.last.ship, record):
         kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]

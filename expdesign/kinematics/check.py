@@ -81,7 +81,6 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
     Args:
         batches: at the reference point, with delivered inputs.
         model: of the vessel file, driven by what is recorded.
-        length_m: of the ship.
     """
     for kind, axis, stems, seen, reason in GROUPS:
         own = [

@@ -303,7 +303,6 @@ def course_as_heading(batches: Sequence[Batch], *, length_m: float, drifts: floa
 
     Args:
         batches: with positions.
-        length_m: of the ship.
         drifts: distance from midships, in ship lengths, of the place that is expected not to drift in a turn.
     """
     own = [batch for batch in batches if batch.pose is not None]

@@ -43,8 +43,6 @@ def eliminate_backward(
     What gains nothing beside a cause of which nothing is left is asked again without it.
 
     Args:
-        found: the selection.
-        windows: data.
         cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
             before any cause, then after every step.
         seed: of the gains' intervals.
@@ -149,7 +147,6 @@ def improves_held_out(
     never do, nor does a change of the ship, whose time is chosen where predictions are worst.
 
     Args:
-        found: the selection.
         held: errors on held-out units of the model before any cause, then after every step.
         seed: of the gains' intervals.
         windows: all data; None where there are no predictions of them.

@@ -108,11 +108,8 @@ def selection_round(
 
     Args:
         base: the fit of the findings so far.
-        windows: data.
         rejected: candidates that are not tried again.
         rng: of the null distribution.
-        work: of the search.
-        validation: of its fits.
         most: effects that a candidate may have.
     """
     tests = round_tests(base, windows, rejected, rng, work, most=most)

@@ -39,7 +39,6 @@ def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...]
 
     Args:
         vessel: its file.
-        inputs: of the model.
         derived: velocities that come from the pose.
         stated: effects.
     """
