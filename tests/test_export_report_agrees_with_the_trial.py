@@ -14,6 +14,7 @@ from lxml import etree
 from lxml import html as lxml_html
 
 import export_case as case
+from expdesign import __version__
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
 from expdesign.export import build_route, words
 from expdesign.export.pages.figures import new_figure, report_style, round_ticks, svg
@@ -148,7 +149,7 @@ def test_the_page_says_what_the_values_say() -> None:
         plan.area.depth_rule,
         plan.area.source,
         "expdesign run test-sound.toml",
-        "expdesign 1.2.3",
+        f"expdesign {__version__}",
     ):
         assert " ".join(fact.split()) in text
     assert text.count("reposition to ") == sum(leg.kind == "reposition" for leg in plan.legs)

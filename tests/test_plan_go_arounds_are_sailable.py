@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 import shapely
 
+from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.visibility_graph import polyline_length
+from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.monte_carlo.return_paths import GoAroundPaths
+from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Guidance
+from expdesign.plan.monte_carlo.procedure import tolerances
+from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers
+from expdesign.plan.runs import Fleet, Truths
+from expdesign.simulation import CALM
+from helm_case import coaster, open_water
+from plan_case import area
 
 RADIUS, SPACING = 40.0, 5.0
 GOAL = np.array([0.0, 0.0, 0.7])
@@ -74,3 +85,54 @@ def test_paths_turn_with_the_water():
 def test_out_of_a_closed_pool_there_is_no_path():
     pool = SEA.union(shapely.box(-900, -900, -700, -700))
     assert go_arounds(pool).find(np.array([-800.0, -800.0, 0.0])) is None
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_ships_keep_to_the_arcs_that_they_go_around_by(side):
+    """Steered by the bends ahead: a helm that waits to be off the path swings a ship length wide."""
+    vessel, water, count = coaster(), open_water(coaster()), 8
+    ship, rng = water.ship, np.random.default_rng(5)
+    drawn = vessel.model.parameters * (1.0 + 0.1 * rng.uniform(-1, 1, (count, len(vessel.model.parameters))))
+    truths = Truths(parameters=drawn, current_to=np.zeros((count, 2)), wind_to=np.zeros((count, 2)))
+    start, approach = np.array([0.0, 0.0, 0.0, *ship.approach.velocity]), ship.approach.inputs
+    fleet = Fleet(vessel, CALM, truths, state=start, standing=approach, rng=rng)
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=ship)
+    radius = 1.5 * ship.turning_radius_m  # which leaves the helm something to correct with
+    back = np.array([0.0, side * 2.5 * radius, np.pi])
+    path = dubins_curve(start[:3], back, radius_m=radius, spacing_m=vessel.length_m)[:, :2]
+    followers = PathFollowers(helm, np.r_[back, start[3:]], count, reach_m=vessel.length_m / 2)
+    for number in range(count):
+        followers.start(number, path)
+    ships, off_m, unexplained = np.arange(count), [], np.zeros((count, 3))
+    for _ in range(int(polyline_length(path) / ship.transit_speed_mps / vessel.sample_time_s)):
+        before = fleet.states
+        fleet.advance(helm.commands(followers.desired(ships, before), before, fleet.given, unexplained=unexplained))
+        unexplained = helm.unexplained(unexplained, before, fleet.states, fleet.delivered)
+        off_m.append(shapely.distance(shapely.LineString(path), shapely.points(fleet.states[:, :2])))
+    assert np.max(off_m) < 0.75 * vessel.length_m
+
+
+@pytest.mark.parametrize(("room", "turns_north"), [(0.5, True), (1.5, False)])
+def test_go_arounds_keep_off_the_shore_where_there_is_room(room, turns_north):
+    """The shortest way round leads by the southern shore, another one through open water."""
+    vessel, water = coaster(), open_water(coaster())
+    radius, length = water.ship.turning_radius_m, vessel.length_m
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=water.ship)
+    leg = np.tile([0.0, 0.0, np.pi / 2, *water.ship.approach.velocity], (60, 1))
+    leg[:, 1] = np.linspace(-6.0 * length, 0.0, 60)
+    shore = -2.0 * radius - water.leg_margin_m - room * radius
+    sea = area(shapely.box(-40 * length, shore, 40 * length, 40 * length))
+    near = replace(water, area=sea, field=clearance_field(sea, resolution_m=length / 4))
+    guidance = Guidance(
+        helm,
+        near,
+        leg,
+        within=tolerances(near),
+        sailing=np.ones(1, bool),
+        inputs=water.ship.approach.inputs,
+        last=False,
+    )
+    guidance._go_around(np.array([0]), np.array([[0.1 * radius, 2.0 * length, np.pi / 2, 5.0, 0.0, 0.0]]))
+    path = guidance._followers._path[0]
+    assert (path[:, 0].max() > radius) == turns_north
+    assert path[:, 0].min() >= shore + water.leg_margin_m + GO_AROUND_ROOM * radius - 1.0

@@ -132,3 +132,16 @@ def test_azimuths_stop_a_turn_before_they_slow_her_down(lively: tuple[Vessel, He
     assert np.median(np.abs(wrap_angle(states[:, :, 2])).max(axis=0)) < np.radians(30.0)
     assert (orders[:12] > 0.0).all()
     assert np.abs(states[-1, :, 3] / ship.transit_speed_mps - 0.5).max() < 0.2
+
+
+def test_wound_azimuths_steer_by_the_shortest_turn(lively: tuple[Vessel, HelmShip]) -> None:
+    """Runs leave azimuths without stops whole turns away; unwinding them would push all round meanwhile."""
+    vessel, ship = lively
+    helm, rng = Helmsman(vessel=vessel, environment=CALM, ship=ship), np.random.default_rng(4)
+    states = rng.normal(size=(30, 6)) * [50.0, 50.0, 1.0, 1.0, 0.3, 0.02] + [0.0, 0.0, 0.0, 3.0, 0.0, 0.0]
+    desired = np.tile([0.0, 0.0, 0.0, ship.transit_speed_mps, 0.0, 0.0], (30, 1))
+    standing = ship.approach.inputs + rng.uniform(-0.2, 0.2, (30, len(vessel.limits)))
+    turns = 2.0 * np.pi * rng.integers(-3, 4, standing.shape) * vessel.turns_freely
+    unwound = helm.commands(desired, states, standing)
+    assert turns.any()
+    np.testing.assert_allclose(helm.commands(desired, states, standing + turns), unwound + turns, atol=1e-9)

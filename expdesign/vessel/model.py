@@ -172,12 +172,12 @@ class VesselModel:
                 correlation[index[one], index[other]] = correlation[index[other], index[one]] = value
         return readonly(correlation)
 
-    @property
+    @cached_property
     def outputs(self) -> tuple[str, ...]:
         """The velocities that have an equation, in the order u, v, r; the others stay zero."""
         return tuple(name for name in OUTPUTS if any(term.equation == name for term in self.terms))
 
-    @property
+    @cached_property
     def inputs(self) -> tuple[str, ...]:
         """Actuator signals in command order."""
         return tuple(name for actuator in self.actuators for name in actuator.signals)

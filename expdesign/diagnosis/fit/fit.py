@@ -106,9 +106,10 @@ class FitOptions:
     ar_order: int | None = None  # of the noise's autoregressions, or None to choose it
     steps: int = STEPS  # Gauss-Newton steps, at most
     warm_start: Fit | None = None  # a fit of a similar ship over the same windows; faster, with the same result
-    # evaluate a step with the weights of initial states and random current at its start. The weights depend on the
-    # effects, which a step of weighted least squares ignores, so a step may raise the cost with updated weights. Fits
-    # that are compared with each other need updated weights.
+    # estimate the noise at the start alone, and evaluate a step with the weights of initial states and random current
+    # at its start. The weights depend on the effects, which a step of weighted least squares ignores, so a step may
+    # raise the cost with updated weights. Fits that are compared with each other need updated weights, and the noise
+    # that they end with.
     fixed_weights: bool = False
 
 
@@ -127,7 +128,6 @@ def prior_precision(ship: ExtendedModel, keys: tuple[str, ...], *, free: int = 0
 
     Args:
         ship: the model in use.
-        keys: effects.
         free: this many of the first have no prior; that of the others is their marginal one.
     """
     whitening = _prior_whitening(ship, keys, free)
@@ -171,7 +171,6 @@ def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 
 
     Args:
         ship: the model before the step.
-        keys: effects.
         shortest_s: that period [s].
     """
     now = np.array([ship.get(key) for key in keys])

@@ -173,11 +173,10 @@ class _Point:
 def fit(
     ship: ExtendedModel, windows: Windows, free: tuple[str, ...], *, starts: Array, options: FitOptions | None = None
 ) -> Fit:
-    """Gauss-Newton with step halving; the noise is estimated at the start, after the first steps and at the end.
+    """Gauss-Newton with step halving; the noise is estimated at the start, after the first step and at the end.
 
     Args:
         ship: where to start; its effects not in `free` stay, except uncertain parameters.
-        windows: data.
         free: effects to estimate without a prior.
         starts: (w, n) first guess of the initial states.
         options: how to begin and when to end.
@@ -200,10 +199,10 @@ def fit(
         simulations += tries
         if ahead is None:
             break
-        best, noise_is_fitted = ahead, False
+        best, noise_is_fitted = ahead, options.fixed_weights
         if best.converged:
             break
-        if step == 0:
+        if step == 0 and not noise_is_fitted:
             best, noise_is_fitted = _with_noise_refitted(problem, best), True
     return replace(best if noise_is_fitted else _with_noise_refitted(problem, best), simulations=simulations)
 

@@ -58,14 +58,13 @@ class ExtendedModel:
     # effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of
     stated: Effects = field(default_factory=dict)
     stated_std: Effects = field(default_factory=dict)
-    scaled_terms: tuple[ScaledTerm, ...] = field(init=False, repr=False)
+    # effect -> least and greatest value that instruments of the record show of each other
+    shown: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        parts = (
-            *own_terms(self.model, self.effects),
-            *library_terms(self.model, self.library, self.effects),
-        )
-        object.__setattr__(self, "scaled_terms", parts)
+    @cached_property
+    def scaled_terms(self) -> tuple[ScaledTerm, ...]:
+        """The model's own terms, then those of the library that were added, with their factors."""
+        return (*own_terms(self.model, self.effects), *library_terms(self.model, self.library, self.effects))
 
     @cached_property
     def regressors(self) -> Evaluation:
@@ -80,6 +79,16 @@ class ExtendedModel:
         first = [0, *itertools.accumulate(map(len, order))]
         own = [np.array([self.factor(self.scaled_terms[place]) for place in places]) for places in order]
         return tuple(rows), list(zip(first, own, strict=False))
+
+    @cached_property
+    def changes(self) -> list[Array] | None:
+        """Of u, v and r, by how much a change of the ship changes the factors of their rows; None without a change."""
+        if not any(part.after for part in self.scaled_terms):
+            return None
+        rows, factors = self.combined_terms
+        shares = np.array([part.after / part.factor if part.after else 0.0 for part in self.scaled_terms])
+        shares = shares[np.argsort(rows)]
+        return [own * shares[first : first + len(own)] for first, own in factors]
 
     def factor(self, part: ScaledTerm) -> float:
         """Factor of a term in its rate: over the inertia, but for ratios of inertias."""
@@ -126,7 +135,10 @@ class ExtendedModel:
         return self.effects.get(key, 0.0)
 
     def bounds(self, key: str) -> tuple[float, float]:
-        """Least and greatest possible value of an effect; what the vessel file states is possible."""
+        """Least and greatest possible value of an effect by its kind and the instruments.
+
+        What the vessel file states is possible.
+        """
         kind, _, which = key.partition(":")
         sizes = {"forward": self.length_m, "starboard": self.beam_m, "asymmetry": self.beam_m / 2}
         row = effect_row(key)
@@ -135,6 +147,8 @@ class ExtendedModel:
             low, high = -sizes[which or kind], sizes[which or kind]
         elif key == "roll:period":
             high = self.longest_roll_s
+        least, most = self.shown.get(key, (low, high))
+        low, high = max(low, least), min(high, most)
         stated = self.stated.get(key, 0.0)
         return min(low, stated), max(high, stated)
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from expdesign.estimation.regression import Polynomial, lift, symbol
-from expdesign.simulation.program import evaluation
+from expdesign.simulation.program import Evaluation, evaluation
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, TERMS, Operators, Response, Term, VesselModel, stem
 from expdesign.vessel.quantities import rows_of
@@ -170,6 +170,7 @@ WORDS = {"*": "_by_", "(": "_of_", "+": "_plus_", "-": "_minus_", ".": "_point_"
 """What stands for marks of an expression in the name of a signal."""
 
 
+@lru_cache(maxsize=64)
 def driving_signals(model: VesselModel) -> tuple[str, ...]:
     """Inputs and forces, but for the yaw moment, which may lean on the force ahead (`ahead_force`)."""
     return tuple(name for name in dict.fromkeys((*model.inputs, *FORCE_SIGNALS)) if name != "tau_psi")
@@ -220,8 +221,13 @@ def input_products(model: VesselModel, library: tuple[Term, ...]) -> Mapping[str
 
 def ahead_force(signals: Mapping[str, Array], model: VesselModel) -> Array:
     """tau_x, of rudder ships n |n| of their propellers; zero without either."""
+    return np.asarray(_ahead_force(model).values(signals)[0])
+
+
+@lru_cache(maxsize=64)
+def _ahead_force(model: VesselModel) -> Evaluation:
     expression = _parsed(ahead_force_text(model), (*FORCE_SIGNALS, *model.inputs))
-    return np.asarray(evaluation([with_input_products(expression, driving_signals(model))]).values(signals)[0])
+    return evaluation([with_input_products(expression, driving_signals(model))])
 
 
 def ahead_force_text(model: VesselModel) -> str:

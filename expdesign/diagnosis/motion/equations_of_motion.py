@@ -63,10 +63,15 @@ def _accelerations(ship: ExtendedModel, u: Array, v: Array, r: Array, exogenous:
     terms = np.empty((len(places), *u.shape))
     for place, part, value in zip(places, ship.scaled_terms, ship.regressors.values(signals), strict=True):
         terms[place] = value
-        if part.after or SHOAL in exogenous:
+        if SHOAL in exogenous:
             terms[place] *= _varying(ship, part, exogenous)
     rows = terms.reshape(len(terms), u.size)
     rates = [(own @ rows[first : first + len(own)]).reshape(u.shape) for first, own in factors]
+    if ship.changes and SHOAL not in exogenous:
+        rates = [
+            rate + (change @ rows[first : first + len(change)]).reshape(u.shape) * exogenous["after"]
+            for rate, change, (first, _) in zip(rates, ship.changes, factors, strict=True)
+        ]
     lean = ship.get("asymmetry")
     if lean and not any(part.reads_turn for part in ship.scaled_terms):
         rates[2] += lean * ahead_force(signals, ship.model) / (1 + ship.get("inertia:r")) / _heavier(ship, exogenous)

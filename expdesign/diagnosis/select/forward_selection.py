@@ -73,7 +73,7 @@ def select_forward(
     while True:
         search = _Search(windows=windows, rejected=tuple(rejected), rng=rng, work=work, validation=validation)
         gains = _gains([first, *(step.chosen.fit for step in steps)], validation)
-        idle = len(gains) > 1 and not gains[-1]
+        idle = not all(gains[-1:])
         step, tests = (None, search.tests(base)) if idle else search.round(base)
         work.rounds_left = listed_causes(tests) + len(steps)  # each step is compared with others at the end
         if (
@@ -115,6 +115,11 @@ def _gains(fits: Sequence[Fit], validation: CrossValidation) -> list[bool]:
     gains = [held_out_gain(*pair, 0) for pair in pairwise(held)]
     least = TUNING.least_gain_points
     return [not (gain <= least or (held[0].in_stretches and low <= 0.0)) for gain, (low, _) in gains]
+
+
+def _gains_last(first: Fit, steps: Sequence[Step], validation: CrossValidation) -> bool:
+    """Whether the last step improves on those before it, or is the first."""
+    return all(_gains([first, *(step.chosen.fit for step in steps)], validation)[-1:])
 
 
 def _up_to_last_gain(steps: list[Step], gains: Sequence[bool]) -> list[Step]:
@@ -206,9 +211,12 @@ def fit_nuisance(ship: ExtendedModel, windows: Windows, starts: Array) -> Fit:
 
 
 def _smaller_causes(block: Step, search: _Search) -> list[Step]:
-    """Causes with fewer effects, one after the other, if they gain more than a block of parameters; else the block."""
+    """Causes with fewer effects, one after the other, if they gain more than a block of parameters; else the block.
+
+    They end, as the search does, where one after the first improves nothing on held-out data.
+    """
     size, base, path, count = len(block.chosen.keys), block.before, list[Step](), 0
-    while count < size and len(path) < MOST_FINDINGS:
+    while count < size and len(path) < MOST_FINDINGS and _gains_last(block.before, path, search.validation):
         step, _ = search.round(base, most=size - 1)
         if step is None:
             break

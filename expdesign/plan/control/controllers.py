@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from expdesign.conventions import OUTPUTS, wrap_angle
+from expdesign.conventions import OUTPUTS, whole_turns, wrap_angle
 from expdesign.plan.control.helm_capability import SteadyTurn
 from expdesign.simulation import Approach
 from expdesign.values import Array
@@ -109,7 +109,8 @@ class HelmController:
         drive = self._drive(speed, moving, angle, unexplained[:, 0])
         if self.approach.helm.turns_thrust:
             drive = self._kicked(drive, np.where(speed > 0.0, np.abs(missing), 0.0), moving)
-        return np.asarray(self.approach.helm.rows(drive, angle))
+        rows = self.approach.helm.rows(drive, angle)
+        return np.asarray(rows + whole_turns(demand.standing - rows) * self.vessel.turns_freely)  # by the shortest turn
 
     def _pointed(self, demand: Demand) -> tuple[Array, Array]:
         """(n,) surge speeds and headings of ships that go where they point.

@@ -124,7 +124,6 @@ def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShi
     Args:
         path: places and courses from the leg's start to its end.
         braking_m: length at its end on which the ship slows down.
-        water, ship: of the leg.
 
     Returns:
         None where every straight is short, or wind turns or slows the ship.
@@ -337,6 +336,8 @@ def _guess(
 ) -> tuple[Array, Array, Array, float]:
     """States (j + 1, 6), commands (j + 1, m), places with courses (j + 1, 3) at even times, and the time they take."""
     time_s, states, inputs, course = _steady_along(check.states[-1], task.end, ship, path)
+    standing = check.commands[-1] if len(check.commands) else task.start_inputs
+    inputs += nearest_turns(water.vessel, inputs[0], standing) - inputs[0]
     lead_s = np.arange(len(check.commands)) * water.vessel.sample_time_s
     before = check.states[:-1]
     drift = np.where(before[:, 3] > 0, np.arctan2(before[:, 4], np.maximum(before[:, 3], 1e-9)), 0.0)

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
+import shapely
 
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
 from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
-from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers, ReturnPaths, build_return_paths
+from expdesign.plan.monte_carlo.return_paths import (
+    GoAroundPaths,
+    PathFollowers,
+    ReturnPaths,
+    build_return_paths,
+    covers_path,
+)
 from expdesign.plan.runs import Fleet
 from expdesign.values import Array
 
+GO_AROUND_ROOM = 1.0  # turning radii that paths of arcs keep from the water's edge where they can
 GO_AROUNDS = 4  # for one run at most; then the trial is aborted
 PAST_START_HULLS = 1.0  # hull lengths past the start over which a reference continues steadily
 # a ship may take so many times as long as planned for a reference or a path, and so many time constants of the return
@@ -282,7 +290,7 @@ class Guidance:
             return
         self.go_arounds[ships] += 1
         sideways = self._helm.ship.keeps_station
-        paths = self._tree.find(states[:, :2]) if sideways else [self._arcs.find(x) for x in states[:, :3]]
+        paths = self._tree.find(states[:, :2]) if sideways else [self._round(pose) for pose in states[:, :3]]
         for ship, path in zip(ships.tolist(), paths, strict=True):
             if path is None:
                 self._abort_cause[ship] = ABORT_CAUSES.index("no go-around path")
@@ -291,14 +299,23 @@ class Guidance:
                 self._followers.start(ship, path)
         self._await(ships)
 
+    def _round(self, pose: Array) -> Array | None:
+        """A path of arcs (k, 2) from a pose (3,) to the run-up, off the shore where there is room; None for none."""
+        return next((path for arcs in self._arcs if (path := arcs.find(pose)) is not None), None)
+
     @cached_property
-    def _arcs(self) -> GoAroundPaths:
-        helm = self._helm
-        return GoAroundPaths(
-            goal=self._followers.goal[:3],
-            radius_m=helm.ship.turning_radius_m,
-            spacing_m=helm.vessel.length_m,
-            holds=self._tree.holds,
+    def _arcs(self) -> tuple[GoAroundPaths, ...]:
+        """Paths that leave room for ships that turn wider than planned, where the run-up has it, and all paths."""
+        helm, goal, graph = self._helm, self._followers.goal[:3], self._water.narrowest_graph
+        radius_m = helm.ship.turning_radius_m
+        roomy = shapely.buffer(graph.water, -GO_AROUND_ROOM * radius_m)
+        shapely.prepare(roomy)
+        waters = [graph.water, roomy] if shapely.contains_xy(roomy, goal[1], goal[0]) else [graph.water]
+        return tuple(
+            GoAroundPaths(
+                goal=goal, radius_m=radius_m, spacing_m=helm.vessel.length_m, holds=partial(covers_path, water)
+            )
+            for water in reversed(waters)
         )
 
     @cached_property

@@ -61,13 +61,14 @@ class ReturnPaths:
         path = np.array([point, start, *path_over(node, self.nodes, self.next_node), self.place])
         return path[np.r_[True, np.hypot(*np.diff(path, axis=0).T) > 1e-6]]
 
-    def holds(self, path: Array) -> bool:
-        """Whether a path (k, 2) stays in the water."""
-        return bool(shapely.covers(self.graph.water, shapely.LineString(path[:, ::-1])))
-
     def hold(self, points: Array, paths: np.ndarray) -> np.ndarray:
         """(k,) whether paths stay in the water, from all their points (j, 2) and the path of each point (j,)."""
         return np.asarray(shapely.covers(self.graph.water, shapely.linestrings(points[:, ::-1], indices=paths)))
+
+
+def covers_path(water: shapely.Geometry, path: Array) -> bool:
+    """Whether a path (k, 2) stays in the water."""
+    return bool(shapely.covers(water, shapely.LineString(path[:, ::-1])))
 
 
 def build_return_paths(graph: VisibilityGraph, place: Array) -> ReturnPaths:
@@ -90,6 +91,7 @@ class PathFollowers:
         self._path: Array = np.tile(goal[:2], (ships, 2, 1))
         self._left: Array = np.zeros((ships, 2))
         self._bend: Array = np.full((ships, 2), helm.ship.transit_speed_mps)
+        self._curvature: Array = np.zeros((ships, 2))
         self._next, self._last = np.ones(ships, dtype=int), np.zeros(ships, dtype=int)
         self._reach_m = reach_m
         self.length_m: Array = np.zeros(ships)
@@ -101,6 +103,7 @@ class PathFollowers:
             self._path = np.concatenate([self._path, np.repeat(self._path[:, -1:], room, axis=1)], axis=1)
             self._left = np.pad(self._left, ((0, 0), (0, room)))
             self._bend = np.pad(self._bend, ((0, 0), (0, room)), mode="edge")
+            self._curvature = np.pad(self._curvature, ((0, 0), (0, room)))
         count, fastest = len(path), self._helm.ship.transit_speed_mps
         steps = np.diff(path, axis=0)
         self._path[ship], self._left[ship], self._next[ship] = self.goal[:2], 0.0, min(1, count - 1)
@@ -109,9 +112,12 @@ class PathFollowers:
         self._left[ship, :count] = np.r_[np.cumsum(length[::-1])[::-1], 0.0]
         self._last[ship] = (self._left[ship] <= 0.0).argmax()
         self._bend[ship] = BEND_SPEED * fastest if self._helm.ship.keeps_station else fastest
+        self._curvature[ship] = 0.0
         if count > 2:
-            turn = np.abs(wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0]))))
-            self._bend[ship, 1 : count - 1] = fastest * np.maximum(BEND_SPEED, np.cos(np.minimum(turn, np.pi / 2)))
+            turn = wrap_angle(np.diff(np.arctan2(steps[:, 1], steps[:, 0])))
+            slow = np.cos(np.minimum(np.abs(turn), np.pi / 2))
+            self._bend[ship, 1 : count - 1] = fastest * np.maximum(BEND_SPEED, slow)
+            self._curvature[ship, 1 : count - 1] = 2.0 * turn / (length[1:] + length[:-1])
         self.length_m[ship] = length.sum()
 
     def arrived(self, ships: np.ndarray, states: Array) -> np.ndarray:
@@ -159,7 +165,10 @@ class PathFollowers:
             speed = speed * np.where(near, 1.0, np.maximum(off, BEND_SPEED))
         north, east = (course * speed[:, None]).T
         c, s = np.cos(heading), np.sin(heading)
-        rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, np.zeros(len(ships))]
+        rate = (
+            np.zeros(len(ships)) if keeps else self._curvature[ships, at] * speed
+        )  # arcs are steered from their bends on
+        rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, rate]
         return np.array(rows).T
 
     def _pass_bends(self, ships: np.ndarray, places: Array) -> None:
