@@ -38,6 +38,7 @@ from expdesign.diagnosis.fit.fit import (
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import (
     FEWEST_RUNS,
+    LEAST_ERROR,
     HeldOut,
     certain_reductions,
     held_out_gain,

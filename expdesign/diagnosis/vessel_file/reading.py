@@ -113,6 +113,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
         effects=known,
         stated=known,
         stated_std=stated_std(vessel, model.inputs, derived, known),
+        shown=record.shown,
     )
 
 
