@@ -274,7 +274,7 @@ def content_of(calibration: Calibration, ends: tuple[State, tuple[Alarm, ...], t
     return MonitorContent(
         vessel="drawn", changes=changes, calibration=calibration, reference_s=0.0, state=state, limit=limit,
         false_alarm_days=1.0, alarms=alarms, moments=tuple(moments), left_out_rows=0, unread_rows=0, notes=(),
-        command="", version="",
+        command="",
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from expdesign import __version__
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Mark, Table, filled, section
 from expdesign.export.files import finite, strict_json
@@ -45,9 +46,7 @@ class RollContent:
     report: NullSpace  # the combinations that the data do not determine
     filter: LowPass  # that the data passed
     notes: tuple[str, ...]  # on the data
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
     scale: float | None = None  # of the ship to the model that was tried; None for a ship
 
 
@@ -250,7 +249,7 @@ def roll_json(content: RollContent) -> str:
     return strict_json(
         {
             "command": content.command,
-            "version": content.version,
+            "version": __version__,
             "method": estimate.method,
             "parameters": {name: _parameter(content, name) for name in estimate.values},
             "null_space": {
@@ -374,6 +373,4 @@ def roll_document(content: RollContent) -> Document:
             section("What would determine the rest", cures, SENSITIVITY),
         ),
         notes=content.notes,
-        command=content.command,
-        version=content.version,
     )

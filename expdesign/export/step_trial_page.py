@@ -189,8 +189,6 @@ def step_trial_document(content: StepTrialContent) -> Document:
             section("All steps", Table(header=STEP_HEADER, rows=step_rows(content), texts=10, on="page")),
         ),
         notes=content.notes,
-        command=content.command,
-        version=content.version,
     )
 
 

@@ -348,7 +348,6 @@ def metacentric_height(estimate: RollEstimate, load: Load | None) -> tuple[float
     """Metacentric height with a load on board, and its standard deviation for the held parameters as they are [m].
 
     Args:
-        estimate: of the parameters.
         load: on board; None for the unknown one.
     """
     problem = estimate.problem

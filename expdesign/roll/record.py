@@ -178,7 +178,6 @@ def judge_roll(
     Args:
         pendulum: of the vessel file, with the load that was on board.
         runs: at one load; those that are too short are left out, if others are not.
-        beam_m: of the ship.
         alarm_p: chance that a change is reported where there is none.
 
     Raises:

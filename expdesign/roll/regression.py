@@ -92,7 +92,6 @@ def unwarped(columns: Array, share: float) -> Array:
     of signals, the trapezoids of the bilinear map are the better rule.
 
     Args:
-        columns: of one run.
         share: of half the sample rate, below which frequencies are corrected; none are at 0.
     """
     if not share:
@@ -257,9 +256,7 @@ def noise_model(residuals: Sequence[Array], past: Array, order: int) -> NoiseMod
     C C* = rho A A* + (1 - q^-2)(1 - q^2), with the rho that leaves the least innovations.
 
     Args:
-        residuals: of one case.
         past: (2,) a1 and a2.
-        order: of the autoregression.
     """
     if not sum(float(e @ e) for e in residuals) > 0:
         return WHITE

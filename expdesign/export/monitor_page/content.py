@@ -64,9 +64,7 @@ class MonitorContent:
     left_out_rows: int  # of the data, which lacked a number; unread_rows: in pieces that could not be read
     unread_rows: int
     notes: tuple[str, ...]  # on the data
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
     roll: RollWatch | None = None  # of a vessel file with [roll]
 
     @property
