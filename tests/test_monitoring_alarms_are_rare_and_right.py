@@ -347,7 +347,9 @@ def states(loaded: Calibration) -> Iterator[tuple[str, MonitorContent]]:
 
 
 @pytest.mark.usefixtures("undrawn_here")
-def test_the_ship_has_changed_only_by_an_alarm_and_the_same_only_where_nothing_else_is_said(loaded: Calibration) -> None:
+def test_the_ship_has_changed_only_by_an_alarm_and_the_same_only_where_nothing_else_is_said(
+    loaded: Calibration,
+) -> None:
     alarms = same = 0
     for name, content in states(loaded):
         found, roll = bool(content.found), content.roll is not None and bool(content.roll.events)
