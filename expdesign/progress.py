@@ -30,7 +30,6 @@ def ending(progress: Progress, *, most_s: float, refusal: Callable[[str], Except
     """Progress of work that is given up where more time than this has passed by the clock.
 
     Args:
-        progress: of the work.
         most_s: time from now; work under way ends its present step first.
         refusal: raised then, made of what was to be done next.
     """

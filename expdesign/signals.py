@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -190,3 +191,5 @@ class Record:
     notes: tuple[str, ...] = ()  # on flaws of the files and their treatment, one sentence each
     doubts: tuple[str, ...] = ()  # those of the notes that put results into question, whatever is done with the data
     faults: tuple[str, ...] = ()  # those of the doubts that stand in the data as they are used
+    # effect of `vessel.quantities` -> least and greatest value of it that instruments show of each other
+    shown: Mapping[str, tuple[float, float]] = field(default_factory=dict)

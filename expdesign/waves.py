@@ -47,7 +47,6 @@ def encounter(frequency_radps: Array, *, speed_mps: float, heading_rad: float) -
 
     Args:
         frequency_radps: of the waves, seen from a fixed place.
-        speed_mps: of the ship.
         heading_rad: of the waves relative to the ship's course, 0 for a following sea.
     """
     w = np.asarray(frequency_radps)

@@ -193,7 +193,6 @@ def report_content(**changes: object) -> ReportContent:
         "design": design(),
         "plan": plan(),
         "command": "expdesign run test-sound.toml",
-        "version": "1.2.3",
     }
     return ReportContent(**(given | changes))
 

@@ -1,7 +1,5 @@
 """A command is stated once: its workflow takes the same values; the line that repeats it is read back as they are."""
 
-import ast
-import inspect
 from dataclasses import MISSING
 from pathlib import Path
 from typing import get_args, get_origin
@@ -10,15 +8,15 @@ import pytest
 from typer.main import get_command
 
 from expdesign import workflows
-from expdesign.cli.commands import app, given
+from expdesign.cli.commands import app
 from expdesign.cli.entry import LISTS, repeat_option
-from expdesign.requests import COMMANDS, Command, command_text
+from expdesign.errors import InputError
+from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Request, command_text, repeating
 from expdesign.requests.options import Argument
 from expdesign.workflows.commands import run
+from expdesign.workflows.outcome import workflow
 from short_examples import SCENARIOS
 
-WITHOUT_EFFECT = {"out", "jobs", "scheduler", "no_cache"}
-"""On results."""
 EXAMPLES = {Path: Path("one.toml"), str: "word", int: 3, float: 1.5, bool: True}
 each_command = pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
 
@@ -31,7 +29,7 @@ def unusual(command: Command) -> dict[str, object]:
             return (EXAMPLES[get_args(kind)[0]],) * 2
         return EXAMPLES[kind if isinstance(kind, type) else get_args(kind)[0]]
 
-    return {one.name: value(one.kind) for one in command.asked}
+    return {one.name: value(one.kind) for one in command.request.asked()}
 
 
 def read_back(command: Command, words: list[str]) -> dict[str, object]:
@@ -40,7 +38,8 @@ def read_back(command: Command, words: list[str]) -> dict[str, object]:
         words = repeat_option(words, option, files=files)
     with get_command(app).commands[command.name].make_context(command.name, words) as context:
         found = {name: value for name, value in context.params.items() if name not in ("quiet", "json")}
-    return given({name: () if value is None else value for name, value in found.items()})
+    asked = command.request(**found)
+    return {one.name: getattr(asked, one.name) for one in command.request.asked()}
 
 
 def test_every_command_is_there() -> None:
@@ -53,56 +52,61 @@ def test_the_line_that_repeats_a_command_is_read_back_as_its_request(command: Co
     values = unusual(command)
     _, name, *words = command_text(command.request(**values)).split()
     assert name == command.name
-    assert read_back(command, words) == given(values)
-    arguments = [one for one in command.asked if one.default is MISSING or isinstance(one.typed, Argument)]
+    assert read_back(command, words) == values
+    arguments = [one for one in command.request.asked() if one.default is MISSING or isinstance(one.typed, Argument)]
     least = {one.name: values[one.name] for one in arguments}
     _, _, *words = command_text(command.request(**least)).split()
-    usual = {one.name: one.default for one in command.asked if one.name not in least}
-    assert read_back(command, words) == given({name: () if v is None else v for name, v in (least | usual).items()})
+    usual = {one.name: one.default for one in command.request.asked() if one.name not in least}
+    assert read_back(command, words) == vars(command.request(**least)) | usual
 
 
 @each_command
-def test_a_workflow_takes_what_its_command_asks_with_the_same_defaults(command: Command) -> None:
-    taken = dict(inspect.signature(getattr(workflows, command.workflow)).parameters)
-    assert taken.pop("progress").default is not inspect.Parameter.empty
-    assert (taken.pop("tell", None) is not None) == command.tells
-    stated = {one.name: one.default for one in command.asked}
-    assert set(taken) == {"cache" if name == "no_cache" else name for name in stated}
-    for name in stated.keys() - WITHOUT_EFFECT:
-        default = inspect.Parameter.empty if stated[name] is MISSING else stated[name]
-        assert taken[name].default == default or stated[name] == (), name
+def test_a_request_and_its_values_reach_the_same_work(command: Command, monkeypatch) -> None:
+    told: list[Request] = []
+
+    def work(request: Request, *, progress: object) -> None:
+        told.append(request)
+
+    work.__name__ = command.workflow
+    called, values = workflow(work), unusual(command)
+    asked = command.request(**values)
+    by_name = dict(values)
+    first = [by_name.pop(one.name) for one in command.request.asked() if isinstance(one.typed, Argument)]
+    if "no_cache" in by_name:
+        by_name["cache"] = not by_name.pop("no_cache")
+    called(asked)
+    called(*first, **by_name)
+    called(*[list(value) if isinstance(value, tuple) else value for value in first], **by_name)
+    assert [vars(one) for one in told] == [vars(asked)] * 3
+    if "jobs" in values:
+        called(*first, **{name: value for name, value in by_name.items() if name != "jobs"})
+        assert told[-1].jobs == 1
+    with pytest.raises(TypeError, match="unknown_option"):
+        called(*first, **by_name, unknown_option=1)
 
 
 @each_command
-def test_a_workflow_that_gives_its_command_states_all_that_results_depend_on(command: Command) -> None:
-    text = inspect.getsource(inspect.getmodule(getattr(workflows, command.workflow)))
-    calls = [
-        node
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == f"requests.{command.request.__name__}"
-    ]
-    stated = {keyword.arg for call in calls for keyword in call.keywords}
-    assert not calls or {one.name for one in command.asked} - WITHOUT_EFFECT <= stated
+def test_a_page_repeats_all_that_results_depend_on(command: Command) -> None:
+    asked = command.request(**unusual(command))
+    words = read_back(command, repeating(asked).split()[2:])
+    assert {name for name, value in words.items() if value != getattr(asked, name)} == {*words} & {*WITHOUT_EFFECT}
+    assert "--out" in repeating(asked, keep={"out"}) or "out" not in words
 
 
-def test_a_request_reaches_its_workflow_with_all_its_values(monkeypatch) -> None:
+def test_values_out_of_range_are_refused_in_python_too() -> None:
     for command in COMMANDS:
-        told: list[dict[str, object]] = []
-        monkeypatch.setattr(workflows, command.workflow, lambda told=told, **values: told.append(values))
-        workflows.carry_out(command.request(**unusual(command)))
-        ((reached),) = told
-        assert reached.pop("progress") is not None
-        assert ("tell" in reached) == command.tells
-        reached.pop("tell", None)
-        expected = unusual(command)
-        if "no_cache" in expected:
-            expected["cache"] = not expected.pop("no_cache")
-        assert reached == expected
+        for one in command.request.asked():
+            over, least = getattr(one.typed, "over", None), getattr(one.typed, "min", None)
+            if (wrong := over if over is not None else least - 1 if least is not None else None) is not None:
+                with pytest.raises(InputError, match=f"{one.flag} is {wrong:g}, expected "):
+                    command.request(**{**unusual(command), one.name: wrong})
+    with pytest.raises(InputError, match="DATA"):
+        workflows.estimate([], None, vessel=Path("ship.toml"))
 
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:
     told: list[str] = []
-    monkeypatch.setattr(run, "_run", lambda case, out, words, *_: told.append(words))
+    monkeypatch.setattr(run, "_run", lambda request, *_: told.append(repeating(request)))
     scenario, vessel = SCENARIOS / "story.toml", SCENARIOS / "vessels" / "tender-20m-true.toml"
     workflows.run(scenario, tmp_path, vessel=vessel, seed=3)
     assert told == [f"expdesign run {scenario} --vessel {vessel} --seed 3"]

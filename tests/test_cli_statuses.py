@@ -19,7 +19,7 @@ import time
 import types
 import expdesign.workflows
 from expdesign.cli import main
-def run(scenario, out, *, progress, **settings):
+def run(request, *, progress):
     progress("asleep", 0.5)
     time.sleep(600)
 expdesign.workflows = types.SimpleNamespace(run=run)

@@ -200,7 +200,7 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
         errors=(clean.windows.measured,),
         step_residuals=(clean.residuals,),
     )
-    page = diagnosis_html(found, command="made up", version="0")
+    page = diagnosis_html(found, command="made up")
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     assert text.count("diverged") >= 3
     assert not re.search(r"\binf\b|e\+\d|100000000", text)

@@ -73,6 +73,55 @@ def test_causes_that_re_estimated_parameters_spoil_are_fitted_beside_the_file(
         assert all(item.in_stretches for item in told[1])
 
 
+@pytest.mark.parametrize(
+    ("alone", "written", "beside", "kept"),
+    [
+        (55.0, 50.0, 60.0, "re-estimated"),  # parameters that predict better stay
+        (50.0, 60.0, 65.0, "beside"),
+        (50.0, 60.0, 55.0, "re-estimated"),  # the cause needs them, and both predict better than the file
+        (45.0, 50.2, 50.1, "nothing"),
+    ],
+)
+def test_nothing_is_written_that_predicts_no_better_than_the_file(monkeypatch, alone, written, beside, kept):
+    """Fits to stretches held out; the file's is 50 %."""
+
+    def model(name):
+        return SimpleNamespace(ship=name, name=name, keys=("theta:Y_v",), value=lambda _: 0.0)
+
+    found = replace(steps_of("re-estimated"), first=model("alone"), last=model("re-estimated"))  # type: ignore[arg-type]
+    last = SimpleNamespace(ship=SimpleNamespace(is_possible=lambda _: True), value=lambda _: 0.0)
+    known = replace(steps_of("beside"), last=last, beside_stated=True)  # type: ignore[arg-type]
+    monkeypatch.setattr(judgement, "fitted_ahead", lambda *_, **__: known)
+    monkeypatch.setattr(judgement, "harms", lambda *_: False)
+    monkeypatch.setattr(judgement, "only_nuisance", lambda *_: False)
+    monkeypatch.setattr(judgement, "with_runs_counted", lambda selection, *_: selection)
+    monkeypatch.setattr(judgement, "open_candidates", lambda *_: [])
+    monkeypatch.setattr(judgement, "improves_held_out", lambda *_: [True])
+    fits = {"alone": alone, "re-estimated": written, "beside": beside}
+
+    def of(name):
+        fit_percent = fits.get(getattr(name, "name", name), 50.0)
+        return replace(errors(fit_percent), ahead=lambda: replace(errors(fit_percent), in_stretches=True))
+
+    validation = SimpleNamespace(of=of, short_windows=lambda _: None)
+    held, data = [of("file"), of("re-estimated")], (None, None)
+    told, told_held = judgement.worth_writing(found, held, None, of("file"), validation, data, 0)  # type: ignore[arg-type]
+    assert [step.chosen.fit for step in told.steps] == ([] if kept == "nothing" else [kept])
+    assert len(told_held) == 1 + len(told.steps)
+
+
+@pytest.mark.parametrize(
+    ("fit_percent", "share", "harmful"), [(50.0, 0.015, False), (50.0, 0.03, True), (90.0, 0.03, True)]
+)
+def test_harm_is_a_share_of_the_error_however_much_is_explained(monkeypatch, fit_percent, share, harmful):
+    left = 100.0 - fit_percent
+    fits = {"before": np.full(3, fit_percent), "after": np.full(3, fit_percent - share * left)}
+    monkeypatch.setattr(judgement, "cut_windows", lambda *_, **__: None)
+    monkeypatch.setattr(judgement, "_simulated", lambda ship, _: (fits[ship.name], False))
+    before, after = (SimpleNamespace(name=name, model=None) for name in fits)
+    assert harms(before, after, None) is harmful  # type: ignore[arg-type]
+
+
 def test_causes_are_taken_back_until_none_harms(monkeypatch):
     """Three causes, of which the second makes the simulation worse: the first is left, with its errors."""
     found = steps_of("good", "bad", "worse")

@@ -160,7 +160,7 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
         for name in ("X_u", "Y_v")
     )
     found = replace(clean, findings=items, errors=(clean.windows.measured,) * 2, step_residuals=(clean.residuals,) * 2)
-    page = diagnosis_html(found, command="made up", version="0")
+    page = diagnosis_html(found, command="made up")
     assert "X_u: u" in page
     assert "Y_v: v" in page
     assert page.index("Missing acceleration") < page.index('id="finding1"')
@@ -174,7 +174,7 @@ def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
         variables={name: values[:5] for name, values in clean.residuals.variables.items()},
     )
     found = replace(clean, residuals=short)
-    assert "too short for that" in diagnosis_html(found, command="made up", version="0")
+    assert "too short for that" in diagnosis_html(found, command="made up")
     assert json.loads(diagnosis_json(found))["residuals"]["p_values"]["u"]["heading"] is None
 
 
@@ -182,4 +182,4 @@ def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
 def test_one_variable_is_not_called_several(clean, names, words, monkeypatch):
     monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
     some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
-    assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="", version="")
+    assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="")

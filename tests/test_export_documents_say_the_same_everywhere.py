@@ -54,7 +54,6 @@ WHOLE = Document(
     values={"gap": float("nan")},
     notes=("ignored mood",),
     command="expdesign run a.toml",
-    version="0",
 )
 
 

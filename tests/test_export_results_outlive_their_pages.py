@@ -11,7 +11,6 @@ from expdesign.errors import NotDrawn
 from expdesign.export import write_files
 from expdesign.export.folder import gaps
 from expdesign.export.pages.figures import page_figure
-from expdesign.workflows.commands import estimate as command
 from synthetic_ship import sail, trial, vessel_file, write
 
 
@@ -78,7 +77,7 @@ def test_the_command_tells_what_is_missing_and_ends_as_a_defect(
 ):
     data, ship = write(tmp_path / "run.csv", sail(trial()[:200])), vessel_file(tmp_path / "ship.toml")
     if place == "page":
-        monkeypatch.setattr(command, "document_html", broken)
+        monkeypatch.setattr("expdesign.export.pages.document_html", broken)
     else:
         from expdesign.export import estimate_page
 

@@ -62,9 +62,7 @@ def told(plan: Rehearsal, *, spread: float, noisy: tuple[str, ...] = ()) -> str:
         theory=np.ones(p),
         failed=0,
     )
-    content = ValidationContent(
-        scenario="any", rehearsal=plan, results=(result,), noisy_moduli=noisy, command="", version=""
-    )
+    content = ValidationContent(scenario="any", rehearsal=plan, results=(result,), noisy_moduli=noisy)
     return " ".join(judgements(content))
 
 
@@ -139,9 +137,7 @@ def test_wind_that_the_method_does_not_know_is_found_and_named():
         integrator="euler",
         trials=12,
     )
-    content = ValidationContent(
-        scenario="any", rehearsal=plan, results=validate(plan), noisy_moduli=(), command="", version=""
-    )
+    content = ValidationContent(scenario="any", rehearsal=plan, results=validate(plan), noisy_moduli=())
     said = " ".join(judgements(content))
     assert "the bias exceeds half a standard deviation" in said
     assert "no current and wind. Method iv removes only a constant" in said

@@ -82,7 +82,7 @@ def case(name: str, *, day_s: float, variance: float) -> Case:
 @given(st.floats(60.0, 1e5), st.floats(60.0, 1e5), st.floats(1e-8, 1e8))
 def test_a_variant_is_longer_shorter_or_as_long_and_no_ratio_is_zero(one: float, other: float, ratio: float) -> None:
     cases = (case("first", day_s=one, variance=1.0), case("other", day_s=other, variance=ratio))
-    ((_, sentences),) = explanations(WhatIfContent(cases=cases, planned=True, command="", version=""))
+    ((_, sentences),) = explanations(WhatIfContent(cases=cases, planned=True))
     told = " ".join(sentences)
     assert ("as long as the scenario's" in told) == (abs(one - other) < 3.0)
     assert not re.search(r"\b0\.0+ (min|times)\b", told)

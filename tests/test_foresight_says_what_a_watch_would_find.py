@@ -100,7 +100,7 @@ def test_intervals_are_exact(count: int, trials: int) -> None:
 
 
 def test_page_file_and_table_agree(found: OperationForesight) -> None:
-    content = OperationContent(scenario="story", vessel="tender", found=found, command="expdesign foresee", version="0")
+    content = OperationContent(scenario="story", vessel="tender", found=found)
     told, page = json.loads(operation_json(content)), document_html(operation_document(content))
     assert [row["found"] for row in told["changes"]] == [item.found for item in found.rows]
     assert f"{found.nominal} voyages" in told["sentences"][0]

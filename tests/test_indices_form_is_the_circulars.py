@@ -28,7 +28,6 @@ def content(vessel: Vessel = SHIP, **changes: object) -> IndicesContent:
         "measured": (),
         "notes": (),
         "command": "expdesign indices",
-        "version": "1.2.3",
     }
     return IndicesContent(**(given | changes))
 

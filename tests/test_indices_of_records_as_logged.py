@@ -277,7 +277,7 @@ def test_the_distance_to_ten_degrees_of_heading_is_not_given_where_the_helm_is_r
 def content(found: tuple[object, ...]) -> IndicesContent:
     return IndicesContent(
         vessel=SHIP, scale=1.0, simulated=standard_results(nomoto_ship(), speed_mps=7.0), simulated_why_not="",
-        measured=found, notes=("log.csv: odd",), command="", version="",
+        measured=found, notes=("log.csv: odd",), command="",
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import FileError
 from expdesign.kinematics.check import _disagreements, faster_than_stated
 from expdesign.kinematics.instruments import Finding, log_against_positions
@@ -97,6 +98,24 @@ FAULTS: dict[str, tuple[Callable[[Log], Log], float]] = {
     "position_forward_m": (moved, 15.0),
     "current_mps": (through_water, 0.4),
 }
+
+
+def test_what_a_gyro_and_a_heading_show_of_each_other_bounds_what_a_diagnosis_may_say(
+    tmp_path: Path, ship: Vessel
+) -> None:
+    """Delays of either, on time and late by three samples."""
+    inside = 0
+    for delay in (0, 3):
+        for log in voyages(COUNT // 2, "zigzag", sample_s=0.4, seed=9):
+            record = read(tmp_path, later("r_radps", samples=delay)(log) if delay else log, ship)
+            model = extended_model(ship, record)
+            for key, sign in (("late:r", 1.0), ("late:psi", -1.0)):
+                low, high = record.shown[key]
+                inside += low < sign * 0.4 * delay < high
+                assert high - low < 1.0
+                for beyond in (max(high, 0.0) + 0.1, min(low, 0.0) - 0.1):
+                    assert not model.with_effects({key: beyond}).is_possible([key])
+    assert inside >= 2 * COUNT * (0.95 - 3.0 * np.sqrt(0.95 * 0.05 / COUNT))
 
 
 ALIKE_IN_A_CIRCLE = "surge_scale", "velocity_delay_s", "position_delay_s"

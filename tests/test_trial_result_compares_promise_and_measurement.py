@@ -47,7 +47,7 @@ def estimate_text(plan: dict, *, times: float = 1.0, off: dict[str, float] | Non
 
 def contents(plan: dict, estimate: dict) -> ResultContent:
     read = PlanResult.model_validate(plan), Estimated.model_validate(estimate)
-    return ResultContent(plan=read[0], estimate=read[1], indices=None, command="", version="")
+    return ResultContent(plan=read[0], estimate=read[1], indices=None)
 
 
 def told(tmp_path: Path, plan: str, estimate: str, *more: str) -> tuple[dict, str]:

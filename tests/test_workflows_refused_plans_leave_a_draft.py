@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from expdesign import requests
 from expdesign.cli import main
 from expdesign.errors import NoPlan, NotInformative
 from expdesign.export.document import Document
@@ -17,7 +18,12 @@ from expdesign.workflows.outcome import Outcome
 from expdesign.workflows.steps.case import DRAFT, drafted, written
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
+STORY = load_scenario(SCENARIOS / "story.toml")
 RESULTS = {"plan.json", "track.csv", "commands.csv", "report.html", "cards.html", "route.rtz", "durations.json"}
+
+
+def asked(folder: Path) -> requests.Run:
+    return requests.Run(scenario=SCENARIOS / "story.toml", out=folder)
 
 
 def refused(folder: Path, **known) -> NoPlan:
@@ -25,7 +31,7 @@ def refused(folder: Path, **known) -> NoPlan:
     error = NoPlan("no room for 'zigzag'", place=(20.0, -30.0), remedy="with plan.clearance_m = 5 there is", **known)
     error.poses = np.linspace((-100.0, -450.0, 0.0), (0.0, 0.0, 1.0), 5000)
     error.tried = ("plan 1: 9 % leave allowed water",)
-    with pytest.raises(NoPlan) as caught, drafted(load_scenario(SCENARIOS / "story.toml"), folder, command="expdesign"):
+    with pytest.raises(NoPlan) as caught, drafted(asked(folder), STORY):
         raise error
     return caught.value
 
@@ -57,7 +63,7 @@ def test_earlier_results_stay_and_are_named_as_such(tmp_path):
 
 def finished(folder: Path, name: str) -> Outcome:
     """A command that writes one file into a folder."""
-    return written(load_scenario(SCENARIOS / "story.toml"), folder, {name: "{}"}, Document(), silent)
+    return written(asked(folder), STORY, {name: "{}"}, Document(), silent)
 
 
 def test_a_plan_that_is_found_takes_an_earlier_draft_away_and_other_results_do_not(tmp_path):
@@ -83,7 +89,7 @@ def test_a_draft_that_cannot_be_deleted_is_named_in_one_line(tmp_path, monkeypat
 
 
 def test_other_refusals_leave_nothing(tmp_path):
-    with pytest.raises(NotInformative), drafted(load_scenario(SCENARIOS / "story.toml"), tmp_path / "out", command=""):
+    with pytest.raises(NotInformative), drafted(asked(tmp_path / "out"), STORY):
         raise NotInformative("nothing is known")
     assert not (tmp_path / "out").exists()
 

@@ -143,7 +143,7 @@ def test_two_of_one_name_and_none_at_all_are_refused(tmp_path):
     path = variant(tmp_path, "model-ship", "[design]\n")
     with pytest.raises(InputError, match="'model-ship' is given to 2 cases"):
         workflows.whatif(MODEL_SHIP, [path], tmp_path, jobs=1)
-    with pytest.raises(InputError, match="no variant files"):
+    with pytest.raises(InputError, match="no VARIANT"):
         workflows.whatif(MODEL_SHIP, [], tmp_path, jobs=1)
     with pytest.raises(FileError, match="does not exist"):
         workflows.whatif(MODEL_SHIP, [tmp_path / "none.toml"], tmp_path, jobs=1)
@@ -171,7 +171,7 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
         case_of(name, track=track, day_s=day_s)
         for name, track, day_s in (("first", np.eye(2), 900.0), ("half", 2 * np.eye(2), 600.0), ("none", None, 300.0))
     )
-    content = WhatIfContent(cases=(first, half, unknown), planned=True, command="", version="")
+    content = WhatIfContent(cases=(first, half, unknown), planned=True)
     assert content.against(half).track == pytest.approx(0.5)
     assert content.against(half).accuracy == pytest.approx(1.0)
     assert content.against(unknown).track is None
@@ -179,7 +179,7 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
     assert 'id="days-' in page
     assert page.count("Legs included, the day has 0.50 times the information of the scenario") == 1
     asked = replace(case_of("asked", track=None, day_s=0.0, legs_count=True), plan={})
-    unplanned = WhatIfContent(cases=(first, asked), planned=False, command="", version="")
+    unplanned = WhatIfContent(cases=(first, asked), planned=False)
     assert document_html(whatif_document(unplanned)).count("These durations only state its accuracy;") == 1
     for minutes in ("15.0", "16.0", "17.0", "10.0"):  # planned, median, 95 %
         assert f">{minutes}<" in page
@@ -188,7 +188,7 @@ def test_days_are_compared_by_what_their_whole_tracks_tell():
 def test_where_legs_count_whole_days_are_compared_and_not_runs():
     first = case_of("first", track=np.eye(2), day_s=900.0)
     shortest = case_of("shortest", track=np.diag([2.0, 0.5]), day_s=600.0, legs_count=True)
-    content = WhatIfContent(cases=(first, shortest), planned=True, command="", version="")
+    content = WhatIfContent(cases=(first, shortest), planned=True)
     against = content.against(shortest)
     np.testing.assert_allclose(against.ratios, np.sqrt([2.0, 0.5]))
     assert against.accuracy == against.track == pytest.approx(1.0)

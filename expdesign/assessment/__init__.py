@@ -1,6 +1,5 @@
 """Assessment: estimates are validated on their estimation runs and on test runs."""
 
-from expdesign.assessment.assess import NO_TESTS, assess, default_methods, settled
-from expdesign.assessment.held_out import HeldOut
-from expdesign.assessment.misfit import Limits, OneStep, RunCheck, check_run, decomposed, one_step, sentence
-from expdesign.assessment.values import INSTRUMENTS, Assessed, Assessment, Disturbances, EstimateOptions
+from expdesign.assessment.assess import NO_TESTS, assess, settled
+from expdesign.assessment.misfit import Limits, RunCheck, check_run, decomposed, sentence
+from expdesign.assessment.values import INSTRUMENTS, Assessed, Assessment, EstimateOptions

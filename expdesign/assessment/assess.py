@@ -83,7 +83,6 @@ def settled(
         raw: with commands as inputs.
         options: methods and settings.
         smoothed: whether velocities from the pose are smoothed, as in `reduced`.
-        progress: of the estimates.
 
     Raises:
         InputError, NoAnswer: as of `assess`.
@@ -125,7 +124,6 @@ def assess(
         options: methods, fixed parameters and settings.
         tests: runs that are simulated but not used.
         stated: as the vessel's file has it, where `vessel` has dead times or lags that were found since.
-        progress: of the assessment.
 
     Raises:
         InputError: the data lack what every method needs, or a name is unknown.

@@ -134,7 +134,6 @@ def reason(found: Sequence[HeldOut], chosen: str, asked: Sequence[str]) -> str:
     """Why the estimate of a method is chosen, to follow its name; "" where nothing was compared.
 
     Args:
-        found: the comparison.
         chosen: label of the chosen one.
         asked: names of the methods asked for; none where they are the program's choice.
     """
@@ -220,7 +219,6 @@ def held_out(
     those on the data that the estimates are from.
 
     Args:
-        record: the data.
         candidates: with estimates from them.
         ship: gives the limits of rudders, and the length.
         seen_as: what of a record is predicted.

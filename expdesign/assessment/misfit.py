@@ -57,7 +57,6 @@ def check_run(model: VesselModel, batch: Batch, *, use: str, wind: bool, integra
 
     Args:
         model: with estimated parameters.
-        batch: the run.
         use: "estimation" or "test".
         wind: simulate in the wind that was measured; otherwise in still air. The water is still in both.
         integration: Euler's map at the sample time when left out.
@@ -317,9 +316,7 @@ def one_step(
     """The residuals of an estimate on the record it comes from.
 
     Args:
-        record: the data.
         model: the initial model; gives the values of the fixed parameters.
-        found: the estimate.
         fixed: fixed parameters.
         quadrature: one of `predictors.QUADRATURES`.
     """

@@ -242,13 +242,11 @@ def attempted(
     Args:
         work: its options.
         vessel: whose values it starts from.
-        record: the data.
         method: the method.
         start: of the first instruments.
         times: estimated too.
         begun: where output error goes on.
         quick: whether its covariance may be one that takes no time.
-        progress: of output error.
     """
     options = work.options
     weighting = Weighting(mean=options.mean, blocks=options.blocks)

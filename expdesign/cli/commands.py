@@ -166,19 +166,12 @@ def _untold(line: str) -> None:
     """Say nothing."""
 
 
-def given(options: Mapping[str, object]) -> dict[str, object]:
-    """Options as a request has them: lists as tuples."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
-
-
 def register(command: Command) -> None:
     """Make a command of its request, with --quiet and --json besides."""
-    entries = command.asked
-    lists = {one.name for one in entries if get_origin(one.kind) is tuple}
+    entries = command.request.asked()
 
     def run(*, quiet: bool, json: bool, **options: object) -> None:
-        named = {name: value or () if name in lists else value for name, value in options.items()}
-        run_command(command, given(named), quiet=quiet, json=json)
+        run_command(command, options, quiet=quiet, json=json)
 
     kind = inspect.Parameter.KEYWORD_ONLY
     parameters = [
@@ -208,13 +201,8 @@ def _typed(kind: Any, flag: str, typed: Option | Argument, *, required: bool) ->
     if isinstance(typed, Argument):
         return Annotated[kind, typer.Argument(metavar=typed.metavar, help=typed.help)]
     flags = (flag, typed.short) if typed.short else (flag,)
-    return Annotated[
-        kind,
-        typer.Option(
-            *flags, metavar=typed.metavar, help=typed.help, min=typed.min, max=typed.max, parser=typed.parser,
-            callback=typed.callback,
-        ),
-    ]  # fmt: skip
+    allowed = f" Allowed: {typed.range}." if typed.range else ""
+    return Annotated[kind, typer.Option(*flags, metavar=typed.metavar, help=typed.help + allowed, parser=typed.parser)]
 
 
 for each in COMMANDS:

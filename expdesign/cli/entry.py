@@ -29,7 +29,7 @@ from expdesign.requests import COMMANDS
 LISTS = {
     one.flag: get_args(one.kind)[0] is Path
     for command in COMMANDS
-    for one in command.asked
+    for one in command.request.asked()
     if one.flag and get_origin(one.kind) is tuple
 }
 """Options that take several values, and whether these are files."""

@@ -62,6 +62,7 @@ from expdesign.diagnosis.judgement import (
     with_alternatives,
     with_parameters_as_rival,
     without_harm,
+    worth_writing,
 )
 from expdesign.diagnosis.model import ExtendedModel
 from expdesign.diagnosis.motion import fitted_start, simulate_from_measured, stable_windows
@@ -169,6 +170,7 @@ def select_causes(
         if compared and kept.steps and not by_predictions:
             kept, compared = with_alternatives(kept, compared, seed), None
         kept, held = by_predictions or (kept, held)
+    kept, held = worth_writing(kept, held, ship, as_stated, validation, data, seed)
     rest = with_unlisted_terms(kept, held, windows, validation, seed, rejected)
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])
     return Selected(

@@ -12,6 +12,7 @@ from expdesign.diagnosis.accuracy import WHOLE_S, pooled_fit
 from expdesign.diagnosis.data import Windows, cut_windows
 from expdesign.diagnosis.fit import (
     AHEAD_S,
+    LEAST_ERROR,
     CrossValidation,
     Fit,
     HeldOut,
@@ -148,7 +149,6 @@ def found_by_predictions(
         compared: causes, by their predictions.
         data: as compared, and as measured.
         ship: the model in use.
-        seed: of the intervals.
         re_estimated: errors of the model with parameters re-estimated and no cause, where causes are compared beside
             the parameters of the file; None where they are compared beside re-estimated ones.
     """
@@ -193,7 +193,6 @@ def parameters_alone(kept: Selection, held: Sequence[HeldOut], validation: Cross
     beside the cause. None elsewhere.
 
     Args:
-        kept: the causes.
         held: errors on held-out units of the model before any cause, then after every one.
         validation: of other fits.
     """
@@ -269,7 +268,6 @@ def losses_without(found: Selection, held: Sequence[HeldOut], validation: CrossV
     they were found; this does not.
 
     Args:
-        found: the selection.
         held: errors on held-out units of the model before any cause, then after every step, and perhaps of more.
         validation: of other fits.
         windows: all data.
@@ -306,10 +304,9 @@ def harmless_beside_the_file(
         as_stated: its errors as its file states it.
         validation: of other fits.
         data: as compared, and as measured.
-        seed: of the intervals.
     """
     windows, record = data
-    if not kept.steps or not kept.first.keys or kept.beside_stated or not harms(ship, kept.last.ship, record):
+    if not _re_estimates(kept) or not harms(ship, kept.last.ship, record):
         return None
     known = fitted_ahead(kept, windows, validation.short_windows(ship), beside_stated=True)
     if known is None or harms(ship, known.last.ship, record):
@@ -320,16 +317,52 @@ def harmless_beside_the_file(
     return with_runs_counted(known, open_candidates(known.last, windows), np.random.default_rng(seed)), held
 
 
+def worth_writing(
+    kept: Selection,
+    held: list[HeldOut],
+    ship: ExtendedModel,
+    as_stated: HeldOut,
+    validation: CrossValidation,
+    data: tuple[Windows, Record],
+    seed: int,
+) -> tuple[Selection, list[HeldOut]]:
+    """Causes whose model predicts stretches held out better than the file does, where re-estimated parameters do not.
+
+    What is written has to help other runs, not these. Many parameters re-estimated from few runs may spoil what a right
+    cause gains, or be what a wrong one needs. Where they predict no better than those of the file, causes are fitted
+    beside the latter if that predicts better and each improves there; if it does not, and the model of all takes less
+    than `Tuning.least_reduction` off the error of the file's, nothing is found. Arguments as of
+    `harmless_beside_the_file`, and the errors that belong to the causes.
+    """
+    windows, record = data
+    if not _re_estimates(kept) or only_nuisance(kept.steps[0], kept):
+        return kept, held
+    stated, alone, written = _ahead([as_stated, *map(validation.of, (kept.first, kept.last))])
+    if alone.mean_fit > stated.mean_fit:
+        return kept, held
+    known = fitted_ahead(kept, windows, validation.short_windows(ship), beside_stated=True)
+    if known is not None and not harms(ship, known.last.ship, record):
+        beside = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
+        if beside[-1].mean_fit > written.mean_fit and all(improves_held_out(known, beside, seed, windows)):
+            rng = np.random.default_rng(seed)
+            return with_runs_counted(known, open_candidates(known.last, windows), rng), beside
+    gains = written.left < (1.0 - SELECTION_TUNING.least_reduction) * stated.left
+    return (kept, held) if gains else (kept.with_steps(()), held[:1])
+
+
+def _re_estimates(kept: Selection) -> bool:
+    """Whether causes stand beside parameters that were fitted with them."""
+    return bool(kept.steps and kept.first.keys and not kept.beside_stated)
+
+
 def without_harm(
     kept: Selection, held: list[HeldOut], ship: ExtendedModel, record: Record
 ) -> tuple[Selection, list[HeldOut]]:
     """The first causes, as many as can be, with which the data are simulated no worse than by the model in use.
 
     Args:
-        kept: the causes.
         held: errors on held-out units of the model before any cause, then after every one.
         ship: the model in use.
-        record: data.
     """
     while kept.steps and harms(ship, kept.last.ship, record):
         kept, held = kept.with_steps(kept.steps[:-1]), held[:-1]
@@ -342,9 +375,10 @@ def without_harm(
 def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
     """Whether an extended model simulates the data worse than the model in use, each from the first measured state.
 
-    It does if it runs away where the model in use does not; if its mean fit in short stretches is less by more than
-    `Tuning.most_loss_points`; and if it simulates some output of whole runs worse than a constant, while the model in
-    use simulates none so, or all of them worse by more than `Tuning.much_better_points` on average. A smaller loss in
+    It does if it runs away where the model in use does not; if its errors in short stretches, as the geometric mean
+    over outputs, are larger by more than the share `Tuning.most_loss_share`; and if it simulates some output of whole
+    runs worse than a constant, while the model in use simulates none so, or its errors in these are larger by more than
+    `Tuning.much_better_share`. A smaller loss in
     whole runs is weak evidence, and so is any loss of a model that explains little of them: it depends on slow errors,
     which in a wrong model may cancel by chance.
     """
@@ -352,14 +386,20 @@ def harms(ship: ExtendedModel, extended: ExtendedModel, record: Record) -> bool:
         windows = cut_windows(ship.model, record, longest_s=length_s)
         (before, ran_before), (after, runs_away) = (_simulated(one, windows) for one in (ship, extended))
         if length_s == AHEAD_S:
-            loses = after.mean() < before.mean() - SELECTION_TUNING.most_loss_points
+            loses = _larger_error(before, after) > 1.0 + SELECTION_TUNING.most_loss_share
         else:
             right = not (before < 0.0).any() and before.mean() > LITTLE_FIT
-            less = after.mean() < before.mean() - SELECTION_TUNING.much_better_points
+            less = _larger_error(before, after) > 1.0 + SELECTION_TUNING.much_better_share
             loses = bool(right and (less or (after < 0.0).any()))
         if loses or (runs_away and not ran_before):
             return True
     return False
+
+
+def _larger_error(before: Array, after: Array) -> float:
+    """Geometric mean over outputs of the ratio of errors, by the fits [%] before and after."""
+    left, still = (np.maximum(100.0 - fit, 100.0 * LEAST_ERROR) for fit in (before, after))
+    return float(np.exp(np.log(still / left).mean()))
 
 
 def _simulated(ship: ExtendedModel, windows: Windows) -> tuple[Array, bool]:

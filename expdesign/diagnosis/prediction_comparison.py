@@ -133,7 +133,6 @@ def compare_predictions(
         ship: the model that the search for causes begins with.
         short: data in short stretches.
         seed: of the gains' intervals.
-        progress: of all of it.
         asked: causes that may be found; empty where all may.
     """
     activity = "comparing causes by predictions"

@@ -3,4 +3,3 @@
 from expdesign.dictionary.build import build_dictionary, build_primitive, family
 from expdesign.dictionary.families import FAMILIES
 from expdesign.dictionary.spec import Family, Primitive, PrimitiveSpec, Setting, complete_settings
-from expdesign.dictionary.trim import trim

@@ -70,7 +70,6 @@ def newton_step(
         w: (q,) where B is positive definite for every model.
         chosen: (c,) fractions that may change.
         mixture: (m,) weights of the models.
-        floor_prices: of the floors.
         gain: order of magnitude of what the step may gain. The solver's tolerances are absolute, so they are applied to
             shares of it.
 

@@ -159,7 +159,6 @@ def certify(
     """The tightest bound at a design, and the criterion's sensitivities (q,) there.
 
     Args:
-        task: the problem.
         w: (q,) the design.
         kind: the theorem, in words.
         multipliers: (d, d) for each model, tried in addition to the gradients; the bound is valid for any.

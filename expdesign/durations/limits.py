@@ -151,7 +151,6 @@ def feasible_set(constraints: Constraints, names: Sequence[str], *, run_s: Array
     """The polytope of time fractions.
 
     Args:
-        constraints: the limits.
         names: of the q primitives.
         run_s: (q,) duration of one run [s].
         total_s: total time of all primitives [s].

@@ -64,7 +64,6 @@ def maximised(task: ConcaveProblem, kind: str = "", *, as_stated: bool = False) 
     """The optimum with its certificate.
 
     Args:
-        task: the problem.
         kind: the theorem, in words.
         as_stated: solve the problem as it is stated where its size allows that, not by the quickest method. The answers
             agree to the gaps.

@@ -253,7 +253,6 @@ def build_fused(
         run_s: (q,) duration of one whole run [s].
         total_s: total time of all primitives [s].
         aim: criterion with its settings; D when not given. Covariances are in physical units, so noise must be 1.
-        constraints: limits.
 
     Raises:
         NotInformative: a primitive that is not informative on its own.

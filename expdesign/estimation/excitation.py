@@ -100,7 +100,6 @@ def check_excitation(
     """Every modulus of velocities that breaks the condition, batch by batch; empty when the condition holds.
 
     Args:
-        record: the data.
         model: whose terms hold the moduli.
         worst: noise, current and wind.
         wind_measured: air velocities are data; otherwise ship velocities stand for them and must beat the wind.
@@ -240,7 +239,6 @@ def with_strata(layout: Layout, rows: Rows, tables: Sequence[Table], *, worst: W
 
     Args:
         layout: columns; equations are its model's outputs.
-        rows: of the regression.
         tables: signals of each batch, simulated or measured.
         worst: noise, current and wind that signals inside a modulus must exceed.
 

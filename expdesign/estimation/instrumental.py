@@ -70,7 +70,6 @@ def least_squares(rows: Rows, weighting: Weighting) -> Refined:
     """The estimate of least squares.
 
     Args:
-        rows: of the regression.
         weighting: whose covariance is wanted; its mean and blocks are those of instruments.
     """
     return Refined(solve_ls(rows.regression, replace(weighting, mean="none", blocks="one")), 0, ())
@@ -88,9 +87,7 @@ def instrumental_estimate(
 
     Args:
         layout: columns, linearised around the first guess of a current.
-        record: the data.
         driving: whose inputs the instruments are simulated with.
-        choices: settings.
     """
     windy = layout.predictor.wind and choices.wind != "measured"
     replay = build_replay(layout.model, driving, choices.integration, windy=windy, flowing=layout.predictor.steady)
@@ -117,7 +114,6 @@ def _settled_current(
 
     Args:
         around: the estimate around a guess.
-        found: the first one.
     """
     share = 1.0
     for _ in range(MOST_CURRENTS):

@@ -63,7 +63,6 @@ def suspected_force(found: Diagnosis, item: Finding, at: Mapping[str, Array]) ->
     """The variable that a force depends on, and its label.
 
     Args:
-        found: the diagnosis.
         item: one of its findings.
         at: (k,) variables of `Residuals` by name.
     """

@@ -101,7 +101,7 @@ NO_NUMBER = "\N{EN DASH}"
 
 
 def diagnosis_html(
-    found: Diagnosis, *, command: str, version: str, roll: RollVerdict | None = None, progress: Progress = silent
+    found: Diagnosis, *, command: str, roll: RollVerdict | None = None, progress: Progress = silent
 ) -> str:
     """One HTML page without any outside reference."""
     figures = _figures(found, progress)
@@ -123,7 +123,6 @@ def diagnosis_html(
         notes=diagnosis_notes(found),
         figures=figures,
         command=command,
-        version=version,
     )
 
 

@@ -113,9 +113,7 @@ class Document:
     values: Mapping[str, object] = field(default_factory=dict)  # more of them, for JSON alone
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = ()  # on the data
-    # command, version: to reproduce it
-    command: str = ""
-    version: str = ""
+    command: str = ""  # to reproduce it
 
     @property
     def summary(self) -> Mapping[str, object]:

@@ -49,8 +49,6 @@ class EstimateContent:
 
     vessel: Vessel  # as it was before the estimation
     found: Assessment  # the estimates and their assessment
-    command: str  # the command line that reproduces the result
-    version: str  # of the program
 
     @property
     def drawn(self) -> tuple[Assessed, ...]:
@@ -171,8 +169,6 @@ def estimate_document(content: EstimateContent) -> Document:
             section("Methods without an estimate", Table(header=("Method", "Why"), rows=failure_rows(found), texts=2)),
         ),
         notes=(*([] if ship.pendulum is None else [NOT_ACTING_BACK]), *_data_notes(content)),
-        command=content.command,
-        version=content.version,
     )
 
 

@@ -52,9 +52,6 @@ class ForesightContent:
     vessel: str  # its name
     source: str  # the trial, in words
     found: Foresight  # what is foreseen
-    # command, version: to reproduce it
-    command: str
-    version: str
 
 
 def foresight_rows(found: Foresight) -> tuple[tuple[str, ...], ...]:
@@ -266,8 +263,6 @@ def foresight_document(content: ForesightContent) -> Document:
             ),
             section("Method", METHOD),
         ),
-        command=content.command,
-        version=content.version,
     )
 
 

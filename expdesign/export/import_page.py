@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
+from expdesign import __version__
 from expdesign.conventions import plus_minus
 from expdesign.export.document import Document, Figure, Listing, Table, filled, section
 from expdesign.export.files import finite, strict_json
@@ -44,10 +45,8 @@ class ImportContent:
     notes: tuple[str, ...]
     origin_s: float  # time of the first row that is written
     dated: bool  # whether it counts from 1970
-    # command, version: to reproduce it
-    command: str
+    command: str  # to reproduce it
     vessel: str  # file that was given, or a word for one
-    version: str
 
 
 def channel_rows(content: ImportContent) -> list[tuple[str, ...]]:
@@ -180,7 +179,7 @@ def import_json(content: ImportContent) -> str:
     return strict_json(
         {
             "command": content.command,
-            "version": content.version,
+            "version": __version__,
             "begins": moment(content, content.origin_s) if content.dated else None,
             "begins_s": content.origin_s,
             "sample_time_s": content.sampled.sample_time_s,
@@ -280,7 +279,6 @@ def import_document(content: ImportContent, folder: Path) -> Document:
         ),
         notes=content.notes,
         command=content.command,
-        version=content.version,
     )
 
 

@@ -53,7 +53,6 @@ class IndicesContent:
     measured: tuple[Found, ...]  # results of measured runs
     notes: tuple[str, ...]  # remarks on the files, one sentence each
     command: str  # the command line
-    version: str  # of the program
     held: Held = field(default_factory=Held)  # depth and weather of the measured trials
 
     @property

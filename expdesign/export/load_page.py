@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from expdesign import __version__
 from expdesign.export.document import Document, Listing, Table, section
 from expdesign.export.files import finite, strict_json
 from expdesign.export.words import counted, ship
@@ -30,9 +31,7 @@ class LoadContent:
     plan: LoadPlan  # the load cases
     known: Mapping[str, float]  # parameters that are not sought, by name
     commands: tuple[str, ...]  # that plan each load case, and estimate from the data
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
 
     @property
     def options(self) -> tuple[LoadOption, ...]:
@@ -132,7 +131,7 @@ def load_plan_json(content: LoadContent) -> str:
     return strict_json(
         {
             "command": content.command,
-            "version": content.version,
+            "version": __version__,
             "load_cases": [
                 {
                     "name": option.name,
@@ -243,5 +242,4 @@ def load_document(content: LoadContent) -> Document:
             ),
         ),
         command=content.command,
-        version=content.version,
     )

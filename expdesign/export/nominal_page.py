@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from expdesign import __version__
 from expdesign.export.document import Document, Table, notes_of, section
 from expdesign.export.files import finite, strict_json, vessel_toml
 from expdesign.export.words import ship
@@ -57,9 +58,7 @@ class NominalContent:
     """The values that page and files show."""
 
     nominal: Nominal
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -133,7 +132,7 @@ def nominal_json(content: NominalContent) -> str:
     return strict_json(
         {
             "command": content.command,
-            "version": content.version,
+            "version": __version__,
             "vessel": found.vessel.name,
             "trials": [
                 {
@@ -199,6 +198,4 @@ def nominal_document(content: NominalContent) -> Document:
                 "\u201cNo end\u201d: some of these ships do not come to the end of the trial.",
             ),
         ),
-        command=content.command,
-        version=content.version,
     )

@@ -26,9 +26,6 @@ class OperationContent:
     scenario: str
     vessel: str
     found: OperationForesight  # what is foreseen
-    # command, version: to reproduce it
-    command: str
-    version: str
 
 
 def operation_rows(found: OperationForesight) -> tuple[tuple[str, ...], ...]:
@@ -141,6 +138,4 @@ def operation_document(content: OperationContent) -> Document:
                 "force of all actuators. Traffic, loading, fouling over time and shallow water are not simulated.",
             ),
         ),
-        command=content.command,
-        version=content.version,
     )

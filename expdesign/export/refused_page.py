@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
+from expdesign import __version__
 from expdesign.errors import NoPlan
 from expdesign.export.document import Document, Figure, Items, section
 from expdesign.export.pages.figures import (
@@ -45,9 +46,7 @@ class Refusal:
     clearance_m: float  # asked for [m]
     error: NoPlan  # the refusal
     earlier: tuple[str, ...] = ()  # names of results of an earlier attempt in the same folder
-    # command, version: how it came about
-    command: str = ""
-    version: str = ""
+    command: str = ""  # how it came about
 
     def __post_init__(self) -> None:
         seal(self, start="3", goal="3")
@@ -92,7 +91,7 @@ def refused_json(refusal: Refusal) -> str:
             for north, east, heading in refusal.track.tolist()
         ],
         "command": refusal.command,
-        "version": refusal.version,
+        "version": __version__,
     }
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
@@ -122,7 +121,6 @@ def refused_document(refusal: Refusal) -> Document:
             *([section("Other files in this folder", others)] if refusal.earlier else []),
         ),
         command=refusal.command,
-        version=refusal.version,
     )
 
 

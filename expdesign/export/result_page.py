@@ -146,9 +146,6 @@ class ResultContent:
     plan: PlanResult
     estimate: Estimated  # the one in the vessel file
     indices: Indices | None  # None where none were computed
-    # command, version: to reproduce it
-    command: str
-    version: str
 
     @property
     def recorded_s(self) -> float:
@@ -218,8 +215,6 @@ def result_document(content: ResultContent) -> Document:
             ),
         ),
         notes=_left_out(content),
-        command=content.command,
-        version=content.version,
     )  # fmt: skip
 
 

@@ -48,9 +48,7 @@ class StepTrialContent:
     own: tuple[Validated, ...]
     tests: tuple[Validated, ...]
     notes: tuple[str, ...]  # on the data
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
 
 
 def begins_s(content: StepTrialContent, one: StepSample) -> float:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from expdesign import __version__
 from expdesign.export.files.text import csv_text, strict_json
 from expdesign.export.step_trial_content import unit_of
 from expdesign.step_trials.live import Event, Inputs, Listed, State, StepList, in_sequence
@@ -22,9 +23,7 @@ class LiveContent:
     state: State  # after the last row
     constants_s: tuple[float, float]  # expected time constants of U and r [s]
     notes: tuple[str, ...]  # on the data
-    # command, version: to reproduce it
-    command: str
-    version: str
+    command: str  # to reproduce it
 
 
 def event_line(event: Event, steps: StepList) -> str:
@@ -119,7 +118,7 @@ def live_json(content: LiveContent) -> str:
             "sample_time_s": state.sample_time_s or None,
             "notes": list(content.notes),
             "command": content.command,
-            "version": content.version,
+            "version": __version__,
         }
     )  # fmt: skip
 

@@ -53,9 +53,6 @@ class ValidationContent:
     # primitives of the optimised design in which noise or weather may change the sign of a velocity inside an absolute
     # value
     noisy_moduli: tuple[str, ...]
-    # command, version: to reproduce it
-    command: str
-    version: str
 
 
 def chance(result: Validated) -> float:
@@ -359,8 +356,6 @@ def validation_document(content: ValidationContent) -> Document:
                 "and radians.",
             ),
         ),
-        command=content.command,
-        version=content.version,
     )
 
 

@@ -66,9 +66,6 @@ class WhatIfContent:
 
     cases: tuple[Case, ...]  # the scenario first, then its variants
     planned: bool  # whether trials were planned
-    # command, version: to reproduce it
-    command: str
-    version: str
 
     def against(self, case: Case) -> Against | None:
         """A case against the first, or None when one of them has no result or they share no parameter."""

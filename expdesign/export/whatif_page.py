@@ -172,8 +172,6 @@ def whatif_document(content: WhatIfContent) -> Document:
                 "Prior knowledge is not included.",
             ),
         ),
-        command=content.command,
-        version=content.version,
     )
 
 

@@ -21,33 +21,10 @@ it is drawn: effects are estimated without each fold of the runs, by the informa
 Sources: A. Wald (1943) for the noncentral distribution; C. R. Rao (1948) for score tests.
 """
 
-from expdesign.foresight.effects import (
-    Direction,
-    HiddenEffect,
-    Size,
-    StandardTrials,
-    default_sizes,
-    sizes_that_matter,
-    standard_trials,
-    with_effect,
-)
+from expdesign.foresight.effects import default_sizes, with_effect
 from expdesign.foresight.foresee import foresee
-from expdesign.foresight.operation import (
-    Detectability,
-    HiddenChange,
-    OperationForesight,
-    foresee_operation,
-    interval,
-)
+from expdesign.foresight.operation import Detectability, OperationForesight, foresee_operation, interval
 from expdesign.foresight.power import level_of, needed_noncentrality, power
 from expdesign.foresight.reveal import Wanted, causes_by_runs, told_apart_from, told_apart_with, wanted
-from expdesign.foresight.trial import (
-    Background,
-    TrialRun,
-    background,
-    design_runs,
-    run_of,
-    simulated_record,
-    weather_without_causes,
-)
-from expdesign.foresight.values import TOLD_APART, AddedRuns, Confusion, Foreseen, Foresight
+from expdesign.foresight.trial import TrialRun, background, design_runs, simulated_record, weather_without_causes
+from expdesign.foresight.values import TOLD_APART, AddedRuns, Foreseen, Foresight

@@ -65,9 +65,7 @@ def information_of_runs(
         vessel: the model in use.
         base: fit of the trial that the runs are added to: its model, nuisance and noise.
         primitives: q manoeuvres.
-        weather: forecast.
         directions: m effects; a change of the ship has happened before the runs.
-        sizes: of the effects.
     """
     calm = weather_without_causes(vessel, weather)
     turns = np.arange(HEADINGS) * (np.pi / HEADINGS)

@@ -258,7 +258,6 @@ def sizes_that_matter(
         trials: standard trials; None where there are none, so that defaults count.
         stated_std: standard deviations of effects in the vessel file; what is within them is no cause.
         defaults: size by kind of effect, where the rule gives none.
-        progress: of the simulations.
     """
     found = [_by_fit(item, trials, _default(item, defaults)) for item in directions]
     found = [_beyond_std(item, size, stated_std) for item, size in zip(directions, found, strict=True)]
@@ -334,8 +333,6 @@ def with_effect(vessel: Vessel, ship: ExtendedModel, item: Direction, size: floa
     Args:
         vessel: the model in use.
         ship: its extended model for the records of a trial.
-        item: the effect.
-        size: of it.
     """
     present = {key: ship.get(key) + value if key in item.shares else value for key, value in item.at(size).items()}
     return extend(vessel, ship.with_effects(present), {})[0]

@@ -69,12 +69,10 @@ def foresee(
 
     Args:
         vessel: the model in use, with its sensors.
-        runs: of the trial.
         weather: the forecast; how it varies is in the trial.
         offers: manoeuvres whose runs may be added.
         sizes: of causes, in the unit of their effects in results, instead of those that matter.
         seed: of all chance.
-        progress: of the work.
 
     Raises:
         Diverged: the model cannot be simulated over the trial.
@@ -121,11 +119,8 @@ def sizes_of(
 
     Args:
         vessel: the model in use.
-        hidden: the effects.
         known: the trial that they are hidden in.
-        weather: forecast.
         stated: size by cause, in the unit of its effects in results.
-        progress: of the simulations.
     """
     ship, stated = known.base.ship, stated or {}
     std = {f"theta:{n}": s for n, s in zip(ship.model.names, ship.model.parameter_std.tolist(), strict=True)}

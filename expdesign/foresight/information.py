@@ -38,7 +38,6 @@ def batch_information(
         linear: the linearised motion of all batches.
         keys: c effects that are estimated anyway.
         disturbances: m effects as they are.
-        noise: of the remainder.
     """
     return unit_information(linear, keys, disturbances, noise, linear.motion.windows.batch)
 
@@ -93,7 +92,6 @@ def simulated_units(
         base: the fit to a record.
         windows: its data.
         again: other records of the same runs, simulated by the model that they come from.
-        disturbances: of hidden effects.
     """
     unit = validation_units(windows)
     own = effect_disturbances(base.linear, base.keys)

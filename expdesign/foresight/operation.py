@@ -250,7 +250,6 @@ def foresee_operation(
         sizes: shares of the changes.
         references: voyages of `REFERENCE_S` that the watch learns from.
         seed: of all chance.
-        progress: of the simulations.
 
     Raises:
         NotInformative: the reference has no information.

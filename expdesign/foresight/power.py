@@ -42,9 +42,7 @@ def power(noncentrality: Array | float, freedom: int, level: float) -> Array:
     """Probability that a chi-squared test rejects; the level where nothing is hidden.
 
     Args:
-        noncentrality: of the statistic.
         freedom: numbers tested at once.
-        level: of the test.
     """
     limit = float(scipy.special.chdtri(freedom, level))
     hidden = np.maximum(np.asarray(noncentrality, dtype=float), 0.0)
@@ -103,7 +101,6 @@ def rivals_of(
         tests: of t candidates.
         rows: their rows in `A`.
         A: (m, m) information beside nuisance, of effects that are no candidates too.
-        rng: of the draws.
     """
     size = np.sqrt(np.maximum(np.diag(A), 1e-300))
     blocks, parts, columns = [], [], 0
@@ -152,7 +149,6 @@ def share_shown(
         rows: of the effect's d numbers among the m.
         mixture: (d,) of them that is hidden.
         limit: of the statistic, from which on the test accepts.
-        rng: of the draws.
     """
     c = len(units.precision)
     kept = np.concatenate([np.arange(c), c + rows])

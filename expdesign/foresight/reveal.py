@@ -117,12 +117,10 @@ def wanted(
     Args:
         vessel: the model in use, with its sensors.
         primitives: q manoeuvres.
-        weather: forecast.
         reveal: causes.
         apart: pairs of causes to tell apart.
         sizes: of causes, in the unit of their effects, instead of those that matter.
         seed: of all chance.
-        progress: of the work.
 
     Raises:
         NoAnswer: records of the trial cannot show a cause.

@@ -72,7 +72,6 @@ def simulated_record(
 
     Args:
         vessel: the ship that sails, with its sensors.
-        runs: of the trial.
         weather: its means and how it varies.
         rng: of weather and sensor noise.
     """
@@ -137,8 +136,6 @@ def background(vessel: Vessel, runs: Sequence[TrialRun], weather: Environment, *
 
     Args:
         vessel: the model in use, with its sensors.
-        runs: of the trial.
-        weather: the forecast.
         seed: of sensor noise, weather and the null distribution of the tests.
     """
     rng = np.random.default_rng(seed)

@@ -103,9 +103,7 @@ def grow_dictionary(
     Args:
         vessel: nominal.
         information: the present dictionary, scored with the same environment, fixed parameters and mean subtraction.
-        settings: of the search.
         environment, fixed_parameters, mean_subtraction: as in `score_primitives`.
-        progress: of the search.
 
     Raises:
         NotInformative: the present dictionary does not inform about every parameter.

@@ -13,12 +13,12 @@
 Times count from 1970 UTC where a clock has a date. Angles are in radians, headings clockwise from north.
 """
 
-from expdesign.importing.alignment import Lag, lag_of, zone_lag_of
+from expdesign.importing.alignment import lag_of, zone_lag_of
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log, joined
 from expdesign.importing.guess import guess
 from expdesign.importing.labels import family, fitted, presumed
 from expdesign.importing.machines import bow_signals, sides
-from expdesign.importing.mapping import EXTRA_COLUMNS, FileClock, Mapping, Use
+from expdesign.importing.mapping import FileClock, Mapping
 from expdesign.importing.readers import READERS, read_log
 from expdesign.importing.responses import Followed, followed, sensor_keys
 from expdesign.importing.runs import (

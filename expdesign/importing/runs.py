@@ -145,7 +145,6 @@ def cut_by_plan(found: Sampled, commands: Commands, legs: Sequence[tuple[str, in
 
     Args:
         found: with orders or positions of the same signals.
-        commands: of the plan.
         legs: name, first and last sample of each run.
     """
     best: tuple[float, int, int] | None = None

@@ -12,8 +12,6 @@ from expdesign.indices.criteria import (
     Circle,
     Condition,
     Conditions,
-    Criterion,
-    Execute,
     Stop,
     Verdict,
     ZigZag,
@@ -24,4 +22,4 @@ from expdesign.indices.criteria import (
 )
 from expdesign.indices.measured import NotStandard, measured_trial
 from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
-from expdesign.indices.steered_run import SteeredRun, steered_run
+from expdesign.indices.steered_run import steered_run

@@ -1,6 +1,6 @@
 """Information: moments of regressors and instruments, identifiability."""
 
-from expdesign.information.excitation import EXCITATIONS, excitation_condition, excitation_refusal
+from expdesign.information.excitation import excitation_condition, excitation_refusal
 from expdesign.information.moments import (
     MEAN_SUBTRACTIONS,
     PrimitiveInformation,

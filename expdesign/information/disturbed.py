@@ -168,7 +168,6 @@ def score_augmented(
 
     Args:
         vessel: nominal.
-        primitives: the dictionary.
         predictor: one with nuisance regressors, see `estimation.predictors`.
         environment: mean current and wind.
         fixed_parameters: held at the nominal values.

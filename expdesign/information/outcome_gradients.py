@@ -45,7 +45,6 @@ def outcome_gradients(
         names: keys of `indices.OUTCOMES`.
         parameters: p names.
         speed_mps: approach speed for all parameter values; that of the nominal model when not given.
-        progress: of the simulations.
 
     Raises:
         InputError: the vessel cannot run a trial, or a name is not an outcome.

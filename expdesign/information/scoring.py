@@ -62,7 +62,6 @@ def score_primitives(
 
     Args:
         vessel: nominal.
-        primitives: the dictionary.
         environment: mean current and wind, and their spread.
         fixed_parameters: held at the nominal values.
         mean_subtraction: "none", "batch" or "complete".

@@ -10,5 +10,4 @@ a log is.
 """
 
 from expdesign.kinematics.check import checked, in_stated_time
-from expdesign.kinematics.held import Held, held
-from expdesign.kinematics.instruments import Finding
+from expdesign.kinematics.held import held

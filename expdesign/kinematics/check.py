@@ -36,6 +36,7 @@ from expdesign.kinematics.instruments import (
     gyro_against_heading,
     integral,
     log_against_positions,
+    shown_delays,
     stretches,
 )
 from expdesign.kinematics.relation import CERTAIN, relation
@@ -80,7 +81,6 @@ def against_inputs(batches: Sequence[Batch], model: VesselModel, *, length_m: fl
     Args:
         batches: at the reference point, with delivered inputs.
         model: of the vessel file, driven by what is recorded.
-        length_m: of the ship.
     """
     for kind, axis, stems, seen, reason in GROUPS:
         own = [
@@ -207,7 +207,8 @@ OF_LOG = (
 def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: bool = True) -> Record:
     """The record with held and interpolated signals read in time, and its doubts: what does not agree.
 
-    A gain, an offset or a delay that two other instruments show in all files together is undone.
+    A gain, an offset or a delay that two other instruments show in all files together is undone. What a gyro and a
+    heading show of each other's clocks stands beside (`Record.shown`).
 
     Args:
         record: as measured.
@@ -232,7 +233,8 @@ def checked(record: Record, vessel: Vessel, *, smoothed: bool = False, undo: boo
         alone = _findings(own, vessel, smoothed=smoothed)
         faults += [f"{file}: {item.text}" for item in alone if item.name not in stands]
     doubts = (*held_notes, *faults)
-    return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=tuple(faults))
+    shown = shown_delays(record.batches, length_m=vessel.length_m)
+    return replace(record, notes=(*doubts, *record.notes), doubts=doubts, faults=tuple(faults), shown=shown)
 
 
 def _what_is_done(item: Finding) -> str:

@@ -91,6 +91,21 @@ def gyro_against_heading(batches: Sequence[Batch], *, length_m: float) -> Iterat
         )  # fmt: skip
 
 
+SHOWN_STD, SHOWN_SAMPLES = 2.0, 0.5
+"""Standard errors, and samples beside these, within which one instrument shows the clock of another."""
+
+
+def shown_delays(batches: Sequence[Batch], *, length_m: float) -> dict[str, tuple[float, float]]:
+    """Effect -> least and greatest delay [s] of a yaw rate or heading by each other; nothing where neither tells."""
+    own = [batch for batch in batches if batch.pose is not None and "r" not in batch.derived]
+    found = relation(stretches(own, [_turning(batch) for batch in own], length_m=length_m))
+    if found is None:
+        return {}
+    late = -float(found.others[1].real)
+    apart = SHOWN_STD * float(found.others_std[1, 0]) + SHOWN_SAMPLES * own[0].sample_time_s
+    return {"late:r": (late - apart, late + apart), "late:psi": (-late - apart, apart - late)}
+
+
 def log_against_positions(batches: Sequence[Batch], *, length_m: float) -> Iterator[Finding]:
     """Scale, axes and clock of the measured velocities, place and clock of the positions, and a steady difference."""
     own = [batch for batch in batches if batch.pose is not None and not {"u", "v"} & set(batch.derived)]
@@ -288,7 +303,6 @@ def course_as_heading(batches: Sequence[Batch], *, length_m: float, drifts: floa
 
     Args:
         batches: with positions.
-        length_m: of the ship.
         drifts: distance from midships, in ship lengths, of the place that is expected not to drift in a turn.
     """
     own = [batch for batch in batches if batch.pose is not None]

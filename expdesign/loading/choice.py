@@ -176,11 +176,8 @@ def choose_loads(
 
     Args:
         question: with the candidate loads.
-        primitives: the manoeuvres.
         total_s: informative time, without changing loads.
-        aim: the criterion.
         most_loads: at most so many load cases; None for the fewest that keep `LEAST_EFFICIENCY`.
-        progress: of the calculation.
 
     Raises:
         NotInformative: no load of the candidates tells a combination of the parameters, which is named.

@@ -255,10 +255,8 @@ def _attributed(
     """The change that explains the data since an alarm's beginning best, among those that are watched.
 
     Args:
-        state: of the watch.
         alarm: before.
         pending: sums since then, for the ship of the state.
-        calibration: of the reference.
         named: the change, where it is known.
     """
     score, information = beside_baseline(pending, calibration)

@@ -106,7 +106,6 @@ def watch(
     """Go on watching for a while.
 
     Args:
-        calibration: of the reference.
         state: before.
         grams: of the stretches that follow, in order of time, linearised at the ship changed by `state.shift`.
         rules: threshold and port calls.

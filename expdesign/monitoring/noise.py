@@ -73,7 +73,6 @@ def whitened(columns: Array, seen: NDArray[np.bool_], transition: Array, noise: 
         columns: (c, w, s, 4), zero where not measured.
         seen: (w, s, 4) what is measured.
         transition: (w, k, n, n) over each integrator step, as many between samples as `k` has.
-        noise: of the error.
         step_s: of the integrator [s].
     """
     if noise.white:

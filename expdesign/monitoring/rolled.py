@@ -87,7 +87,6 @@ def roll_watched(
     Args:
         now: before.
         ship: with [roll].
-        runs: of the piece.
         begin_s, end_s: of the piece [s].
         mean_time_s: average time between false alarms of roll [s].
         called: whether a port call ended within the piece, which then belongs to no load.

@@ -216,7 +216,6 @@ def nominal(card: Card, *, also: tuple[Trial, ...] = (), seed: int = 0, progress
         card: particulars and stated values.
         also: trials to predict beside those of the card and the standard ones.
         seed: of the ships that are drawn for intervals.
-        progress: of the fit.
 
     Raises:
         InputError: nothing drives her.

@@ -95,7 +95,6 @@ class Fleet:
             environment: how current and wind vary.
             truths: of each ship.
             state, standing: at the beginning.
-            rng: of the weather.
         """
         runs = len(truths.parameters)
         self.vessel = vessel

@@ -185,9 +185,7 @@ def sail_all(
     """Every run and leg from start to goal.
 
     Args:
-        problem: the trial.
         room: that legs and runs are planned in.
-        progress: of the sailing.
         stated: the water that runs keep to, with the clearance asked for.
         budget: counts what legs cost.
         known: takes the legs that are found, for `sail_placed`.
@@ -207,6 +205,7 @@ def sail_all(
         return _sailed(voyage, room.space, progress)
     except NoPlan as error:
         error.poses = voyage.sailed.trajectory.pose if voyage.line.stretches else None
+        error.spent_s = budget.spent_s
         raise
 
 

@@ -149,9 +149,7 @@ def plan_trial(problem: PlanProblem, *, advise: bool = True, progress: Progress 
     """One continuous, verified trial from start to goal with every run the design asks for.
 
     Args:
-        problem: the trial.
         advise: whether a refusal tries which changes help, which takes as long as several plans.
-        progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg; the message names what, where, and which change of
@@ -281,10 +279,8 @@ def draft_trial(problem: PlanProblem, *, like: Draft | None = None, progress: Pr
     """The trial of `plan_trial` without the checks, for comparing trials.
 
     Args:
-        problem: the trial.
         like: another trial between the same places; its water is tried first, and transitions that were tried for it
             are not tried again.
-        progress: of the planning.
 
     Raises:
         NoPlan: no path, no room, or no dynamically feasible leg.

@@ -57,7 +57,6 @@ def verify_plan(
     Args:
         vessel, environment: the nominal model and the forecast's means.
         area: allowed water.
-        sailed: the plan.
         clearance_m: required distance from hull to forbidden water.
         transit_mps: stated speed of legs through water.
         primitives: the dictionary by name.

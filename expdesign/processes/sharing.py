@@ -49,7 +49,6 @@ def local_processes(count: int, *, load: Callable[[], None] | None = None) -> It
     """Work of this block is shared among so many processes of this machine, which end with it.
 
     Args:
-        count: of processes.
         load: what each does first, where `begin` is called before there is work to share.
     """
     place = Processes(count, load)

@@ -105,7 +105,6 @@ def pieces(
     """Pieces of a CSV file, or of the standard input for `STREAM`, with whole stretches but at gaps.
 
     Args:
-        source: the file.
         inputs: signals of the vessel, e.g. ("n1", "a1").
         stretch_s: length of a stretch [s].
         most_rows: of a piece; one that is shorter than a stretch has the rows of one.

@@ -79,14 +79,11 @@ def estimates_alone(
 
     Args:
         vessel: nominal ship, simulated and estimated in the form of its model: continuous motion, or Euler's map.
-        primitives: the dictionary.
         parameters: names to estimate; the others are held.
         total_s: informative time of the whole design [s].
         trials: of each primitive.
         environment: weather, drawn anew for each trial as far as it is uncertain.
-        method, mean_subtraction: of the estimator.
         seed: of all random numbers.
-        progress: of the trials.
 
     Raises:
         InputError: fewer trials than a covariance of so many parameters needs.

@@ -147,7 +147,6 @@ def validate(
         rehearsal: the designs and ships.
         done: rows of chunks from an earlier, interrupted call with the same rehearsal.
         keep: called with the key and rows of each finished chunk.
-        progress: of the trials.
 
     Raises:
         NoAnswer: no trial of a design gives an estimate.

@@ -6,12 +6,11 @@ The command line is made of these values, and so is the line that repeats a call
 from __future__ import annotations
 
 import shlex
-from dataclasses import MISSING, dataclass
-from functools import cached_property
-from typing import Any, get_args, get_type_hints
+from collections.abc import Collection
+from dataclasses import dataclass
 
 from expdesign.requests.operation import Monitor, WatchSteps
-from expdesign.requests.options import Argument, Option, Request
+from expdesign.requests.options import Argument, Request
 from expdesign.requests.planning import (
     CheckRoute,
     Durations,
@@ -29,21 +28,6 @@ from expdesign.requests.trials import Foresee, Incline, Replan, Roll, Simulate, 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
-    """One option or argument of a command."""
-
-    name: str  # of the field
-    kind: Any  # its type
-    typed: Option | Argument  # how it is given
-    default: Any  # MISSING where it must be given
-
-    @property
-    def flag(self) -> str:
-        """As it is typed; empty for an argument."""
-        return "" if isinstance(self.typed, Argument) else self.typed.flag or f"--{self.name.replace('_', '-')}"
-
-
-@dataclass(frozen=True, kw_only=True)
 class Command:
     """A command: its name, and the workflow that carries it out."""
 
@@ -51,15 +35,6 @@ class Command:
     request: type[Request]
     workflow: str  # name in `expdesign.workflows`
     tells: bool = False  # whether the workflow also takes `tell`, for lines that are printed while it works
-
-    @cached_property
-    def asked(self) -> tuple[Asked, ...]:
-        """Options and arguments of the request, in their order."""
-        hints = get_type_hints(self.request, include_extras=True)
-        return tuple(
-            Asked(name=name, kind=kind, typed=typed, default=getattr(self.request, name, MISSING))
-            for name, (kind, typed) in ((name, get_args(hint)) for name, hint in hints.items())
-        )
 
 
 def _command(name: str, request: type[Request], *, workflow: str = "", tells: bool = False) -> Command:
@@ -105,7 +80,7 @@ def command_text(request: Request) -> str:
     """`expdesign COMMAND ARGUMENTS OPTIONS`, ready to be typed; options with their usual values are left out."""
     command = command_of(request)
     arguments, options = list[str](), list[str]()
-    for one in command.asked:
+    for one in command.request.asked():
         value = getattr(request, one.name)
         words = [f"{item:g}" if isinstance(item, float) else str(item) for item in _listed(value)]
         if isinstance(one.typed, Argument):
@@ -113,6 +88,16 @@ def command_text(request: Request) -> str:
         elif value != one.default or one.typed.stated:
             options += [one.flag, *words]
     return shlex.join(["expdesign", command.name, *arguments, *options])
+
+
+WITHOUT_EFFECT = ("out", "jobs", "scheduler", "no_cache")
+"""Values on which no result depends."""
+
+
+def repeating(request: Request, *, keep: Collection[str] = ()) -> str:
+    """The command that gives the same results again, without values that have no effect on them; some may be kept."""
+    usual = {one.name: one.default for one in request.asked() if one.name in WITHOUT_EFFECT and one.name not in keep}
+    return command_text(request.but(**usual))
 
 
 def _listed(value: object) -> tuple[object, ...]:

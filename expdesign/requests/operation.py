@@ -31,33 +31,29 @@ class Monitor(Request):
         tuple[Path, ...],
         Argument(metavar="DATA.csv ...", help="Records of operation in the order of time; - reads a stream."),
     ]
-    vessel: Annotated[Path, Option("--vessel", metavar="VESSEL.toml", help="The model of the ship.")]
+    vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="The model of the ship.")]
     reference: Annotated[
         tuple[Path, ...],
         Option(
-            "--reference",
             metavar="FILE ...",
             help="Records of a time in which the ship was as known, in weather as usual.",
         ),
     ] = ()
     learn_h: Annotated[
         float,
-        Option("--learn-h", metavar="H", help="Hours of the data that are the reference, where none is given."),
+        Option(metavar="H", over=0.0, help="Hours of the data that are the reference, where none is given."),
     ] = 24.0
-    false_alarm_days: Annotated[
-        float, Option("--false-alarm-days", metavar="D", help="Days between false alarms, on average.")
-    ] = 30.0
+    false_alarm_days: Annotated[float, Option(metavar="D", over=0.0, help="Days between false alarms, on average.")] = (
+        30.0
+    )
     size: Annotated[
         float,
         Option(
-            "--size",
             metavar="S",
             help="Relative change of parameters, thrust and inertia that matters; of angles and gyro in proportion.",
         ),
     ] = 0.1
-    every_s: Annotated[float, Option("--every-s", metavar="T", help="Seconds of a stream between looks at it.")] = (
-        3600.0
-    )
+    every_s: Annotated[float, Option(metavar="T", over=0.0, help="Seconds of a stream between looks at it.")] = 3600.0
     model: Annotated[
         str,
         Option(
@@ -69,7 +65,6 @@ class Monitor(Request):
     port_h: Annotated[
         float,
         Option(
-            "--port-h",
             metavar="H",
             help="Hours without way and propulsion, or without data, that count as a port call: the ship may carry "
             "another load afterwards, which is estimated anew and raises no alarm. inf: its load never changes.",
@@ -94,7 +89,6 @@ class WatchSteps(Request):
     steps: Annotated[
         Path,
         Option(
-            "--steps",
             metavar="FILE",
             help="What is to be sailed: a CSV with one row for each hold and a column for every input (n1_rps, "
             "rudder1_rad); the plan.json of a trial; or a dictionary with families of steps (.toml).",
@@ -102,15 +96,15 @@ class WatchSteps(Request):
     ]
     vessel: Annotated[
         Path,
-        Option("--vessel", metavar="VESSEL.toml", help="The guess before the trial: inputs, and how fast it answers."),
+        Option(metavar="VESSEL.toml", help="The guess before the trial: inputs, and how fast it answers."),
     ]
     throttle: Throttle = ()
     rudder: Rudder = ()
     learn_s: Annotated[
         float | None,
         Option(
-            "--learn-s",
             metavar="T",
+            over=0.0,
             help="Seconds of the first hold, from which the noise is learnt. Default: 120, or 80 % of the hold where "
             "it is planned to be shorter.",
         ),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, dataclass_transform
+from typing import Annotated, Any, Self, dataclass_transform, get_args, get_origin, get_type_hints
 
 from expdesign.errors import InputError
 
@@ -21,9 +22,20 @@ class Option:
     help: str = ""
     min: float | None = None
     max: float | None = None
+    over: float | None = None  # it must be larger, and finite
     parser: Callable[[str], Any] | None = None  # of what is typed
-    callback: Callable[[Any], Any] | None = None  # checks the value, before the work begins
     stated: bool = False  # whether the command that repeats a call states a usual value, too
+
+    @property
+    def range(self) -> str:
+        """The values that are allowed, in words; none where all are."""
+        limits = ((self.over, "more than {:g}"), (self.min, "at least {:g}"), (self.max, "at most {:g}"))
+        return " and ".join(words.format(limit) for limit, words in limits if limit is not None)
+
+    def allows(self, value: float) -> bool:
+        """Whether a value is in this range."""
+        over = self.over is None or self.over < value < math.inf
+        return over and (self.min is None or value >= self.min) and (self.max is None or value <= self.max)
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,34 @@ class Argument:
     help: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """One option or argument of a command."""
+
+    name: str  # of the field
+    kind: Any  # its type
+    typed: Option | Argument  # how it is given
+    default: Any  # MISSING where it must be given
+
+    @property
+    def flag(self) -> str:
+        """As it is typed; empty for an argument."""
+        return "" if isinstance(self.typed, Argument) else self.typed.flag or f"--{self.name.replace('_', '-')}"
+
+    def check(self, value: Any) -> None:
+        """Check a value, also where no command line has.
+
+        Raises:
+            InputError: it is out of its range, or nothing is given.
+        """
+        if value == () and self.default is MISSING:
+            raise InputError(f"no {self.typed.metavar or self.flag} is given, expected one or more")
+        if isinstance(self.typed, Argument) or value is None:
+            return
+        if self.typed.range and not self.typed.allows(value):
+            raise InputError(f"{self.flag} is {value:g}, expected {self.typed.range}")
+
+
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Request:
     """What a command is asked: annotations are its options, class attributes their defaults, the docstring its help.
@@ -42,15 +82,34 @@ class Request:
     """
 
     def __init__(self, **values: object) -> None:
-        """Take values by name.
+        """Take values by name; of several a list, or None for an empty one, becomes a tuple.
 
         Raises:
             TypeError: a name is unknown or missing.
+            InputError: a value is not allowed.
         """
-        known = type(self).__annotations__
-        if wrong := {*values} - {*known} | {name for name in known if name not in values and not hasattr(self, name)}:
+        asked = {one.name: one for one in self.asked()}
+        wrong = {*values} - {*asked} | {name for name, one in asked.items() if values.get(name, one.default) is MISSING}
+        if wrong:
             raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
-        vars(self).update(values)
+        for name, value in values.items():
+            vars(self)[name] = tuple(value or ()) if get_origin(asked[name].kind) is tuple else value  # type: ignore[arg-type]
+        for name, one in asked.items():
+            one.check(getattr(self, name))
+
+    @classmethod
+    @cache
+    def asked(cls) -> tuple[Asked, ...]:
+        """Options and arguments, in their order."""
+        hints = get_type_hints(cls, include_extras=True)
+        return tuple(
+            Asked(name=name, kind=kind, typed=typed, default=getattr(cls, name, MISSING))
+            for name, (kind, typed) in ((name, get_args(hint)) for name, hint in hints.items())
+        )
+
+    def but(self, **changes: object) -> Self:
+        """The request with some values changed."""
+        return type(self)(**{**vars(self), **changes})
 
 
 def parse_seed(text: str) -> int:
@@ -71,24 +130,6 @@ def parse_jobs(text: str) -> int:
     return _count("--jobs", text)
 
 
-def check_out(out: Path | None) -> Path | None:
-    """The folder for results, before hours are spent on something that cannot be written there.
-
-    Raises:
-        InputError: it is a file, lies below a file, or may not be written to.
-    """
-    if out is None:
-        return None
-    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
-    if there.is_symlink() and not there.exists():
-        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
-    if not there.is_dir():
-        raise InputError(f"--out {out}: {there} is a file, expected a folder")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: no permission to write in {there}")
-    return out
-
-
 def _count(option: str, text: str) -> int:
     if not str(text).isdecimal():
         raise InputError(f"{option} is {text}, expected a whole number of 0 or more")
@@ -99,10 +140,8 @@ def _count(option: str, text: str) -> int:
 
 
 def out_option(default: str) -> object:
-    """`--out`, checked; `default` says where results go without it."""
-    return Option(
-        "--out", "-o", metavar="FOLDER", callback=check_out, help=f"Folder for the results. Default: {default}."
-    )
+    """`--out`; `default` says where results go without it."""
+    return Option("--out", "-o", metavar="FOLDER", help=f"Folder for the results. Default: {default}.")
 
 
 Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]

@@ -34,7 +34,7 @@ class New(Request):
     folder: Annotated[Path, Argument(metavar="NAME", help="The folder to make; also the scenario's name.")]
     kind: Annotated[
         str,
-        Option("--kind", metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv."),
+        Option(metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv."),
     ] = "azimuth"
 
 
@@ -49,7 +49,6 @@ class Run(Request):
     draft: Annotated[
         bool,
         Option(
-            "--draft",
             help="Only a quick look: one placing of the runs, checked with the nominal ship; fewer manoeuvres "
             "searched for, no drawn trials, no bounds, no route files. Marked DRAFT; goes to runs/<name of the "
             "scenario>-draft.",
@@ -103,12 +102,11 @@ class Durations(Request):
     out: Out = None
     grow: Annotated[
         bool,
-        Option("--grow", help="Also search for manoeuvres to add, as the table [design.grow] does."),
+        Option(help="Also search for manoeuvres to add, as the table [design.grow] does."),
     ] = False
     monte_carlo: Annotated[
         int,
         Option(
-            "--monte-carlo",
             metavar="N",
             min=0,
             max=MOST_TRIALS,
@@ -131,7 +129,7 @@ class Plan(Request):
     out: Out = None
     durations: Annotated[
         Path | None,
-        Option("--durations", metavar="FILE", help="A durations.json made before. Default: computed now."),
+        Option(metavar="FILE", help="A durations.json made before. Default: computed now."),
     ] = None
     jobs: Jobs = 0
     scheduler: Scheduler = None
@@ -158,12 +156,11 @@ class Export(Request):
     ]
     departure: Annotated[
         str | None,
-        Option("--departure", metavar="TIME", help="Time of the first waypoint, e.g. 2026-05-01T08:00:00Z."),
+        Option(metavar="TIME", help="Time of the first waypoint, e.g. 2026-05-01T08:00:00Z."),
     ] = None
     tolerance_m: Annotated[
         float | None,
         Option(
-            "--tolerance-m",
             metavar="D",
             help="With --fine, which it implies: the largest distance between track and legs [m]. Default: a third of "
             "the clearance, at most half the beam.",
@@ -171,11 +168,9 @@ class Export(Request):
     ] = None
     name: Annotated[
         str | None,
-        Option("--name", metavar="NAME", help="Of the route and its files; an ECDIS lists it. Default: route."),
+        Option(metavar="NAME", help="Of the route and its files; an ECDIS lists it. Default: route."),
     ] = None
-    fine: Annotated[bool, Option("--fine", help="Follow the track in every turn, instead of one leg for each run.")] = (
-        False
-    )
+    fine: Annotated[bool, Option(help="Follow the track in every turn, instead of one leg for each run.")] = False
     out: OutBesidePlan = None
 
 
@@ -221,24 +216,26 @@ class RollPlan(Request):
     scenario: ScenarioFile
     loads: Annotated[
         Path,
-        Option("--loads", metavar="LOADS.toml", help="Candidate load cases; see expdesign explain loads."),
+        Option(metavar="LOADS.toml", help="Candidate load cases; see expdesign explain loads."),
     ]
     most_loads: Annotated[
         int | None,
-        Option("--most-loads", metavar="N", min=1, help="At most N. Default: the fewest with nearly all information."),
+        Option(metavar="N", min=1, help="At most N. Default: the fewest with nearly all information."),
     ] = None
     interest: Annotated[
         tuple[str, ...],
-        Option("--interest", metavar="NAME ...", help="Parameters to determine best, e.g. m z_m. Default: all."),
+        Option(metavar="NAME ...", help="Parameters to determine best, e.g. m z_m. Default: all."),
     ] = ()
     place: Annotated[
         bool,
-        Option("--place", help="Also plan each load case on the chart, with routes and run cards."),
+        Option(help="Also plan each load case on the chart, with routes and run cards."),
     ] = False
     minutes: Annotated[
         float,
         Option(
-            "--minutes", metavar="M", help="By the clock, after which it gives up with status 3 and writes nothing."
+            metavar="M",
+            over=0.0,
+            help="By the clock, after which it gives up with status 3 and writes nothing.",
         ),
     ] = 30.0
     out: Out = None

@@ -41,14 +41,13 @@ class Import(Request):
     vessel: Annotated[
         Path | None,
         Option(
-            "--vessel",
             metavar="VESSEL.toml",
             help="Numbers thrusters and rudders as this file does, and holds the ship's answers against its model.",
         ),
     ] = None
     plan: Annotated[
         Path | None,
-        Option("--plan", metavar="PLAN.json", help="Cut out the runs of this plan, by their names."),
+        Option(metavar="PLAN.json", help="Cut out the runs of this plan, by their names."),
     ] = None
     map_file: Annotated[
         Path | None,
@@ -63,12 +62,13 @@ class Import(Request):
         Option(
             "--sample-time",
             metavar="S",
+            over=0.0,
             help="Time between rows that are written [s]. Default: that of the slowest main sensor, at most 1.",
         ),
     ] = None
     length_m: Annotated[
         float | None,
-        Option("--length-m", metavar="L", help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."),
+        Option(metavar="L", over=0.0, help="Length of the ship [m]. Default: VESSEL.toml's, or by her speed."),
     ] = None
     out: OutByLog = None
 
@@ -82,9 +82,7 @@ class Estimate(Request):
     """
 
     data: DataFiles
-    vessel: Annotated[
-        Path, Option("--vessel", metavar="VESSEL.toml", help="Model structure, start values and sensors.")
-    ]
+    vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="Model structure, start values and sensors.")]
     methods: Annotated[
         tuple[str, ...],
         Option(
@@ -137,9 +135,7 @@ class Estimate(Request):
             "course and for weather that is not measured. Default: 30, or never, whichever predicts better.",
         ),
     ] = None
-    constant: Annotated[
-        bool, Option("--constant", help="Give every run a constant force of its own in output error.")
-    ] = False
+    constant: Annotated[bool, Option(help="Give every run a constant force of its own in output error.")] = False
     steered: Annotated[
         str,
         Option(
@@ -188,7 +184,6 @@ class Diagnose(Request):
     vessel: Annotated[
         Path,
         Option(
-            "--vessel",
             metavar="VESSEL.toml",
             help="The simulation model in use; parameter_std is the uncertainty of its parameters.",
         ),
@@ -196,7 +191,6 @@ class Diagnose(Request):
     scenario: Annotated[
         Path | None,
         Option(
-            "--scenario",
             metavar="SCENARIO.toml",
             help="Scenario whose dictionary is searched for manoeuvres that distinguish causes. Default: standard "
             "manoeuvres.",
@@ -216,30 +210,22 @@ class Indices(Request):
     Example: expdesign indices zigzag.csv circle.csv --vessel ship.toml
     """
 
-    vessel: Annotated[Path, Option("--vessel", metavar="VESSEL.toml", help="Model, length and actuators of the ship.")]
+    vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="Model, length and actuators of the ship.")]
     data: Annotated[
         tuple[Path, ...], Argument(metavar="DATA.csv ...", help="Measured zig-zags, turning circles, stops.")
     ] = ()
     speed_mps: Annotated[
         float | None,
-        Option("--speed-mps", metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
+        Option(metavar="V", help="Approach speed of the simulated trials. Default: 85 % power."),
     ] = None
-    scale: Annotated[
-        float, Option("--scale", metavar="S", help="Ship length by model length, for trials of a model.")
-    ] = 1.0
+    scale: Annotated[float, Option(metavar="S", help="Ship length by model length, for trials of a model.")] = 1.0
     antenna_forward_m: Annotated[
         float,
-        Option("--antenna-forward-m", metavar="X", help="Distance of the antenna forward of amidships [m]."),
+        Option(metavar="X", help="Distance of the antenna forward of amidships [m]."),
     ] = 0.0
-    depth_m: Annotated[
-        float | None, Option("--depth-m", metavar="D", help="Depth of the water in the measured trials [m].")
-    ] = None
-    wind_mps: Annotated[
-        float | None, Option("--wind-mps", metavar="W", help="Mean true wind in the measured trials [m/s].")
-    ] = None
-    sea_state: Annotated[
-        int | None, Option("--sea-state", metavar="N", help="Sea state in the measured trials, 0 to 9.")
-    ] = None
+    depth_m: Annotated[float | None, Option(metavar="D", help="Depth of the water in the measured trials [m].")] = None
+    wind_mps: Annotated[float | None, Option(metavar="W", help="Mean true wind in the measured trials [m/s].")] = None
+    sea_state: Annotated[int | None, Option(metavar="N", help="Sea state in the measured trials, 0 to 9.")] = None
     out: OutByVessel = None
 
 
@@ -256,7 +242,6 @@ class IdentifySteps(Request):
     vessel: Annotated[
         Path | None,
         Option(
-            "--vessel",
             metavar="VESSEL.toml",
             help="What is known of the vessel before the trial: its model with parameter_std. The steps update it.",
         ),
@@ -270,7 +255,6 @@ class IdentifySteps(Request):
     steps: Annotated[
         Path | None,
         Option(
-            "--steps",
             metavar="FILE",
             help="What was to be sailed, as in watch-steps, e.g. plan.json: only these steps are asked to be repeated.",
         ),
@@ -291,10 +275,8 @@ class Mine(Request):
     """
 
     data: DataFiles
-    vessel: Annotated[
-        Path, Option("--vessel", metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")
-    ]
-    keep: Annotated[int, Option("--keep", metavar="K", help="How many batches, or pieces, to choose.")]
+    vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="Nominal model; its simulation gives instruments.")]
+    keep: Annotated[int, Option(metavar="K", min=1, help="How many batches, or pieces, to choose.")]
     piece_s: Annotated[
         float | None,
         Option("--piece", metavar="SECONDS", help="Cut runs into pieces of about this length first."),
@@ -305,13 +287,12 @@ class Mine(Request):
     labels: Annotated[
         str | None,
         Option(
-            "--labels",
             metavar="WHERE",
             help="Make a dictionary of labelled manoeuvres, share out K pieces of --piece seconds among them, and "
             "compare with random pieces. Labels are in the column manoeuvre (column), or before the first underscore "
             "of a file's name (file).",
         ),
     ] = None
-    draws: Annotated[int, Option("--draws", metavar="N", help="With --labels: subsets drawn of each design.")] = 500
+    draws: Annotated[int, Option(metavar="N", min=2, help="With --labels: subsets drawn of each design.")] = 500
     out: OutByData = None
     seed: Seed = 0

@@ -41,7 +41,6 @@ class Foresee(Request):
     plan: Annotated[
         Path | None,
         Option(
-            "--plan",
             metavar="PLAN.json",
             help="A plan made before, whose whole track is diagnosed. Default: the runs of the design alone.",
         ),
@@ -49,7 +48,6 @@ class Foresee(Request):
     operation: Annotated[
         int | None,
         Option(
-            "--operation",
             metavar="N",
             min=1,
             max=MOST_VOYAGES,
@@ -70,12 +68,10 @@ class Simulate(Request):
     """
 
     plan: PlanFile
-    truth: Annotated[
-        Path, Option("--truth", metavar="VESSEL.toml", help="The vessel that runs the trial, with its sensors.")
-    ]
+    truth: Annotated[Path, Option(metavar="VESSEL.toml", help="The vessel that runs the trial, with its sensors.")]
     until_s: Annotated[
         float | None,
-        Option("--until", metavar="S", help="End the data after S seconds, as if the trial were aborted."),
+        Option("--until", metavar="S", over=0.0, help="End the data after S seconds, as if the trial were aborted."),
     ] = None
     out: OutBesidePlan = None
     seed: Seed = 0
@@ -90,15 +86,14 @@ class Validate(Request):
     scenario: ScenarioFile
     truth: Annotated[
         Path | None,
-        Option("--truth", metavar="VESSEL.toml", help="The true ship. Default: the scenario's own vessel."),
+        Option(metavar="VESSEL.toml", help="The true ship. Default: the scenario's own vessel."),
     ] = None
     trials: Annotated[
-        int, Option("--trials", metavar="N", max=MOST_TRIALS, stated=True, help="Simulated trials of each design.")
+        int, Option(metavar="N", max=MOST_TRIALS, stated=True, help="Simulated trials of each design.")
     ] = 100
     method: Annotated[
         str | None,
         Option(
-            "--method",
             metavar="M",
             help="Estimator; see expdesign explain methods. Default: iv, or with a steady current where the forecast "
             "leaves one unknown, iv-current or iv-air-current.",
@@ -107,7 +102,6 @@ class Validate(Request):
     integrator: Annotated[
         str,
         Option(
-            "--integrator",
             stated=True,
             metavar="HOW",
             help="Motion between samples: rk4, or euler, the map by which discrete parameters are defined.",
@@ -130,11 +124,11 @@ class TrialResult(Request):
     plan: Annotated[Path, Argument(metavar="PLAN.json", help="The plan that was sailed.")]
     estimate: Annotated[
         Path,
-        Option("--estimate", metavar="ESTIMATE.json", help="What expdesign estimate found in the data."),
+        Option(metavar="ESTIMATE.json", help="What expdesign estimate found in the data."),
     ]
     indices: Annotated[
         Path | None,
-        Option("--indices", metavar="INDICES.json", help="What expdesign indices found in them."),
+        Option(metavar="INDICES.json", help="What expdesign indices found in them."),
     ] = None
     out: OutBesidePlan = None
 
@@ -153,7 +147,6 @@ class Replan(Request):
     data: Annotated[
         tuple[Path, ...],
         Option(
-            "--data",
             metavar="DATA.csv ...",
             help="Measured so far; the last row of the last file is the present position.",
         ),
@@ -161,7 +154,6 @@ class Replan(Request):
     vessel: Annotated[
         Path | None,
         Option(
-            "--vessel",
             metavar="VESSEL.toml",
             help="Model to continue with, e.g. vessel-extended.toml. Default: estimated from the data.",
         ),
@@ -178,14 +170,13 @@ class Replan(Request):
     interest: Annotated[
         tuple[str, ...],
         Option(
-            "--interest",
             metavar="NAME ...",
             help="Parameters to optimise the rest for (criterion D_s), e.g. one that a diagnosis added.",
         ),
     ] = ()
     stopped: Annotated[
         bool,
-        Option("--stopped", help="The ship stops at the last position of the data before the rest begins."),
+        Option(help="The ship stops at the last position of the data before the rest begins."),
     ] = False
     out: Out = None
     jobs: Jobs = 0
@@ -207,15 +198,15 @@ class Roll(Request):
     data: DataFiles
     loads: Annotated[
         Path,
-        Option("--loads", metavar="LOADS.toml", help="Load of each data file; see expdesign explain loads."),
+        Option(metavar="LOADS.toml", help="Load of each data file; see expdesign explain loads."),
     ]
     vessel: Annotated[
         Path | None,
-        Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll], in place of [ship] in LOADS.toml."),
+        Option(metavar="VESSEL.toml", help="Ship with [roll], in place of [ship] in LOADS.toml."),
     ] = None
     rudder: Annotated[
         tuple[str, ...],
-        Option("--rudder", metavar="NAME ...", help="Signals whose mean steers. Default: rudders, else all a."),
+        Option(metavar="NAME ...", help="Signals whose mean steers. Default: rudders, else all a."),
     ] = ()
     method: Annotated[
         str,
@@ -223,11 +214,11 @@ class Roll(Request):
     ] = "iv"
     lowpass_hz: Annotated[
         float | None,
-        Option("--lowpass-hz", metavar="F", help="Low-pass filter, which must pass roll. Default: as needed."),
+        Option(metavar="F", help="Low-pass filter, which must pass roll. Default: as needed."),
     ] = None
     scale: Annotated[
         float | None,
-        Option("--scale", metavar="S", help="Ship length by model length, for results of the ship too."),
+        Option(metavar="S", over=0.0, help="Ship length by model length, for results of the ship too."),
     ] = None
     out: OutByData = None
 
@@ -240,23 +231,18 @@ class Incline(Request):
     Example: expdesign incline --vessel scenarios/vessels/roll-model.toml --mass-kg 0.2 0.4 --shift-m 0.05 0.1
     """
 
-    vessel: Annotated[Path, Option("--vessel", metavar="VESSEL.toml", help="Ship with [roll].")]
-    mass_kg: Annotated[
-        tuple[float, ...], Option("--mass-kg", metavar="M ...", help="Weights on board that may be shifted.")
-    ]
-    shift_m: Annotated[tuple[float, ...], Option("--shift-m", metavar="Y ...", help="Shifts across the ship.")]
-    heel_std_deg: Annotated[
-        float, Option("--heel-std-deg", metavar="S", help="Standard deviation of one reading of heel.")
-    ] = 0.02
+    vessel: Annotated[Path, Option(metavar="VESSEL.toml", help="Ship with [roll].")]
+    mass_kg: Annotated[tuple[float, ...], Option(metavar="M ...", help="Weights on board that may be shifted.")]
+    shift_m: Annotated[tuple[float, ...], Option(metavar="Y ...", help="Shifts across the ship.")]
+    heel_std_deg: Annotated[float, Option(metavar="S", help="Standard deviation of one reading of heel.")] = 0.02
     period_std_s: Annotated[
         float | None,
-        Option("--period-std-s", metavar="S", help="Standard deviation of a decay's period. Default: no decay."),
+        Option(metavar="S", help="Standard deviation of a decay's period. Default: no decay."),
     ] = None
-    shifts: Annotated[int, Option("--shifts", metavar="N", min=1, help="Shifts that are read.")] = 4
+    shifts: Annotated[int, Option(metavar="N", min=1, help="Shifts that are read.")] = 4
     read_s: Annotated[
         float,
         Option(
-            "--read-s",
             metavar="T",
             min=0.0,
             help="Time over which a reading of heel is averaged; acts in [roll.waves].",

@@ -11,12 +11,11 @@ Source: doctoral thesis on grey-box identification of ship roll with few sensors
 several load conditions), chapters 4 to 6.
 """
 
-from expdesign.roll.estimate import METHODS, RollEstimate, estimate_roll, fitted_pendulum, metacentric_height
+from expdesign.roll.estimate import RollEstimate, estimate_roll, fitted_pendulum, metacentric_height
 from expdesign.roll.model import (
     MEANINGS,
     PARAMETERS,
     UNITS,
-    Coefficients,
     coefficients,
     discrete,
     froude_scaled,
@@ -26,7 +25,7 @@ from expdesign.roll.model import (
     roll_frequency,
     stiffness,
 )
-from expdesign.roll.null_space import Cure, Direction, NullSpace, cures, direction, null_space, open_directions
+from expdesign.roll.null_space import Direction, NullSpace, cures, direction, null_space, open_directions
 from expdesign.roll.problem import RollProblem, build_problem
 from expdesign.roll.runs import EFFECTS, Case, LowPass, Run, low_pass, prepared
 from expdesign.roll.tuning import TUNING

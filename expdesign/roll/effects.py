@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from expdesign.roll.instruments import Weighted, spread_of
 from expdesign.roll.model import PARAMETERS
@@ -63,33 +62,34 @@ def by_effects(problem: RollProblem, weighted: Sequence[Weighted], theta: Array)
 
 
 def _by_effects(part: Weighted, by: Array, own: Moments) -> Array:
-    slopes = scipy.linalg.solve_triangular(own.root, part.effects @ by, lower=True)
-    if not part.follows:
+    slopes = own.inverse @ (part.effects @ by)
+    if part.spread is None:
         return np.asarray(slopes)
     noise = [one.reshape(len(one), 4, 6) @ by for one in part.hidden]  # of the residuals, and of what each effect adds
-    inverse = np.linalg.inv(own.root)
-    with_left = inverse @ spread_of(part.basis, noise)[1:, 0] @ inverse.T
+    with_left = own.inverse @ spread_of(part.basis, noise, rows=1)[0, 1:].swapaxes(1, 2) @ own.inverse.T
     return np.asarray(slopes - (with_left @ own.residuals).T)
 
 
 def missing_sizes(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, left: Array, places: Sequence[int]
+    problem: RollProblem, by: Array, sensed: Array, left: Array, places: Sequence[int]
 ) -> tuple[Array, Array]:
-    """By how much some effects are too small, and their standard deviations, beside all parameters."""
-    by = by_effects(problem, weighted, theta)[:, list(places)]
-    across = by - _onto(sensed * problem.scale[problem.places], by)
+    """By how much some effects are too small, and their standard deviations, beside all parameters.
+
+    Args:
+        problem: with the effects as they are.
+        by: (q, 3) derivatives of the weighted residuals by the effects.
+        sensed: (q, p) the same by the free parameters.
+        left: (q,) residuals.
+        places: of the effects.
+    """
+    own = by[:, list(places)]
+    across = own - _onto(sensed * problem.scale[problem.places], own)
     inverse = np.linalg.pinv(across, rcond=1e-10)
     return -inverse @ left, np.sqrt(np.diag(inverse @ inverse.T))
 
 
 def missed_effects(
-    problem: RollProblem,
-    weighted: Sequence[Weighted],
-    theta: Array,
-    sensed: Array,
-    left: Array,
-    added: Sequence[int],
-    banned: Sequence[int],
+    problem: RollProblem, by: Array, sensed: Array, left: Array, added: Sequence[int], banned: Sequence[int]
 ) -> list[int]:
     """The effect that data show most clearly of those not among the parameters yet; all where much is missed."""
     rest = [place for place in range(len(EFFECT_NAMES)) if place not in (*added, *banned)]
@@ -97,7 +97,7 @@ def missed_effects(
         return rest  # which of them it is shows when none is missing
     scores = []
     for place in rest:
-        more, std = missing_sizes(problem, weighted, theta, sensed, left, [*added, place])
+        more, std = missing_sizes(problem, by, sensed, left, [*added, place])
         scores.append((abs(more[-1]) / max(std[-1], 1e-300), place))
     best = max(scores, default=(0.0, 0))
     return [best[1]] if best[0] > SEEN and best[0] ** 2 > EXPLAINED * float(left @ left) else []

@@ -40,8 +40,8 @@ from expdesign.roll.instruments import Weighted, chance_of_answers, folds, weigh
 from expdesign.roll.model import PARAMETERS, discrete, named, relative_sensitivity, roll_frequency, stiffness
 from expdesign.roll.problem import (
     RollProblem,
-    moments_of,
     noise_of,
+    noise_of_slopes,
     residuals_of,
     sampled,
     slopes_of,
@@ -84,7 +84,7 @@ class RollEstimate:
     rounds: Array  # (r, 9) parameters after each round of spectra
     settled: bool  # whether the last round changed little
     # of the instruments: their information about the least certain combination of parameters over what noise alone
-    # would seem to give, zero where they tell nothing; nan for least squares
+    # would seem to give, zero where they tell nothing; nan for least squares, and where the model does not fit
     strength: float
     # least sum of squares over its expected value, 1 for a model that fits; nan where nothing is left over
     surprise: float
@@ -167,16 +167,20 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         history.append(theta)
         weighed = method == "iv" and values[0] is not None
         fits = weighed and not surprise_of(left, len(problem.free)) > TUNING.most_surprise
-        settled = len(history) > 1 and _little(problem, theta - before, sensed) and fits == weighted[0].follows
-        more, std = missing_sizes(problem, weighted, theta, sensed, left, added)
+        settled = (
+            len(history) > 1 and _little(problem, theta - before, sensed) and fits == (weighted[0].spread is not None)
+        )
+        by = by_effects(problem, weighted, theta)
+        more, std = missing_sizes(problem, by, sensed, left, added)
         settled = settled and bool((np.abs(more) <= 2 * SETTLED * std).all())
         looked = settled or len(history) in (LEAST_ROUNDS, MOST_ROUNDS)
+        tilts = None
         if unmeasured and TILT not in added and looked and scans < MOST_SCANS:
             scans += 1
-            tilts = tilts_of(problem, weighted, theta, held)
+            tilts = tilts_of(problem, weighted, theta, held, by)
             if tilts.other:
+                problem = with_effects(without_effects(problem, added), [TILT], np.array([tilts.best_rad]))
                 added, unseen_before, theta = [TILT], [], tilts.theta
-                problem = with_effects(problem, added, np.array([tilts.best_rad]))
                 values, settled = [*sampled(problem, theta)], False
                 continue
         if weighed and len(history) >= LEAST_ROUNDS:
@@ -184,23 +188,27 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
             problem, unseen_before = without_effects(problem, unseen), [*unseen_before, *unseen]
             added = [place for place in added if place not in unseen]
             banned = [place for place in unseen_before if unseen_before.count(place) >= MOST_TRIES]
-            new = [] if unseen else missed_effects(problem, weighted, theta, sensed, left, added, banned)
+            banned += [TILT] * unmeasured  # it is found by looking at all tilts
+            new = [] if unseen else missed_effects(problem, by, sensed, left, added, banned)
             added, settled = [*added, *new], settled and not new and not unseen
-        if settled or len(history) == MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
+        if settled or len(history) >= MOST_ROUNDS * (1 + bool(added) + (TILT in added)):
             break
+        share = 0.5 if len(history) > MOST_ROUNDS and len(history) % 2 else 1.0  # rounds may go back and forth
         if added:
-            more, _ = missing_sizes(problem, weighted, theta, sensed, left, added)
-            problem = with_effects(problem, added, more)
-        values = [*sampled(problem, theta)]
-    _, std = missing_sizes(problem, weighted, theta, sensed, left, added)
+            more, _ = missing_sizes(problem, by, sensed, left, added)
+            problem = with_effects(problem, added, share * more)
+        values = [*sampled(problem, before + share * (theta - before))]
+    if unmeasured and tilts is None:
+        tilts = tilts_of(problem, weighted, theta, held, by)
+    _, std = missing_sizes(problem, by, sensed, left, added)
     effects = dict(zip([EFFECT_NAMES[place] for place in added], zip(
         [problem.cases[0].runs[0].effects[place] for place in added], std.tolist(), strict=True
     ), strict=True))  # fmt: skip
-    gone = np.linalg.qr(by_effects(problem, weighted, theta)[:, added])[0]
+    gone = np.linalg.qr(by[:, added])[0]
     sensed, left = sensed - gone @ (gone.T @ sensed), left - gone @ (gone.T @ left)
     settled = settled and bool((np.abs(problem.cases[0].runs[0].effects) < 0.999 * most_effects(problem)).all())
     surprise = surprise_of(left, len(problem.free) - len(held) + len(added))
-    covariance = _covariance(problem, weighted, theta, sensed, held, gone)
+    covariance = _covariance(problem, weighted, theta, sensed, held, gone, method)
     return RollEstimate(
         problem=problem,
         method=method,
@@ -215,7 +223,7 @@ def estimate_roll(problem: RollProblem, *, method: str = "iv") -> RollEstimate:
         unanswered=_unanswered(problem, weighted, theta, sensed, surprise) if method == "iv" else float("nan"),
         freedom=min(spectrum(residuals).freedom for residuals in noise_of(problem, weighted, theta)),
         effects=effects,
-        tilt_told=not unmeasured or tilts_of(problem, weighted, theta, held).told,
+        tilt_told=tilts is None or tilts.told,
         load_interval=load_interval(problem, weighted, theta, sensed, covariance, held, gone),
     )
 
@@ -262,7 +270,13 @@ def _little(problem: RollProblem, change: Array, sensed: Array) -> bool:
 
 
 def _covariance(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, sensed: Array, held: Sequence[str], gone: Array
+    problem: RollProblem,
+    weighted: Sequence[Weighted],
+    theta: Array,
+    sensed: Array,
+    held: Sequence[str],
+    gone: Array,
+    method: str,
 ) -> Array:
     """(p, p) covariance from the spectra of the noise at the estimate; zero for what is held.
 
@@ -273,7 +287,7 @@ def _covariance(
     the K they are divided by.
     """
     scale = problem.scale[problem.places] * [name not in held for name in problem.free]
-    if weighted[0].spread is None:
+    if method == "ls":
         inverse = np.linalg.pinv(sensed * scale, rcond=1e-12)
         first, middle = 0, np.zeros((len(scale),) * 2)
         for part, residuals in zip(weighted, noise_of(problem, weighted, theta), strict=True):
@@ -315,10 +329,12 @@ def _strength(
     Source: J. G. Cragg and S. G. Donald, Econometric Theory 9 (1993), 222-240, with spectra in place of variances;
     D. Staiger and J. H. Stock, Econometrica 65 (1997), 557-586, for what weak instruments do.
     """
+    if weighted[0].spread is None:
+        return math.nan
     std = np.sqrt(np.diag(covariance))
     kept = np.flatnonzero(std > 0)
     places = np.array(problem.places)[kept]
-    noise = np.sum([one.slopes_noise for one in moments_of(problem, weighted, theta)], axis=0)[np.ix_(places, places)]
+    noise = noise_of_slopes(problem, weighted, theta)[np.ix_(places, places)]
     size = np.outer(std[kept], std[kept])
     information = _curvature(problem, weighted, theta, gone)[np.ix_(kept, kept)] * size
     powers, axes = np.linalg.eigh(noise * size)
@@ -332,7 +348,6 @@ def metacentric_height(estimate: RollEstimate, load: Load | None) -> tuple[float
     """Metacentric height with a load on board, and its standard deviation for the held parameters as they are [m].
 
     Args:
-        estimate: of the parameters.
         load: on board; None for the unknown one.
     """
     problem = estimate.problem

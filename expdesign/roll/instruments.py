@@ -30,9 +30,12 @@ from expdesign.roll.regression import (
     difference,
     flat_spectrum,
     inside,
+    length_for,
     noise_model,
+    real_products,
     shares_of,
     spectrum,
+    transforms,
     without_start,
 )
 from expdesign.roll.runs import LEFT_OUT_SAMPLES, Case, Run
@@ -122,22 +125,18 @@ def instrument_columns(simulated: Array) -> Array:
     return np.column_stack([delayed(roll_rate, range(1, 1 + LAGS)), *parts, bent(roll_rate)])
 
 
-def weighted_columns(own: Sequence[Fold], noise: NoiseModel, left: Spectrum) -> Array:
-    """(n, q) instruments of the rows of a run, whitened as these are and through 1 / spectrum of what colour is left.
+def whitened_columns(own: Sequence[Fold], noise: NoiseModel) -> list[Array]:
+    """(n, q) instruments of each fold at the rows of a run, whitened as these are."""
+    return [noise.whitened(fold.columns)[LEFT_OUT_SAMPLES:] for fold in own]
 
-    These are the weights of least variance. The equation is whitened too, as instruments that end suddenly would pick
-    up the noise of high frequencies, which is many times stronger.
 
-    Source: E. J. Hannan, in Time Series Analysis (M. Rosenblatt, ed., 1963), 17-37.
-    """
+def stitched(own: Sequence[Fold], columns: Sequence[Array], noise: NoiseModel) -> Array:
+    """(n, q) rows of each fold's part of a run from its own columns (n, q)."""
     first = LEFT_OUT_SAMPLES
-    divided = [(fold.part, left.divided(noise.whitened(fold.columns)[first:])) for fold in own]
-    return without_start(_stitched(divided, first), noise)
-
-
-def _stitched(parts: Sequence[tuple[slice, Array]], first: int) -> Array:
-    """(n, q) rows of each part from its own columns, which begin with the first sample that is kept."""
-    return np.concatenate([columns[max(part.start - first, 0) : part.stop - first] for part, columns in parts])
+    parts = [
+        rows[max(fold.part.start - first, 0) : fold.part.stop - first] for fold, rows in zip(own, columns, strict=True)
+    ]
+    return without_start(np.concatenate(parts), noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,17 +150,20 @@ class Weighted:
     slope: Array
     effects: Array  # (q, 3, 6) the same with what effects change of y and X
     noise: NoiseModel  # that whitened the rows
-    # (6, 6, q, q) covariances of the sums of products with the noise in y and X, which is what a regression on the
-    # instruments leaves of them; None where the noise is taken as given
+    # (n, 24) what instruments do not explain of y, X and `effects` of each run, and (6, 6, q, q) covariances of the
+    # sums of its products in y and X, where the covariance of the residuals follows the coefficients; none where it is
+    # as at those of the weights
+    hidden: tuple[Array, ...]
     spread: Array | None
-    hidden: tuple[Array, ...]  # (n, 24) what instruments do not explain of y, X and `effects` of each run
-    follows: bool  # whether the covariance of the residuals follows the coefficients, or is as at those of the weights
 
 
 def weighted_equations(
     case: Case, instruments: Sequence[Sequence[Fold]] | None, values: Array | None, *, follows: bool = False
 ) -> Weighted:
-    """Equations for sampled coefficients (5,), weighted by the noise at given ones, or as if it were white."""
+    """Equations for sampled coefficients (5,), weighted by the noise at given ones, or as if it were white.
+
+    Source: E. J. Hannan, in Time Series Analysis (M. Rosenblatt, ed., 1963), 17-37, for the weights.
+    """
     plain = tuple(build_rows(run, WHITE) for run in case.runs)
     if values is None:
         model, rows, left = WHITE, plain, flat_spectrum([one.y for one in plain])
@@ -171,10 +173,17 @@ def weighted_equations(
         model = noise_model([one.residuals(values) for one in plain], values[:2], NOISE_ORDER)
         rows = tuple(build_rows(run, model) for run in case.runs)
         left = spectrum([one.residuals(values) for one in rows])
-    by = [one.X for one in rows] if instruments is None else [weighted_columns(own, model, left) for own in instruments]
-    basis = _basis(by, left)
+    hidden: tuple[Array, ...] = ()
+    if instruments is None:
+        basis = _basis([one.X for one in rows], left)
+    else:
+        # through 1 / spectrum are the weights of least variance; the equation is whitened too, as instruments that end
+        # suddenly would pick up the noise of high frequencies, which is many times stronger
+        white = [whitened_columns(own, model) for own in instruments]
+        pairs = list(zip(instruments, white, strict=True))
+        basis = _basis([stitched(own, [left.divided(part) for part in one], model) for own, one in pairs], left)
+        hidden = _hidden(rows, [stitched(own, one, model) for own, one in pairs]) if follows else ()
     parts = list(zip(basis, rows, strict=True))
-    hidden = () if instruments is None or values is None else _hidden(rows, instruments, model)
     return Weighted(
         rows,
         basis,
@@ -182,46 +191,49 @@ def weighted_equations(
         np.sum([B.T @ one.X for B, one in parts], axis=0),
         np.sum([np.einsum("nq,nij->qij", B, one.effects) for B, one in parts], axis=0),
         model,
-        None if not hidden else spread_of(basis, [one[:, :6] for one in hidden]),
         hidden,
-        follows,
+        spread_of(basis, [one[:, :6] for one in hidden]) if follows else None,
     )
 
 
-def _hidden(rows: Sequence[Rows], instruments: Sequence[Sequence[Fold]], noise: NoiseModel) -> tuple[Array, ...]:
-    """(n, 24) parts of y, the regressors and effects of each run that instruments do not explain."""
-    first = LEFT_OUT_SAMPLES
-    found = []
-    for own in instruments:
-        parts = [(fold.part, noise.whitened(fold.columns)[first:]) for fold in own]
-        found.append(without_start(_stitched(parts, first), noise))
+def _hidden(rows: Sequence[Rows], instruments: Sequence[Array]) -> tuple[Array, ...]:
+    """(n, 24) parts of y, the regressors and effects of each run that instruments (n, q) do not explain."""
     tables = [np.column_stack([one.y, one.X, one.effects.reshape(len(one.y), -1)]) for one in rows]
-    gains = np.linalg.lstsq(np.concatenate(found), np.concatenate(tables), rcond=1e-10)[0]
-    return tuple(table - Z @ gains for table, Z in zip(tables, found, strict=True))
+    columns = _combinations(instruments, np.sum([Z.T @ Z for Z in instruments], axis=0))
+    gains = np.sum([Z.T @ table for Z, table in zip(columns, tables, strict=True)], axis=0)
+    return tuple(table - Z @ gains for table, Z in zip(tables, columns, strict=True))
 
 
-def spread_of(basis: Sequence[Array], hidden: Sequence[Array]) -> Array:
-    """(c, c, q, q) covariances of the sums of products of the basis with noise (n, c) of each run."""
-    power, length = cross_spectra(hidden)
-    count, q = power.shape[-1], basis[0].shape[1]
-    seen = [np.fft.rfft(B, length, axis=0) for B in basis]
-    shares = shares_of(len(power), length)
-    found = np.empty((count, count, q, q))
-    for i in range(count):
+def spread_of(basis: Sequence[Array], hidden: Sequence[Array], rows: int | None = None) -> Array:
+    """(r, c, q, q) covariances of the sums of products of the basis with noise (n, c) of each run, of its first r."""
+    length = length_for(hidden)
+    power = cross_spectra(hidden, length)
+    power *= shares_of(power.shape[2], length)
+    count, q = len(power), basis[0].shape[1]
+    rows = count if rows is None else rows
+    seen = [transforms(B, length) for B in basis]
+    found = np.empty((rows, count, q, q))
+    for i in range(rows):
         for j in range(i, count):
-            found[i, j] = sum((F.conj().T @ ((shares * power[:, i, j])[:, None] * F)).real for F in seen)
-            found[j, i] = found[i, j].T
+            found[i, j] = sum(real_products(F, power[i, j] * F) for F in seen)
+            if j < rows:
+                found[j, i] = found[i, j].T
     return found
 
 
 def _basis(columns: Sequence[Array], noise: Spectrum) -> tuple[Array, ...]:
     """(n, q) combinations of the columns of each run whose sums of products with the noise have unit covariance."""
-    power = noise.covariance(columns)
+    return _combinations(columns, noise.covariance(columns))
+
+
+def _combinations(columns: Sequence[Array], power: Array) -> tuple[Array, ...]:
+    """(n, q) combinations of the columns (n, c) of each run that a covariance (c, c) makes one, without repetitions."""
     there = np.diag(power) > 0
     size = np.sqrt(np.diag(power)[there])
     powers, axes = np.linalg.eigh(power[np.ix_(there, there)] / np.outer(size, size))
     kept = powers > REPEATED * powers[-1:]
-    return tuple(Z[:, there] / size @ (axes[:, kept] / np.sqrt(powers[kept])) for Z in columns)
+    by = (axes[:, kept] / np.sqrt(powers[kept])) / size[:, None]
+    return tuple(Z[:, there] @ by for Z in columns)
 
 
 # Whether the rudder answers the moment that rolls the ship, as then no instrument comes from the rudder.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -110,7 +111,7 @@ def noise_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -
 
 def residuals_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
     """(q,) weighted residuals."""
-    return np.concatenate([one.residuals for one in moments_of(problem, weighted, theta)])
+    return _joined(problem, weighted, theta)[0]
 
 
 def slopes_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
@@ -121,7 +122,12 @@ def slopes_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) 
 
     Source: L. P. Hansen, J. Heaton and A. Yaron, J. Business and Economic Statistics 14 (1996), 262-280.
     """
-    return np.concatenate([one.slopes for one in moments_of(problem, weighted, theta)])
+    return _joined(problem, weighted, theta)[1]
+
+
+def _joined(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> tuple[Array, Array]:
+    found = moments_of(problem, weighted, theta)
+    return np.concatenate([one.residuals for one in found]), np.concatenate([one.slopes for one in found])
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +136,7 @@ class Moments:
 
     residuals: Array  # (q,)
     slopes: Array  # (q, 9) as of `slopes_of`
-    root: Array  # (q, q) lower, by which the products were divided
-    slopes_noise: Array  # (9, 9) expected sum of products of the slopes where instruments tell nothing
+    inverse: Array  # (q, q) lower, by which the products were multiplied
 
 
 def moments_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> list[Moments]:
@@ -139,30 +144,56 @@ def moments_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array)
     found = []
     for part, case in zip(weighted, problem.cases, strict=True):
         one = discrete(theta, problem.body, case.load, problem.step_s)
-        left, slopes = part.top - part.slope @ one.values, -part.slope @ one.jacobian
+        left, slopes, inverse = part.top - part.slope @ one.values, -part.slope @ one.jacobian, np.eye(len(part.top))
+        if part.spread is not None:
+            across = _across(part.spread, one.values)
+            whole = across[0] - np.tensordot(one.values, across[1:], 1)
+            inverse = scipy.linalg.lapack.dtrtri(np.linalg.cholesky(whole), lower=1)[0]
+            left = inverse @ left
+            slopes = inverse @ (slopes + (across[1:] @ (inverse.T @ left)).T @ one.jacobian)
+        found.append(Moments(left, slopes, inverse))
+    return found
+
+
+def _across(spread: Array, values: Array) -> Array:
+    """(6, q, q) covariances of the products with y and X with those with the residuals at coefficients (5,)."""
+    by = np.concatenate([[1.0], -values])
+    return np.asarray((by @ spread.reshape(6, -1)).reshape(spread.shape[1:]).swapaxes(1, 2))
+
+
+def noise_of_slopes(problem: RollProblem, weighted: Sequence[Weighted], theta: Array) -> Array:
+    """(9, 9) expected sum of products of the slopes where instruments tell nothing."""
+    found = np.zeros((len(theta),) * 2)
+    for part, case, own in zip(weighted, problem.cases, moments_of(problem, weighted, theta), strict=True):
         if part.spread is None:
-            found.append(Moments(left, slopes, np.eye(len(left)), np.zeros((len(theta),) * 2)))
             continue
-        by = np.concatenate([[1.0], -one.values])
-        across = np.einsum("ijkl,j->ikl", part.spread, by)  # covariance of each column's products with the residuals
-        root = np.linalg.cholesky(np.einsum("ikl,i->kl", across, by)) if part.follows else np.eye(len(left))
-        left, slopes = (scipy.linalg.solve_triangular(root, both, lower=True) for both in (left, slopes))
-        inverse = np.linalg.inv(root)
-        with_left = inverse @ across[1:] @ inverse.T  # (5, q, q)
-        if part.follows:
-            slopes = slopes + np.einsum("ikl,l->ki", with_left, left) @ one.jacobian
-        alone = np.einsum("kl,ijlm,km->ij", inverse, part.spread[1:, 1:], inverse, optimize=True)
-        alone -= np.einsum("ikl,jkl->ij", with_left, with_left)
-        found.append(Moments(left, slopes, root, one.jacobian.T @ alone @ one.jacobian))
+        one = discrete(theta, problem.body, case.load, problem.step_s)
+        with_left = own.inverse @ _across(part.spread, one.values)[1:] @ own.inverse.T  # (5, q, q)
+        alone = np.einsum("kl,ijlm,km->ij", own.inverse, part.spread[1:, 1:], own.inverse, optimize=True)
+        found += one.jacobian.T @ (alone - np.einsum("ikl,jkl->ij", with_left, with_left)) @ one.jacobian
     return found
 
 
 def solved(
-    problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str], *, within: float = 1e-12
+    problem: RollProblem,
+    weighted: Sequence[Weighted],
+    theta: Array,
+    held: Sequence[str],
+    *,
+    beside: Array | None = None,
+    within: float = 1e-12,
 ) -> tuple[Array, Array, Array]:
     """Parameters (9,), derivatives (q, p) of the weighted residuals by the free ones, and these residuals (q,).
 
-    The search ends within a share of the sum of squares.
+    Args:
+        problem, weighted: as the estimate has them.
+        theta: (9,) where the search begins.
+        held: names of free parameters that stay there.
+        beside: (q, e) orthonormal directions of the residuals that do not count; None for none.
+        within: share of the sum of squares within which the search ends.
+
+    Raises:
+        NotInformative: there are fewer equations than parameters.
     """
     places = [PARAMETERS.index(name) for name in problem.free if name not in held]
     equations = sum(len(part.top) for part in weighted)
@@ -177,13 +208,20 @@ def solved(
         result[places] = values
         return result
 
+    @lru_cache(maxsize=1)  # the search asks for residuals and then, there, for derivatives
+    def at(values: bytes) -> tuple[Array, Array]:
+        left, slopes = _joined(problem, weighted, full(np.frombuffer(values)))
+        if beside is not None:
+            left, slopes = (rows - beside @ (beside.T @ rows) for rows in (left, slopes))
+        return left, slopes
+
     low, high = problem.bounds
     found = scipy.optimize.least_squares(
-        lambda values: residuals_of(problem, weighted, full(values)), np.clip(theta, low, high)[places],
-        lambda values: slopes_of(problem, weighted, full(values))[:, places], bounds=(low[places], high[places]),
+        lambda values: at(values.tobytes())[0], np.clip(theta, low, high)[places],
+        lambda values: at(values.tobytes())[1][:, places], bounds=(low[places], high[places]),
         x_scale=problem.scale[places], xtol=within, ftol=within, gtol=within,
     )  # fmt: skip
-    return full(found.x), slopes_of(problem, weighted, full(found.x))[:, problem.places], np.asarray(found.fun)
+    return full(found.x), at(found.x.tobytes())[1][:, problem.places], np.asarray(found.fun)
 
 
 def surprise_of(left: Array, fitted: int) -> float:

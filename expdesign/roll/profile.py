@@ -10,7 +10,7 @@ import scipy
 
 from expdesign.roll.instruments import Weighted
 from expdesign.roll.model import PARAMETERS
-from expdesign.roll.problem import RollProblem, residuals_of, slopes_of
+from expdesign.roll.problem import RollProblem, residuals_of, solved
 from expdesign.values import Array
 
 CHI2_95 = 3.841  # of one degree of freedom
@@ -40,7 +40,6 @@ def load_interval(
     least = math.sqrt(max(float(np.linalg.pinv(plain.T @ plain, rcond=1e-12)[own, own]), 0.0)) * problem.scale[place]
     if not (0 < std < math.inf and least > 0):
         return None
-    others = [PARAMETERS.index(name) for name in problem.free if name not in (*held, "m")]
     low, high = problem.bounds
     enough = CHI2_95 * (std / least) ** 2
     best = _cost(problem, weighted, theta, gone)
@@ -52,24 +51,10 @@ def load_interval(
             return known[mass]
         nearest = found[min(found, key=lambda other: abs(other - mass))]
 
-        def full(values: Array) -> Array:
-            result = np.array(nearest)
-            result[others], result[place] = values, mass
-            return result
-
-        def apart(values: Array) -> Array:
-            left = residuals_of(problem, weighted, full(values))
-            return np.asarray(left - gone @ (gone.T @ left))
-
-        def slopes(values: Array) -> Array:
-            rows = slopes_of(problem, weighted, full(values))[:, others]
-            return np.asarray(rows - gone @ (gone.T @ rows))
-
-        begin = np.clip(nearest[others], low[others], high[others])
-        one = scipy.optimize.least_squares(
-            apart, begin, slopes, bounds=(low[others], high[others]), x_scale=problem.scale[others]
-        )
-        found[mass], known[mass] = full(one.x), float(2.0 * one.cost - best - enough)
+        begin = np.array(nearest)
+        begin[place] = mass
+        found[mass], _, left = solved(problem, weighted, begin, [*held, "m"], beside=gone, within=1e-8)
+        known[mass] = float(left @ left) - best - enough
         return known[mass]
 
     ends = []

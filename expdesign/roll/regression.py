@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run
+from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run, level
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 
@@ -54,11 +54,13 @@ class Rows:
 
 def build_rows(run: Run, noise: NoiseModel) -> Rows:
     """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
-    table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
-    effects = _effects(run.signals, run.step_s)
+    *linear, tilt_rad = run.effects
+    signals = level(run.signals, tilt_rad)  # first, as the sensor's place counts yaw alone
+    table = np.column_stack([signals[:, 0], regressors(signals)])
+    effects = _effects(signals, run.step_s)
     table[:2], effects[:2] = 0.0, 0.0
     table[:, :3] = unwarped(table[:, :3], run.unwarped)
-    table += np.einsum("kij,i->kj", effects, run.effects)
+    table += np.einsum("kij,i->kj", effects[:, : len(linear)], linear)
     both = np.column_stack([table, effects.reshape(len(table), -1)])
     both = without_start(noise.whitened(both)[LEFT_OUT_SAMPLES:], noise)
     return Rows(y=both[:, 0], X=both[:, 1:6], effects=both[:, 6:].reshape(-1, 3, 6))
@@ -90,7 +92,6 @@ def unwarped(columns: Array, share: float) -> Array:
     of signals, the trapezoids of the bilinear map are the better rule.
 
     Args:
-        columns: of one run.
         share: of half the sample rate, below which frequencies are corrected; none are at 0.
     """
     if not share:
@@ -139,14 +140,23 @@ class Spectrum:
 
     def divided(self, signals: Array) -> Array:
         """Signals (k, q), k up to half the length, through the filter 1 / density, which shifts nothing in time."""
-        changed = np.fft.rfft(signals, self.length, axis=0) / self.density[:, None]
-        return np.asarray(np.fft.irfft(changed, self.length, axis=0)[: len(signals)])
+        changed = transforms(signals, self.length) / self.density
+        return np.asarray(scipy.fft.irfft(changed, self.length)[:, : len(signals)].T)
 
     def covariance(self, columns: Sequence[Array]) -> Array:
         """(q, q) covariance of the sum over runs of Z' e, with columns Z (k, q) of each run that do not depend on e."""
-        seen = [np.fft.rfft(Z, self.length, axis=0) for Z in columns]
-        weights = (shares_of(len(self.density), self.length) * self.density)[:, None]
-        return np.asarray(sum((F.conj().T @ (weights * F)).real for F in seen))
+        seen, weights = [transforms(Z, self.length) for Z in columns], shares_of(len(self.density), self.length)
+        return np.asarray(sum(real_products(F, weights * self.density * F) for F in seen))
+
+
+def transforms(signals: Array, length: int) -> Array:
+    """(q, f) real transforms of columns (k, q)."""
+    return np.asarray(scipy.fft.rfft(np.ascontiguousarray(signals.T), length))
+
+
+def real_products(one: Array, other: Array) -> Array:
+    """(q, p) real part of the sums over frequencies of conjugates of transforms (q, f) with others (p, f)."""
+    return np.asarray(one.view(float) @ other.view(float).T)
 
 
 def shares_of(frequencies: int, length: int) -> Array:
@@ -170,8 +180,8 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     Source: P. D. Welch, IEEE Trans. Audio Electroacoustics 15 (1967), 70-73; R. B. Blackman and J. W. Tukey, The
     Measurement of Power Spectra (1958), for whitening before.
     """
-    found, length = cross_spectra([one[:, None] for one in residuals])
-    density, steps = found[:, 0, 0].real, _segments(residuals)
+    length, steps = _transform_length(residuals), _segments(residuals)
+    density = cross_spectra([one[:, None] for one in residuals], length)[0, 0].real
     return Spectrum(
         density=np.maximum(density, max(LEAST_DENSITY * float(density.max()), 1e-100)),
         length=length,
@@ -179,19 +189,29 @@ def spectrum(residuals: Sequence[Array]) -> Spectrum:
     )
 
 
-def cross_spectra(signals: Sequence[Array]) -> tuple[Array, int]:
-    """(f, c, c) cross spectra of signals (k, c) of each run, by the segments of `spectrum`, and the transform length.
+def cross_spectra(signals: Sequence[Array], length: int) -> Array:
+    """(c, c, f) cross spectra of signals (k, c) of each run, by the segments of `spectrum`, for transforms of a length.
 
     Of a conjugate of the second with the first, so that all of one frequency are the covariance of their transforms.
     """
-    length, total, count = _transform_length(signals), sum(map(len, signals)), signals[0].shape[1]
-    found = np.zeros((length // 2 + 1, count, count), dtype=complex)
+    total, count = sum(map(len, signals)), signals[0].shape[1]
+    found = np.zeros((count, count, length // 2 + 1), dtype=complex)
     for one, n in zip(signals, _segments(signals), strict=True):
         window = scipy.signal.windows.hann(n, sym=False)
         parts = np.lib.stride_tricks.sliding_window_view(one, n, axis=0)[:: n - n // 2]  # (s, c, n)
-        seen = np.fft.rfft((parts - parts.mean(axis=2, keepdims=True)) * window, length).transpose(2, 1, 0)
-        found += seen @ seen.conj().transpose(0, 2, 1) * (len(one) / total / seen.shape[2] / (window @ window))
-    return found, length
+        seen = scipy.fft.rfft((parts - parts.mean(axis=2, keepdims=True)) * window, length)
+        share = len(one) / total / len(seen) / (window @ window)
+        for i in range(count):
+            for j in range(i, count):
+                found[i, j] += share * np.einsum("sf,sf->f", seen[:, i], seen[:, j].conj())
+    for i in range(count):
+        found[i:, i] = found[i, i:].conj()
+    return found
+
+
+def length_for(signals: Sequence[Array]) -> int:
+    """Even length of transforms of signals (k, ...) that go through filters as long as a segment of `spectrum`."""
+    return 2 * int(scipy.fft.next_fast_len((max(map(len, signals)) + max(_segments(signals))) // 2 + 1))
 
 
 def _segments(signals: Sequence[Array]) -> list[int]:
@@ -236,9 +256,7 @@ def noise_model(residuals: Sequence[Array], past: Array, order: int) -> NoiseMod
     C C* = rho A A* + (1 - q^-2)(1 - q^2), with the rho that leaves the least innovations.
 
     Args:
-        residuals: of one case.
         past: (2,) a1 and a2.
-        order: of the autoregression.
     """
     if not sum(float(e @ e) for e in residuals) > 0:
         return WHITE

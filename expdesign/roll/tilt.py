@@ -22,8 +22,9 @@ from expdesign.values import Array
 MOST_RAD, STEP_RAD = 0.052, 0.004  # of the tilts that are tried
 NARROW_RAD = 0.009  # beside a tilt, that counts as the same valley
 CLEAR = 12.0  # sum of squares by which one of so many tilts is better than the others not by chance
+VALLEYS = 3  # that are searched again from the parameters without more tilt
 REFINING = 10  # tries between two tilts
-ROUGHLY = 1e-7  # share of a sum of squares within which it is found
+ROUGHLY = 1e-4  # share of a sum of squares within which it is found
 TILT = tuple(EFFECTS).index("tilt")
 
 
@@ -48,34 +49,50 @@ class Tilts:
         return self.lead > CLEAR >= self.gain
 
 
-def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str]) -> Tilts:
-    """The sum of squares over all tilts, each with the parameters that it makes best."""
+def tilts_of(problem: RollProblem, weighted: Sequence[Weighted], theta: Array, held: Sequence[str], by: Array) -> Tilts:
+    """The sum of squares over all tilts, each with the parameters and other effects (`by`, (q, 3)) that it makes best.
 
-    def at(more: float) -> tuple[Array, float]:
+    The search at a tilt begins with the parameters of the tilt beside it; in the deepest valleys it is tried as well
+    from the parameters without more tilt, as there may be several.
+    """
+    beside = np.linalg.qr(np.delete(by, TILT, axis=1))[0]
+    found: dict[float, tuple[float, Array]] = {}  # tilt -> least sum of squares, parameters
+
+    def cost(more: float, begin: Array) -> float:
         tilted = [
             replace(
                 part,
                 top=part.top + more * part.effects[:, TILT, 0],
                 slope=part.slope + more * part.effects[:, TILT, 1:],
-                follows=part.follows,
             )
             for part in weighted
         ]
-        found, _, left = solved(problem, tilted, theta, held, within=ROUGHLY)
-        return found, float(left @ left)
+        values, _, left = solved(problem, tilted, begin, held, beside=beside, within=ROUGHLY)
+        now = float(left @ left), values
+        found[more] = min(found.get(more, now), now, key=lambda one: one[0])
+        return found[more][0]
 
-    def cost(more: float) -> float:
-        return at(more)[1]
-
-    tried = np.arange(-MOST_RAD, MOST_RAD + STEP_RAD / 2, STEP_RAD)
-    costs = np.array([cost(more) for more in tried.tolist()])
-    best = float(tried[np.argmin(costs)])
-    fine = scipy.optimize.minimize_scalar(
-        cost, bounds=(best - STEP_RAD, best + STEP_RAD), method="bounded", options={"maxiter": REFINING}
-    )
-    here = float(fine.x) if fine.fun < costs.min() else best
-    found, least = at(here)
+    cost(0.0, theta)
+    away = np.arange(STEP_RAD, MOST_RAD + STEP_RAD / 2, STEP_RAD)
+    for tried in (away.tolist(), (-away).tolist()):
+        begin = found[0.0][1]
+        for more in tried:
+            cost(more, begin)
+            begin = found[more][1]
+    tilts = np.sort([*-away, 0.0, *away])
+    costs = np.array([found[more][0] for more in tilts.tolist()])
+    around = np.pad(costs, 1, constant_values=np.inf)
+    valleys = np.flatnonzero((costs <= around[:-2]) & (costs <= around[2:]))
+    for place in valleys[np.argsort(costs[valleys])][:VALLEYS]:
+        costs[place] = cost(float(tilts[place]), found[0.0][1])
+    best = float(tilts[np.argmin(costs)])
+    scipy.optimize.minimize_scalar(
+        lambda more: cost(float(more), found[best][1]), bounds=(best - STEP_RAD, best + STEP_RAD), method="bounded",
+        options={"maxiter": REFINING},
+    )  # fmt: skip
+    here = min(found, key=lambda more: found[more][0])
+    least, values = found[here]
     # what the model misses is in all sums of squares
     size = max(1.0, least / max(sum(len(part.top) for part in weighted) - len(problem.free), 1))
-    lead = float(costs[np.abs(tried - here) > NARROW_RAD].min()) - least
-    return Tilts(here, (cost(0.0) - least) / size, lead / size, found)
+    lead = float(costs[np.abs(tilts - here) > NARROW_RAD].min()) - least
+    return Tilts(here, (found[0.0][0] - least) / size, lead / size, values)

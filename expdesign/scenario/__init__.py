@@ -14,6 +14,6 @@ from expdesign.scenario.instruments_file import INSTRUMENTS, equipped_vessel
 from expdesign.scenario.loads_file import LoadCases, load_cases
 from expdesign.scenario.mapping_file import load_mapping
 from expdesign.scenario.scenario_file import load_scenario
-from expdesign.scenario.values import DesignSettings, Scenario
-from expdesign.scenario.variants import Variant, load_variant
+from expdesign.scenario.values import Scenario
+from expdesign.scenario.variants import load_variant
 from expdesign.scenario.vessels import load_vessel

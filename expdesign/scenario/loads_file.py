@@ -79,7 +79,6 @@ def load_cases(path: Path | str, vessel: Vessel | None = None) -> LoadCases:
     """Read a file of load cases.
 
     Args:
-        path: of it.
         vessel: whose [roll], if it has one, is in place of the file's [ship], and where the search begins.
 
     Raises:

@@ -90,7 +90,6 @@ def read_text(path: Path, kind: str) -> str:
     """The text of a file.
 
     Args:
-        path: the file.
         kind: expected kind of file, for messages, e.g. "TOML".
 
     Raises:

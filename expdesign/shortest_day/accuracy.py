@@ -310,7 +310,6 @@ def stated_accuracy(
     """The accuracy that settings ask for.
 
     Args:
-        settings: of the scenario.
         design: the optimal durations in `total_s`.
         vessel: gives nominal values and the noise of sensors.
         runs: of the design, in its order; needed where standard deviations are asked for.

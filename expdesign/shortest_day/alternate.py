@@ -53,7 +53,6 @@ def shortest_day(
         accuracy: to be reached by the whole track, legs included.
         added: runs that the day may have although the durations exclude them.
         most_s: longest day allowed [s].
-        progress: of all rounds.
 
     Raises:
         NoAnswer: no runs within the limits reach it, or no day found does within `most_s`.
@@ -277,7 +276,6 @@ class _Search:
             best: to be planned, the best first.
             days: all that were drafted.
             last: the runs chosen last.
-            progress: of planning.
             good: whether a plan with this margin is what was asked for.
 
         Raises:

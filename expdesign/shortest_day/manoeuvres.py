@@ -70,7 +70,6 @@ def manoeuvres_worth_adding(
         accuracy: to be reached.
         settings: of the search; seconds worth take the place of sensitivity.
         day_s: length of a day whose runs tell as much as can be [s], instead of the accuracy.
-        progress: of the search.
 
     Raises:
         NoAnswer: no runs within the limits reach the accuracy; then there are no prices.

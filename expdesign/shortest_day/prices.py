@@ -176,8 +176,6 @@ def offered(problem: PlanProblem, prices: Prices, free: Collection[str] = (), pl
 
     Args:
         problem: gives the runs and the limits on them.
-        prices: of runs.
-        free: of the limits.
         placeless: not offered, as they have no place in the water, unless the limits require them.
     """
     durations, limits = problem.design.problem, problem.design.problem.constraints

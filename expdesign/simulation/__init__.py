@@ -10,22 +10,13 @@ from expdesign.simulation.actuation import (
     delivered_at_samples,
     keeps_to,
     mapped,
-    past_deadband,
     positions,
     sample_map,
     step_shares,
 )
 from expdesign.simulation.ensemble import Ensemble, mean_weather, simulate_ensemble
-from expdesign.simulation.environment import (
-    CALM,
-    STEADY,
-    Environment,
-    Variation,
-    WeatherSeries,
-    draw_environment,
-    draw_weather,
-)
-from expdesign.simulation.helm import Approach, Helm, service_speed, steady_ahead
+from expdesign.simulation.environment import CALM, Environment, Variation, WeatherSeries, draw_environment, draw_weather
+from expdesign.simulation.helm import Approach, Helm, steady_ahead
 from expdesign.simulation.motion import euler_step, motion_rates, relative_velocity, rk4_step, to_body
 from expdesign.simulation.run import in_waves, integrate_motion, rudder_angle, simulate, simulate_many, steering_signals
 from expdesign.simulation.sensors import measure

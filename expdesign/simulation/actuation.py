@@ -74,7 +74,6 @@ def sample_map(response: Response, *, sample_time_s: float, substeps: int | Arra
     """The map of a signal with this response over one sample, for arrays and for symbols.
 
     Args:
-        response: of the signal.
         sample_time_s: time for which commands are held [s].
         substeps: integrator steps per sample, or the shares of it that they take.
     """

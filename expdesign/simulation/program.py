@@ -392,11 +392,9 @@ def march(
     While it stands at a sample, the caller may set the program's `sea` and `air`.
 
     Args:
-        program: of the runs.
         given: (k, substeps, m, n), or 1 in place of substeps where inputs are held over a sample, or in place of n
             where runs share them.
         state: (6 or 8, n) at the first sample.
-        step: of the integrator.
         step_s: its length, or (substeps,) that of each in a sample [s].
         substeps: steps per sample.
     """

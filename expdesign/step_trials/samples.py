@@ -159,7 +159,6 @@ def with_errors(parts: Sequence[Plateau], states: Sequence[Array], *, beside: Se
     """Plateaus with standard errors by the noise of all of them; samples correlated by waves count as fewer.
 
     Args:
-        parts: the plateaus.
         states: (k, 2) U and r that each is the mean of.
         beside: the same of other plateaus, whose noise is counted, too.
     """

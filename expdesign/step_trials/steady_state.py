@@ -160,7 +160,6 @@ def calibrated(
         steady: stretches of the signal, each steady but for a slow trend, which is taken out.
         sample_time_s: time between samples [s].
         memory_s: of the filtered signal, about half of the slowest time constant that is to be seen [s].
-        rng: of the surrogates.
 
     Raises:
         NotInformative: the stretches are too short for the memory.

@@ -30,7 +30,6 @@ from expdesign.vessel.roll import NOMINAL, NOT_ACTING_BACK, ROLL_PARAMETERS, Bod
 from expdesign.vessel.structures import NUMPY, SCALAR, STRUCTURES, TERMS, Operators, Term, structure_terms
 from expdesign.vessel.vessel import (
     CALM,
-    STEADY,
     Environment,
     Variation,
     Vessel,

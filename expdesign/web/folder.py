@@ -156,7 +156,6 @@ class Folder:
         """Change a TOML file; its comments and order stay.
 
         Args:
-            name: of the file.
             edit: changes the tables in place.
 
         Raises:

@@ -38,7 +38,6 @@ class Form:
         """Of the file `name`, which `model` reads.
 
         Args:
-            folder: of the page.
             name: of the file, in the folder.
             model: of the whole file.
             kinds: key of a list of tables of several kinds -> kind -> its table.

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial, wraps
 from pathlib import Path
 
+from expdesign.errors import InputError
+from expdesign.export import Content, write_files
 from expdesign.export.document import Document, Section, Table, fact_text
 from expdesign.interruptions import interruptions_wait
 from expdesign.progress import Progress, silent
-from expdesign.requests import Request, command_of
+from expdesign.requests import COMMANDS, Request, command_of, repeating
+from expdesign.requests.options import Argument
 from expdesign.vessel import NOT_ACTING_BACK, Vessel
+
+Told = Callable[[str], None]
+"""Takes lines while a command works."""
+
+
+def silently(line: str) -> None:
+    """Say nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,14 +38,69 @@ class Outcome:
         return self.document.summary
 
 
-def carry_out(
-    request: Request, *, progress: Progress = silent, tell: Callable[[str], None] = lambda line: None
+def finished(
+    request: Request,
+    usual: Path,
+    files: Mapping[str, Content],
+    document: Document,
+    progress: Progress,
+    *,
+    page: str = "",
+    drawing: Progress = silent,
 ) -> Outcome:
+    """Write all files into the folder asked for, or the usual one, and end.
+
+    Args:
+        request: what was asked; the document states the command that repeats it.
+        usual: folder where none is asked for.
+        files: their contents by name.
+        document: what they hold.
+        page: name of the document as a page, where it has one.
+        drawing: progress of its figures.
+    """
+    document = document if document.command else replace(document, command=repeating(request))
+    if page:
+        from expdesign.export.pages import document_html  # commands without a page do not wait for it
+
+        files = {**files, page: partial(document_html, document, progress=drawing)}
+    paths = write_files(getattr(request, "out", None) or usual, files)
+    progress("done", 1.0)
+    return Outcome(files=paths, document=document)
+
+
+def workflow(work: Callable[..., Outcome]) -> Callable[..., Outcome]:
+    """The function of a request, which also takes the values of the request themselves.
+
+    `work(requests.Nominal(card=card, seed=1))` and `work(card, seed=1)` are the same. Arguments of the command line, or
+    the first value of a command without, and `out` may stand without their names. `cache=False` says `no_cache=True`.
+    Called by values, all work is done in one process unless `jobs` says otherwise.
+    """
+    command = next(one for one in COMMANDS if one.workflow == work.__name__)
+    names = [one.name for one in command.request.asked()]
+    first = [one.name for one in command.request.asked() if isinstance(one.typed, Argument)] or names[:1]
+    in_order = [*first, *({"out"} & {*names})]
+
+    @wraps(work)
+    def called(*given: object, progress: Progress = silent, tell: Told | None = None, **values: object) -> Outcome:
+        lines = {} if tell is None else {"tell": tell}
+        if len(given) == 1 and isinstance(given[0], command.request) and not values:
+            return work(given[0], progress=progress, **lines)
+        if len(given) > len(in_order) or {*in_order[: len(given)]} & {*values}:
+            raise TypeError(f"{work.__name__} takes {', '.join(in_order)} in this order, each once, all others by name")
+        if "no_cache" in names and "cache" in values:
+            values["no_cache"] = not values.pop("cache")
+        alone = {"jobs": 1} if "jobs" in names else {}
+        asked = alone | dict(zip(in_order, given, strict=False)) | values
+        return work(command.request(**asked), progress=progress, **lines)
+
+    return called
+
+
+def carry_out(request: Request, *, progress: Progress = silent, tell: Told = silently) -> Outcome:
     """Do what a request asks, e.g. `carry_out(requests.Nominal(card=Path("card.toml")))`.
 
     Args:
         request: one of those in `expdesign.requests`.
-        progress: of the command.
         tell: takes lines while the command works, of a command that has such.
 
     Raises:
@@ -41,15 +108,28 @@ def carry_out(
         NoAnswer: there is none.
     """
     command = command_of(request)
+    if out := getattr(request, "out", None):
+        check_out(out)
     with interruptions_wait():  # some solvers do not stand being interrupted while they load
         from expdesign import workflows
 
         work: Callable[..., Outcome] = getattr(workflows, command.workflow)
-    values = {one.name: getattr(request, one.name) for one in command.asked}
-    if "no_cache" in values:
-        values["cache"] = not values.pop("no_cache")
-    lines = {"tell": tell} if command.tells else {}
-    return work(**values, progress=progress, **lines)
+    return work(request, progress=progress, **({"tell": tell} if command.tells else {}))
+
+
+def check_out(out: Path) -> None:
+    """The folder for results, before hours are spent on something that cannot be written there.
+
+    Raises:
+        InputError: it is a file, lies below a file, or may not be written to.
+    """
+    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
+    if there.is_symlink() and not there.exists():
+        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
+    if not there.is_dir():
+        raise InputError(f"--out {out}: {there} is a file, expected a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: no permission to write in {there}")
 
 
 def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), notes: Sequence[str] = ()) -> Document:

@@ -20,7 +20,6 @@ from expdesign.diagnosis.conclusions.verdict import (
     DIVERGED_FIT,
     accuracy_in_words,
     alternatives,
-    benefit,
     has_diverged,
     manoeuvre,
     missing_effect,

@@ -43,10 +43,8 @@ def finding_of(
     """A step of the selection as a finding.
 
     Args:
-        step: of the selection.
         last: the joint fit of all steps, which the estimates come from.
         held: errors on held-out units without and with the cause.
-        seed: of the intervals.
         windows: all data.
         would_tell_apart: the manoeuvre that distinguishes the cause from its alternatives best.
     """
@@ -138,7 +136,6 @@ def notes_on_data(vessel: Vessel, record: Record, windows: Windows, constant: Se
 
     Args:
         vessel: the model in use.
-        record: the data.
         windows: the data as compared.
         constant: inputs that never change.
     """
@@ -268,7 +265,6 @@ def note_on_nuisance(unfitted: HeldOut, fitted: HeldOut, seed: int) -> tuple[str
     Args:
         unfitted: errors of the model in use.
         fitted: with its uncertain parameters fitted.
-        seed: of the interval.
     """
     gain, _ = held_out_gain(unfitted, fitted, seed)
     if not abs(gain) >= SELECTION_TUNING.least_gain_points:
@@ -285,7 +281,6 @@ def note_on_parameters_alone(as_stated: HeldOut, alone: HeldOut, found: HeldOut,
     Args:
         as_stated, alone, found: errors of the model in use, with parameters re-estimated, and with the cause too.
         cause: its missing effect, in words.
-        seed: of the intervals.
     """
     gain, (own, (low, high)) = held_out_gain(as_stated, alone, seed)[0], held_out_gain(alone, found, seed)
     return (
@@ -321,9 +316,7 @@ def note_on_predictions(
     Args:
         as_stated: errors of the model in use as its file states it, in stretches.
         found: those with the cause, held out.
-        kept: the cause.
         replaced: what the search had found.
-        seed: of the interval.
     """
     gain, (low, high) = held_out_gain(as_stated, found, seed)
     names = " and ".join(missing_effect(step.chosen.candidate.cause) for step in replaced)

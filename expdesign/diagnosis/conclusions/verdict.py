@@ -1,6 +1,6 @@
 """The verdict of a diagnosis: a sentence of what is missing, one of how sure that is, and one of what to do.
 
-A fault of the record itself comes first, and then is what to do.
+A fault of the record itself comes first, and then is what to do; so does a model that is unfit for the data.
 
 What else is known goes into remarks.
 """
@@ -136,7 +136,13 @@ def verdict(
         kinds: what the error looks like, which no cause of the catalogue is and no model can get.
         faults: of the record itself, which are to be looked at before any cause is believed.
     """
-    if findings:
+    if findings and _is_unfit(before, findings, unexplained):
+        unfit = f"The model is unfit for these runs, {accuracy_in_words(before)}"
+        sentences = [
+            f"{unfit}: estimate it anew before a cause is believed",
+            *_of_findings(findings, unit, unexplained)[:-1],
+        ]
+    elif findings:
         sentences = _of_findings(findings, unit, unexplained)
     elif kinds:
         what = f"No cause of the catalogue matches the error: it looks like {listed(kinds)}"
@@ -170,6 +176,15 @@ def verdict(
 NO_ERROR = "These data show no error of the model"
 MORE_RUNS = "more runs would tell"
 MORE_DATA = "Keep the vessel file; sail more runs, and measure wind and current, before it is changed"
+
+
+def _is_unfit(before: Accuracy, findings: Sequence[Finding], unexplained: Unexplained | None) -> bool:
+    """Whether the model in use simulates some output worse than a constant, and what is found is no single cause of it.
+
+    It leaves much unexplained, or is that several parameters are wrong.
+    """
+    several = any(item.cause == "parameters" and len(item.keys) > 1 for item in findings)
+    return bool((before.fit < 0.0).any()) and (several or unexplained is not None)
 
 
 def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplained | None) -> list[str]:

@@ -204,7 +204,6 @@ def cut_windows(
 
     Args:
         model: what is simulated.
-        record: data.
         longest_s: of a window; None for the longest that there may be.
         step_s: of the integrator, that of other windows; None for what the model needs at the measured speeds.
 

@@ -15,7 +15,6 @@ from expdesign.diagnosis.fit.between_runs import (
     of_several,
     runs_of,
     spread_between_runs,
-    sum_by_run,
     tail,
 )
 from expdesign.diagnosis.fit.cross_validation import (
@@ -39,6 +38,7 @@ from expdesign.diagnosis.fit.fit import (
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import (
     FEWEST_RUNS,
+    LEAST_ERROR,
     HeldOut,
     certain_reductions,
     held_out_gain,
@@ -49,13 +49,11 @@ from expdesign.diagnosis.fit.held_out import (
     prediction_p_value,
 )
 from expdesign.diagnosis.fit.linear_model import (
-    MarginalInformation,
     build_sensitivities,
     difference_step,
     effect_disturbances,
     gram_matrices,
     in_groups,
-    information,
     marginalised,
     sensitivities_to,
     window_information,

@@ -142,7 +142,6 @@ def counting_runs(found: Fit, run: Array, known: Dispersion | None = None) -> Fi
     They are as wide as an interval of 95 % by Student's distribution is.
 
     Args:
-        found: of all windows.
         run: (w,) number of the run of each window.
         known: of other directions; None where the effects of the fit are all there is.
     """

@@ -88,7 +88,6 @@ def cross_validate(
         found: its fit to all units; None for a model that is not fitted.
         ship: the model.
         windows: all data.
-        progress: of this cross-validation.
         record: the same data, which stretches are cut from where units are batches; else they are parts of windows.
     """
     unit = validation_units(windows)

@@ -128,7 +128,6 @@ def prior_precision(ship: ExtendedModel, keys: tuple[str, ...], *, free: int = 0
 
     Args:
         ship: the model in use.
-        keys: effects.
         free: this many of the first have no prior; that of the others is their marginal one.
     """
     whitening = _prior_whitening(ship, keys, free)
@@ -172,7 +171,6 @@ def step_bounds(ship: ExtendedModel, keys: tuple[str, ...], shortest_s: float = 
 
     Args:
         ship: the model before the step.
-        keys: effects.
         shortest_s: that period [s].
     """
     now = np.array([ship.get(key) for key in keys])

@@ -177,7 +177,6 @@ def fit(
 
     Args:
         ship: where to start; its effects not in `free` stay, except uncertain parameters.
-        windows: data.
         free: effects to estimate without a prior.
         starts: (w, n) first guess of the initial states.
         options: how to begin and when to end.

@@ -96,6 +96,11 @@ class HeldOut:
             return float(100.0 * (1.0 - np.nan_to_num(np.exp(typical), nan=np.inf)))
         return float(np.nan_to_num(self.fit, nan=-np.inf).mean())
 
+    @property
+    def left(self) -> float:
+        """What the model leaves unexplained on average [%], of which gains are shares."""
+        return 100.0 - self.mean_fit
+
 
 def judged(held: Sequence[HeldOut], *, first: int = 1) -> list[HeldOut]:
     """Errors by which models are compared: of whole units, or of short stretches.

@@ -124,8 +124,6 @@ def sensitivities_beside(
     """The same, of which some are known along this motion.
 
     Args:
-        linear: the motion.
-        keys: effects.
         known: effect -> (w, s, 4) response.
         same: sensitivities along the same motion: of the random current and of initial states.
     """

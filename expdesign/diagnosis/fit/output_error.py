@@ -75,7 +75,6 @@ def with_longer_windows(ship: ExtendedModel, record: Record, windows: Windows) -
 
     Args:
         ship: the model in use.
-        record: data.
         windows: of the data, short enough for the model in use.
     """
     if _length_s(windows) > TUNING.ahead_s or windows.steps >= longest_windows(ship, record).steps:

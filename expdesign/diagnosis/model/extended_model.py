@@ -58,6 +58,8 @@ class ExtendedModel:
     # effects as the vessel file states them; stated_std: standard deviations of those that it is unsure of
     stated: Effects = field(default_factory=dict)
     stated_std: Effects = field(default_factory=dict)
+    # effect -> least and greatest value that instruments of the record show of each other
+    shown: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @cached_property
     def scaled_terms(self) -> tuple[ScaledTerm, ...]:
@@ -133,7 +135,10 @@ class ExtendedModel:
         return self.effects.get(key, 0.0)
 
     def bounds(self, key: str) -> tuple[float, float]:
-        """Least and greatest possible value of an effect; what the vessel file states is possible."""
+        """Least and greatest possible value of an effect by its kind and the instruments.
+
+        What the vessel file states is possible.
+        """
         kind, _, which = key.partition(":")
         sizes = {"forward": self.length_m, "starboard": self.beam_m, "asymmetry": self.beam_m / 2}
         row = effect_row(key)
@@ -142,6 +147,8 @@ class ExtendedModel:
             low, high = -sizes[which or kind], sizes[which or kind]
         elif key == "roll:period":
             high = self.longest_roll_s
+        least, most = self.shown.get(key, (low, high))
+        low, high = max(low, least), min(high, most)
         stated = self.stated.get(key, 0.0)
         return min(low, stated), max(high, stated)
 

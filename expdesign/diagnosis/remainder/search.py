@@ -284,8 +284,6 @@ def with_unlisted_terms(
     Args:
         kept: the causes of the catalogue.
         held: errors on held-out units of the model before any cause, then after every one.
-        windows: data.
-        validation: of fits.
         seed: of draws and intervals.
         rejected: fits of causes that are significant and improve nothing on held-out data, first ones first: what is
             missing may show beside the cause that imitates it. What shows only without that cause may imitate it, and

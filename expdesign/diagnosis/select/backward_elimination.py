@@ -43,8 +43,6 @@ def eliminate_backward(
     What gains nothing beside a cause of which nothing is left is asked again without it.
 
     Args:
-        found: the selection.
-        windows: data.
         cross_validated: the selection, its causes fitted as they are judged, and errors on held-out units of the model
             before any cause, then after every step.
         seed: of the gains' intervals.
@@ -149,7 +147,6 @@ def improves_held_out(
     never do, nor does a change of the ship, whose time is chosen where predictions are worst.
 
     Args:
-        found: the selection.
         held: errors on held-out units of the model before any cause, then after every step.
         seed: of the gains' intervals.
         windows: all data; None where there are no predictions of them.
@@ -271,7 +268,7 @@ def simulates_better(
     """
     (gain, interval), least = gained, _least_change(before, after)
     possible = _matters(before, after) and (not imitates or least >= -gain)
-    return possible and _improves(certain and not imitates, least >= 0.0, gain, interval)
+    return possible and _improves(certain and not imitates, least >= 0.0, before.left, (gain, interval))
 
 
 def _matters(before: HeldOut, after: HeldOut) -> bool:
@@ -286,8 +283,8 @@ def _least_change(before: HeldOut, after: HeldOut) -> float:
     return float(np.nan_to_num(after.fit - before.fit).min()) if len(before.squared_error) else -np.inf
 
 
-def _improves(certain: bool, no_output_worse: bool, gain: float, interval: tuple[float, float]) -> bool:
-    low, high = interval
-    if certain and high >= 0.0 and (low > -TUNING.most_loss_points or no_output_worse):
+def _improves(certain: bool, no_output_worse: bool, left: float, gained: tuple[float, tuple[float, float]]) -> bool:
+    gain, (low, high) = gained
+    if certain and high >= 0.0 and (low > -TUNING.most_loss_share * left or no_output_worse):
         return True
     return gain > TUNING.least_gain_points and (gain > TUNING.clear_gain_points or low > 0.0)

@@ -103,7 +103,6 @@ def fit_candidate(
 
     Args:
         base: the fit without it.
-        windows: data.
         point: starting point.
         far: the effect is large, so begin in windows of middle length.
         steps: Gauss-Newton steps.
@@ -195,7 +194,6 @@ def profile_estimate(found: Fit, key: str, std: float) -> tuple[Fit, float]:
 
     Args:
         found: converged with that effect held.
-        key: the effect.
         std: a guess of its standard error.
     """
     centre, span, limits = found.value(key), 4.0 * std, _limits(found, key)

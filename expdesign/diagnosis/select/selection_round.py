@@ -108,11 +108,8 @@ def selection_round(
 
     Args:
         base: the fit of the findings so far.
-        windows: data.
         rejected: candidates that are not tried again.
         rng: of the null distribution.
-        work: of the search.
-        validation: of its fits.
         most: effects that a candidate may have.
     """
     tests = round_tests(base, windows, rejected, rng, work, most=most)
@@ -259,7 +256,7 @@ def _best_on_held_out(
     for other, rival in zip(others, rivals, strict=True):
         fewer = rival.numbers < first.numbers
         simpler = fewer and (first.candidate.imitates or _is_about_as_likely(rival, first))
-        least = TUNING.clear_gain_points if rival in near else TUNING.much_better_points
+        least = TUNING.clear_gain_points if rival in near else TUNING.much_better_share * own.left
         is_better = other.mean_fit > own.mean_fit + (-TUNING.clear_gain_points if simpler and not astray else least)
         if is_better and (fewer or astray or held_out_gain(own, other, 0)[1][0] > 0.0):
             better.append((other.mean_fit, rival))

@@ -85,7 +85,6 @@ def _hidden_by_random_current(
 
     Args:
         base: gives the random current.
-        tests: of all candidates.
         listed: candidates that are fitted, to which a current is added.
         beside: others that may be.
     """

@@ -48,7 +48,6 @@ def suspected_tests(ship: ExtendedModel, windows: Windows, effects: Sequence[str
 
     Args:
         ship: the model in use, whose parameters and statements are taken as known here.
-        windows: data.
         effects: keys of the extended model, such as "gain" or "theta:X_uu".
     """
     if not effects:

@@ -29,16 +29,16 @@ class Tuning:
     least_gain_points: float = 0.1  # gain of fit on held-out data that causes after the first need, at least [points]
     # gain that suffices even where its interval, of few runs perhaps, includes zero [points]
     clear_gain_points: float = 1.0
-    # by which a candidate that is less likely, or has more numbers, has to simulate held-out data better than the best
-    # for it to be the cause instead [points]
-    much_better_points: float = 5.0
+    # share of what the best candidate leaves unexplained of held-out data by which one that is less likely, or has more
+    # numbers, has to leave less for it to be the cause instead
+    much_better_share: float = 0.2
     leads: int = 3  # candidates that are named where a simulation explains little and no cause is certain
     # share by which the error of some output must fall on held-out data for a cause to be a finding
     least_reduction: float = 0.01
     least_predicted: float = 0.05  # share of the squared error of predictions that a first cause may take away instead
-    # loss at the lower end of the interval that the first cause may risk, if some output is simulated worse with it
-    # [points]
-    most_loss_points: float = 0.5
+    # loss at the lower end of the interval that the first cause may risk, if some output is simulated worse with it, as
+    # a share of what the model without it leaves unexplained
+    most_loss_share: float = 0.02
 
 
 TUNING = Tuning()

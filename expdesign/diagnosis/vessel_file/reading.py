@@ -39,7 +39,6 @@ def stated_std(vessel: Vessel, inputs: tuple[str, ...], derived: tuple[str, ...]
 
     Args:
         vessel: its file.
-        inputs: of the model.
         derived: velocities that come from the pose.
         stated: effects.
     """
@@ -114,6 +113,7 @@ def extended_model(vessel: Vessel, record: Record) -> ExtendedModel:
         effects=known,
         stated=known,
         stated_std=stated_std(vessel, model.inputs, derived, known),
+        shown=record.shown,
     )
 
 

@@ -9,7 +9,7 @@ from expdesign.estimation.noise.components import (
     stretches,
     timeline,
 )
-from expdesign.estimation.noise.coupled import Coupled, coupled_covariance, fit_coupled
+from expdesign.estimation.noise.coupled import coupled_covariance, fit_coupled
 from expdesign.estimation.noise.covariance import (
     automatic_lags,
     long_run_covariance,

@@ -316,7 +316,6 @@ def fit_components(residuals: Array, parts: Sequence[Stretch], by: Sequence[Fitt
     """The parts of the noise in each output's residuals (k, n).
 
     Args:
-        residuals: of an estimate.
         parts: `stretches`; without headings there are no turning parts.
         by: what the estimate took from each output's noise; () for noise of which nothing was taken.
     """

@@ -91,7 +91,6 @@ def coupled_covariance(W: Array, sensed: Array, found: Coupled, parts: Sequence[
     Args:
         W: (k, n, p) by which forces enter the estimate.
         sensed: (n, p, p) covariances that sensors with unit variance give.
-        found: the noise.
         parts: `stretches`.
     """
     sensors, forces = found.variances[:, SENSOR], np.array(found.variances)

@@ -130,7 +130,6 @@ def minimise_output_error(
         record: batches of one sample time.
         start: a regression's solution, for the first guess.
         fitting: how simulations are compared with the data.
-        progress: of the search.
 
     Raises:
         InputError: batches of different sample times, or inputs or wind that are not numbers.

@@ -26,7 +26,6 @@ from expdesign.estimation.regression.predictors import (
 from expdesign.estimation.regression.regression import (
     MEANS,
     Integers,
-    Mask,
     Regression,
     batch_slices,
     single_output,

@@ -290,7 +290,6 @@ def unbiased_value(expression: Expression, table: Table, std_rad: float) -> Arra
     """(k,) a term of at most second degree in the wind, whose mean over the noise is the term without noise.
 
     Args:
-        expression: of the term.
         table: measured signals, with components of the wind divided by their shrinkage.
         std_rad: of the noise on the vane's angle.
     """

@@ -212,7 +212,6 @@ def build_layout(
 
     Args:
         model: from `tables.model_for`.
-        record: the data.
         predictor: a name in `PREDICTORS`.
         fixed: parameters held at the model's values.
         quadrature: one of `QUADRATURES`.

@@ -217,7 +217,6 @@ def treatment_of(record: Record, choice: str, *, instruments: bool) -> Steered:
     """What to do with the steered samples of a record.
 
     Args:
-        record: the data.
         choice: one of `STEERED`; "auto" for planned commands where there are some, else left out, in methods with
             instruments, and for use in others.
         instruments: whether the method has instruments.

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from expdesign import __version__
 from expdesign.conventions import VELOCITY_COLUMNS, to_b_frame, to_n_frame
 from expdesign.dictionary.spec import Primitive, PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, bordered, limits_kept, pool_gains
@@ -86,7 +87,6 @@ def durations_json(design: DurationDesign, *, compared: Sequence[Efficiencies] =
     """The design with its certificate, as durations.json; bounds are null where there are none.
 
     Args:
-        design: the durations.
         compared: the design under every criterion.
     """
     problem = design.problem
@@ -169,7 +169,6 @@ def dictionary_files(
 
     Args:
         specs: requests.
-        name: of the dictionary.
         stem: of the file names.
         comments: lines to go first.
     """
@@ -277,7 +276,6 @@ def subsets_json(
     pieces: Sequence[str],
     labels: Sequence[str],
     command: str,
-    version: str,
 ) -> str:
     """Draws of every design with their simulation errors; null where there is no estimate or its model diverges.
 
@@ -286,14 +284,13 @@ def subsets_json(
         outputs: velocities that have equations.
         pieces, labels: of each piece.
         command: that gives the same.
-        version: of the package.
     """
     return strict_json(
         {
             "pieces": [{"name": name, "label": label} for name, label in zip(pieces, labels, strict=True)],
             "designs": {item.design: _design(item, outputs) for item in drawn},
             "command": command,
-            "version": version,
+            "version": __version__,
         }
     )
 

@@ -77,7 +77,6 @@ def check_rtz(content: bytes, file_stem: str) -> list[str]:
     """Problems of an RTZ file.
 
     Args:
-        content: the file.
         file_stem: its name without the ending, which the route must be named after.
     """
     root = _parsed(content)

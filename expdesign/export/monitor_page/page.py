@@ -228,5 +228,4 @@ def monitor_document(content: MonitorContent) -> Document:
         ),
         notes=content.notes,
         command=content.command,
-        version=content.version,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
+from expdesign import __version__
 from expdesign.export.document import Block, Document, Figure, Table, fact_rows
 from expdesign.export.formats.format import xml_text
 from expdesign.progress import Progress, in_phases, silent
@@ -29,6 +30,7 @@ def page_template(name: str, *, package: str = __name__) -> Template:
         lstrip_blocks=True,
         finalize=_shown,
     )
+    environment.globals["version"] = __version__
     environment.filters.update(kind=lambda block: type(block).__name__, number=id)
     return environment.get_template(name)
 

@@ -38,7 +38,6 @@ class ReportContent:
     design: DurationDesign  # the durations with their certificate
     plan: Plan  # the trial; a plan that failed its checks is shown as such
     command: str  # the command line that reproduces the result
-    version: str  # of the program
     compared: tuple[Efficiencies, ...] = ()  # the design under every criterion
     route: Route | None = None  # the waypoints as exported, or None when there are none
     known: Known | None = None  # the state of a trial in progress, or None for a new trial

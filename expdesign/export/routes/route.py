@@ -46,7 +46,6 @@ def build_fence(
     Args:
         points: (k, 2) track, north and east [m].
         water: allowed water in (east, north).
-        beam_m: of the ship.
         clearance_m: that the plan keeps; it is what the fence may be simplified by.
         frame: the plan's.
     """

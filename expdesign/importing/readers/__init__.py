@@ -98,7 +98,6 @@ def read_log(path: Path, *, sample_time_s: float = 0.0, beside: int = 0) -> Log:
     """What a file, or the folder of a bag, holds.
 
     Args:
-        path: of it.
         sample_time_s: between rows of a table without a clock [s]; 0 where it is not known.
         beside: readings and times of other logs of the import, which are kept with these.
 

@@ -28,7 +28,6 @@ def read_text(path: Path, sample_time_s: float) -> Log:
     """The log.
 
     Args:
-        path: the file.
         sample_time_s: between rows of a table without a clock [s]; 0 where it is not known.
 
     Raises:

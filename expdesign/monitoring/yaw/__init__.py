@@ -11,7 +11,7 @@ beyond the thesis.
 Source: a master's thesis on the estimation of a ship's yaw dynamics in operation, chapters 2 to 6.
 """
 
-from expdesign.monitoring.yaw.estimate import YawEstimate, estimate_yaw, halves_differ, simulate_yaw, start_values
+from expdesign.monitoring.yaw.estimate import estimate_yaw, halves_differ, simulate_yaw, start_values
 from expdesign.monitoring.yaw.learnt import estimate_yaw_by_instruments, halves_in_words, learnt_ship
 from expdesign.monitoring.yaw.model import YAW_MODELS, YawData, YawModel, needed_columns, term_budget
 from expdesign.monitoring.yaw.ship import KEY, YawShip, ship_of_changes, yaw_changes, yaw_grams

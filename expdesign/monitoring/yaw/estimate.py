@@ -42,7 +42,6 @@ def simulate_yaw(model: YawModel, data: YawData, parameters: Array) -> tuple[Arr
     recursion, whose coefficients are found for all samples at once.
 
     Args:
-        model: the structure.
         data: inputs; what they multiply is taken as straight lines between samples.
         parameters: (n, p), or (p,) for all voyages.
     """
@@ -114,7 +113,6 @@ def estimate_yaw(
     Levenberg-Marquardt from a start, for all voyages side by side. The inertia is kept positive, damping negative.
 
     Args:
-        model: the structure.
         data: of n voyages.
         start: value of every parameter [SI].
         groups: (n,) number from 0 of the ship that each voyage is of, so that voyages of one share its parameters; by

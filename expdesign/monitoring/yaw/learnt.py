@@ -95,7 +95,6 @@ def estimate_yaw_by_instruments(
     """Parameters whose errors are orthogonal to sensitivities with other noise, by Newton's method.
 
     Args:
-        model: the structure.
         data: of n voyages.
         start: value of every parameter [SI] from which output error begins; instruments begin from its estimate.
         groups: as in `estimate_yaw`.
@@ -151,7 +150,6 @@ def learnt_ship(
     """The yaw model of the reference by output error, and notes on it.
 
     Args:
-        model: the structure.
         vessel: model of the ship, for the moment of the drives where none is measured.
         record: the reference, or its beginning.
         stretch_s: length of a stretch of the watch [s].

@@ -117,7 +117,6 @@ def first_bends(graph: VisibilityGraph, points: Array, nodes: Array, distance: A
     """(k,) length of the shortest path from each point, infinite where there is none, and the node of its first bend.
 
     Args:
-        graph: of the water.
         points: (k, 2).
         nodes, distance: (n, 2) places and the lengths of the paths from there.
     """
@@ -134,7 +133,6 @@ def taut_bends(
     Nodes at which a shortest path may bend are tested for sight first, the others only where none of them is seen.
 
     Args:
-        graph: of the water.
         points: (k, 2).
         nodes, next_node: (n, 2) corners of the graph, the goal last, and the node (n,) after each.
         total: (k, n) cost of the paths from the points that bend at the nodes first.

@@ -12,7 +12,6 @@ from expdesign.plan.control.ships import (
     Capability,
     DubinsShip,
     HelmShip,
-    arc_spare_m,
     capability,
     needs_helm,
 )

@@ -155,7 +155,6 @@ def search_dubins(
         spacing_m: between returned poses, and between those of the checks.
         low, high: (2,) north/east box to search.
         holds: check of a whole motion; it is also asked about poses outside the box.
-        seed: of the sampler.
     """
     ou.RNG.setSeed(seed)
     space = ob.DubinsStateSpace(radius_m)

@@ -132,7 +132,6 @@ def steady_transit(path: Array, braking_m: float, water: LegWater, ship: HelmShi
     Args:
         path: places and courses from the leg's start to its end.
         braking_m: length at its end on which the ship slows down.
-        water, ship: of the leg.
 
     Returns:
         None where every straight is short, or wind turns or slows the ship.

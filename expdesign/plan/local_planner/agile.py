@@ -234,7 +234,6 @@ def _stepped(
     """Straight legs through water from where plans `able` (b,) end.
 
     Args:
-        space: the water.
         plans: partial plans.
         able: those that are continued.
         q: the run.

@@ -55,7 +55,6 @@ def path_successors(
     """A stretch of the shortest path to the goal, then the run with some heading.
 
     Args:
-        space: the water.
         departures: of all plans.
         able: plans that still have the run to do.
         q: the run.
@@ -115,7 +114,6 @@ def path_points(space: SearchSpace, pose: Array, stretches: Sequence[float]) -> 
     """Points along the paths to the goal.
 
     Args:
-        space: the water.
         pose: (b, 3) where the paths begin.
         stretches: hull lengths along them; the whole path is always the last.
     """

@@ -86,7 +86,6 @@ class LegTimes:
         """(...,) time of legs along a path [s].
 
         Args:
-            length_m: of the path.
             first_rad, last_rad: heading at the beginning and at the end, from the path's course there.
             turn_rad: from the one heading to the other.
             exit_mps, entry_mps: speeds ahead, at the beginning and at the end.

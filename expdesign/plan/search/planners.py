@@ -32,7 +32,6 @@ def placed_runs(
         space: the runs and the water.
         repeats: of each of the space's runs.
         departure: where the search begins.
-        progress: of the search.
 
     Raises:
         NoPlan: some run does not fit anywhere the search can reach, or no path leads to the goal.

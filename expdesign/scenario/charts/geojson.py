@@ -78,7 +78,6 @@ def read_features(
     """The features of a GeoJSON file: a FeatureCollection, a Feature or a bare geometry.
 
     Args:
-        path: the file.
         layer_property: the property that names the layer of a feature.
         skip: numbers, from 1, and types of geometry of features to leave out unread.
         stated_at: the list of these in another file.

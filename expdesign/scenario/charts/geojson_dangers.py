@@ -111,7 +111,6 @@ def dangers(features: tuple[Feature, ...], table: ChartTable, near_lon_deg: floa
     """The dangers and obstacles among features.
 
     Args:
-        features: of one file.
         table: of the area file.
         near_lon_deg: longitudes are counted within half a turn of it.
 

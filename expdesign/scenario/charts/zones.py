@@ -157,9 +157,7 @@ def closed_water(
 
     Args:
         objects: of any class; depth areas and other classes close nothing by themselves.
-        rules: of the ship.
         window: (longitude, latitude) [deg].
-        frame: of the result.
     """
     objects = [item for item in objects if item.geometry.intersects(window)]
     restricted = [item for item in objects if item.why]

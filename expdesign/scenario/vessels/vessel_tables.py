@@ -156,7 +156,6 @@ def _signal_keys(stem: str, *, free: bool) -> dict[str, Any]:
     """Fields of the table of an actuator for one of its signals: limits, and what `Response` holds.
 
     Args:
-        stem: of the signal.
         free: whether it may do without limits.
     """
     words, limit, unit = SIGNALS[stem]

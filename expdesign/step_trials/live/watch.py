@@ -325,7 +325,6 @@ def _failed(state: State, held: Held, why: str, now: float, setup: Setup, *, qui
         held: what failed.
         why: in words.
         now: time [s].
-        setup: of the trial.
         quiet: the next commands stand already, so that none are told.
     """
     step = held.step

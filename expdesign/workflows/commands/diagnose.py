@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.diagnosis import Diagnosis, Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
-from expdesign.export import Content, write_files
+from expdesign.export import Content
 from expdesign.export.diagnosis_page import accuracy_rows, diagnosis_html, diagnosis_notes
 from expdesign.export.diagnosis_results import (
     RollVerdict,
@@ -31,16 +31,16 @@ from expdesign.export.diagnosis_results import (
 from expdesign.export.document import Table
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.roll.record import judge_roll, missing_columns, roll_run, with_one_source
 from expdesign.scenario import load_scenario
 from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 SINCE_CHANGE = "since-change.csv"
 """File that a watch leaves for a diagnosis."""
@@ -48,57 +48,34 @@ MOST_PAGE_WORK, PAGE_SAMPLES = 270.0, 375.0
 """Simulations of few data that take as long as drawing the page, and the samples from which on they take longer."""
 
 
-def diagnose(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path,
-    scenario: Path | None = None,
-    velocity: str = "auto",
-    jobs: int = 1,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
-    """Causes of the simulation error and the gain from adding them to the model, into `out` or runs/<first data file>.
-
-    Args:
-        data: CSV files.
-        out: folder, or None.
-        vessel: the model in use.
-        scenario: whose dictionary is searched for manoeuvres that distinguish causes; standard ones by default.
-        velocity: where velocities come from, as in `estimate`.
-        jobs: processes; 0 for one per core. The results do not depend on it, and few data take one.
-        seed: of all chance.
-        progress: of the command.
-    """
-    if not data:
-        raise InputError("no data files are given, expected one or more CSV files")
+@workflow
+def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outcome:
+    """Causes of the simulation error and the gain from adding them, into `out` or runs/<first data file>."""
     progress("reading the data", 0.0)
-    ship, told = equipped(vessel, data)
-    ship, named = with_alarms(ship, data)
-    record = in_stated_time(measured(data, ship, velocity=velocity, told=told), ship.sensors)
-    proposals = _proposals(scenario, model_for(ship.model, record)) if scenario else ()
+    ship, told = equipped(request.vessel, request.data)
+    ship, named = with_alarms(ship, request.data)
+    record = in_stated_time(measured(request.data, ship, velocity=request.velocity, told=told), ship.sensors)
+    proposals = _proposals(request.scenario, model_for(ship.model, record)) if request.scenario else ()
     samples = sum(len(batch.inputs) for batch in record.batches)
     drawing = MOST_PAGE_WORK / (1.0 + samples / PAGE_SAMPLES)
     reported = Estimated(progress, after=drawing)
-    with workers(jobs, load=None), doubted(record):
-        found = diagnose_record(ship, record, seed=seed, proposals=proposals, suspected=named, progress=reported)
+    with shared(request, load=None), doubted(record):
+        found = diagnose_record(
+            ship, record, seed=request.seed, proposals=proposals, suspected=named, progress=reported
+        )
     reported.after = 0.0
     roll = _roll(ship, record)
-    command = command_text(
-        requests.Diagnose(data=tuple(data), vessel=vessel, scenario=scenario, velocity=velocity, seed=seed)
-    )
+    command = repeating(request)
     files: dict[str, Content] = {
         "diagnosis.json": diagnosis_json(found, roll),
         "diagnosis.html": partial(
-            diagnosis_html, found, command=command, version=__version__, roll=roll, progress=reported.part(drawing, 0.0)
+            diagnosis_html, found, command=command, roll=roll, progress=reported.part(drawing, 0.0)
         ),
         "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
     }
-    written = write_files(out or Path("runs") / data[0].stem, files)
-    progress("done", 1.0)
     summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    return Outcome(files=written, document=document_of(summary, _tables(found), diagnosis_notes(found)))
+    document = document_of(summary, _tables(found), diagnosis_notes(found))
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
 def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from expdesign import requests
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.durations import DurationProblem, build_fused, efficiencies, solve_durations
 from expdesign.errors import InputError, NotInformative
@@ -17,11 +17,11 @@ from expdesign.export.files import strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_summary, design_tables, designed
 from expdesign.workflows.steps.scored import growth_files, growth_summary, growth_tables, parameters_of, ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 # The duration problem of a scenario from covariances of simulated trials, (7.59)-(7.63).
 
@@ -129,30 +129,21 @@ def _largest_bias(item: Alone) -> str:
     return f"{share[worst]:.2f} ({item.parameters[worst]})"
 
 
-def durations(
-    scenario: Path,
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    grow: bool = False,
-    monte_carlo: int = 0,
-    jobs: int = 0,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def durations(request: requests.Durations, *, progress: Progress = silent) -> Outcome:
     """How long to run each primitive, with its certificate; with `grow` also of manoeuvres found to add most.
 
     With `monte_carlo` trials of each primitive alone, shares are by the fused covariance of its estimates instead.
     `vessel` stands in for the vessel file that the scenario names.
     """
-    case = loaded(scenario, progress, vessel=vessel)
-    if monte_carlo:
-        if grow or case.design.grow is not None:
+    case = loaded(request.scenario, progress, vessel=request.vessel)
+    if request.monte_carlo:
+        if request.grow or case.design.grow is not None:
             raise InputError("--monte-carlo takes the dictionary as it is, expected neither --grow nor [design.grow]")
-        with workers(jobs, load=None):
-            return _from_covariances(case, out, monte_carlo, seed, progress)
-    information, growth = ready(case, grow=grow, seed=seed, progress=within(progress, 0.05, 0.6))
-    design = designed(case, information, seed=seed, progress=within(progress, 0.6, 0.9))
+        with shared(request, load=None):
+            return _from_covariances(request, case, progress)
+    information, growth = ready(case, grow=request.grow, seed=request.seed, progress=within(progress, 0.05, 0.6))
+    design = designed(case, information, seed=request.seed, progress=within(progress, 0.6, 0.9))
     progress("comparing criteria", 0.9)
     compared = efficiencies(design)
     files = {
@@ -161,12 +152,13 @@ def durations(
     }
     summary = {**growth_summary(growth, case), **design_summary(design)}
     tables = (*growth_tables(growth), *design_tables(design, compared))
-    return written(case, out, files, noted(case, document_of(summary, tables)), progress)
+    return written(request, case, files, noted(case, document_of(summary, tables)), progress)
 
 
-def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, progress: Progress) -> Outcome:
+def _from_covariances(request: requests.Durations, case: Scenario, progress: Progress) -> Outcome:
+    trials = request.monte_carlo
     primitives = build_dictionary(case.vessel, case.dictionary)
-    tried = tried_alone(case, primitives, trials=trials, seed=seed, progress=within(progress, 0.05, 0.9))
+    tried = tried_alone(case, primitives, trials=trials, seed=request.seed, progress=within(progress, 0.05, 0.9))
     design = solve_durations(fused_problem(case, tried))
     compared = efficiencies(design)
     files = {"durations.json": durations_json(design, compared=compared), "covariances.json": covariances_json(tried)}
@@ -176,4 +168,4 @@ def _from_covariances(case: Scenario, out: Path | None, trials: int, seed: int, 
         **design_summary(design),
     }
     document = document_of(summary, (covariance_table(tried), *design_tables(design, compared)))
-    return written(case, out, files, noted(case, document), progress)
+    return written(request, case, files, noted(case, document), progress)

@@ -3,50 +3,38 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
-from pathlib import Path
 
+from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export import FORMATS, build_bridge_route, build_route, find_format, route_files, write_files
+from expdesign.export import build_bridge_route, build_route, find_format, route_files, write_files
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.routes import ROUTE_NAME, read_plan
 from expdesign.progress import Progress, silent
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 
 # `expdesign export`: route files of a plan made before.
 
 
-def export(
-    plan: Path,
-    out: Path | None,
-    *,
-    formats: Sequence[str],
-    departure: str | None = None,
-    tolerance_m: float | None = None,
-    fine: bool = False,
-    name: str | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def export(request: requests.Export, *, progress: Progress = silent) -> Outcome:
     """Route files of a plan made before, into `out` or beside it; with times where a departure is given.
 
     The route and its files are called `name`, or "route". The route has few legs, or follows the track in every turn
     where `fine` or a tolerance is given.
     """
-    if not formats:
-        raise InputError(f"no route format is named; there are {', '.join(item.name for item in FORMATS)}")
-    for known in formats:
+    for known in request.formats:
         find_format(known)
-    called = _name(name)
+    called = _name(request.name)
     progress("reading the plan", 0.1)
-    track, starts = read_plan(plan), _departure(departure)
-    if fine or tolerance_m is not None:
-        route = build_route(track, departure=starts, tolerance_m=tolerance_m)
+    track, starts = read_plan(request.plan), _departure(request.departure)
+    if request.fine or request.tolerance_m is not None:
+        route = build_route(track, departure=starts, tolerance_m=request.tolerance_m)
     else:
         route = build_bridge_route(track, departure=starts)
     route = replace(route, name=called)
-    files = write_files(out or plan.parent, route_files(route, tuple(dict.fromkeys(formats))))
+    files = write_files(request.out or request.plan.parent, route_files(route, tuple(dict.fromkeys(request.formats))))
     summary = {
         "waypoints": len(route.waypoints),
         "length_m": route.length_m,
@@ -77,16 +65,17 @@ def _departure(text: str | None) -> datetime | None:
 # `expdesign check-route`: route files of any origin checked.
 
 
-def check_routes(files: Sequence[Path], *, progress: Progress = silent) -> Outcome:
+@workflow
+def check_routes(request: requests.CheckRoute, *, progress: Progress = silent) -> Outcome:
     """Whether RTZ and GPX files are fit to be loaded.
 
     Raises:
         FileError: the first problem of the first file that has one, and how many more there are.
     """
-    for number, path in enumerate(files):
-        progress(f"checking {path.name}", number / len(files))
+    for number, path in enumerate(request.files):
+        progress(f"checking {path.name}", number / len(request.files))
         problems = check_route_file(path)
         if problems:
             more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
             raise FileError(path, "", problems[0] + more)
-    return Outcome(files=(), document=document_of({"files": len(files), "problems": 0}))
+    return Outcome(files=(), document=document_of({"files": len(request.files), "problems": 0}))

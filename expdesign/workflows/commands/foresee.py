@@ -3,116 +3,83 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
 from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
 from expdesign.export.operation_page import OperationContent, operation_document, operation_json
-from expdesign.export.pages import document_html
 from expdesign.export.routes import read_plan
 from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
 from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
-from expdesign.requests import command_text
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 OF_DESIGN = "the runs of the design, without the legs between them"
 OF_ACCURACY = "the durations that state the accuracy, not the day: --plan foresees that"
 OF_PLAN = "the planned trial, its legs counted"
 
 
-def foresee(
-    scenario: Path,
-    out: Path | None,
-    *,
-    plan: Path | None = None,
-    operation: int | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
-    """The probability that a diagnosis of the trial would find each cause, into `out` or runs/<scenario>.
-
-    Args:
-        scenario: the scenario file.
-        out: folder.
-        plan: a plan.json whose track is diagnosed; the runs of the design alone when None.
-        operation: number of simulated voyages of each change, to foresee what a watch over the ship in operation finds
-            instead.
-        seed: of sensor noise, weather and the tests' null distribution.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
-    """
-    if operation is not None:
-        if plan is not None:
+@workflow
+def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcome:
+    """The probability that a diagnosis of the trial would find each cause, into `out` or runs/<scenario>."""
+    if request.operation is not None:
+        if request.plan is not None:
             raise InputError("--plan and --operation are given, expected one of them")
-        return _operation(scenario, out, operation, seed=seed, jobs=jobs, cache=cache, progress=progress)
-    case = loaded(scenario, progress)
-    words = command_text(requests.Foresee(scenario=scenario, plan=plan, seed=seed))
-    with workers(jobs, load=None, cache=cache):
-        information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.15))
+        return _operation(request, request.operation, progress)
+    case = loaded(request.scenario, progress)
+    with shared(request, load=None):
+        information, _ = ready(case, seed=request.seed, progress=within(progress, 0.02, 0.15))
         offers = [item.primitive for item in information]
-        runs, weather = _trial(case, information, plan, seed, within(progress, 0.15, 0.2))
+        runs, weather = _trial(case, information, request.plan, request.seed, within(progress, 0.15, 0.2))
         found = foresee_trial(
             case.vessel,
             runs,
             weather,
             offers=offers,
             sizes=case.design.reveal_sizes,
-            seed=seed,
+            seed=request.seed,
             progress=within(progress, 0.2, 0.95),
         )
     content = ForesightContent(
         scenario=case.name,
         vessel=case.vessel.name,
-        source=OF_PLAN if plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN,
+        source=OF_PLAN if request.plan else OF_ACCURACY if case.design.accuracy else OF_DESIGN,
         found=found,
-        command=words,
-        version=__version__,
     )
     progress("writing the page", 0.95)
     document = noted(case, foresight_document(content))
     files: dict[str, Content] = {
         "foresee.json": foresight_json(content),
-        "foresee.html": partial(document_html, document),
     }
-    return written(case, out, files, document, progress)
+    return written(request, case, files, document, progress, page="foresee.html")
 
 
-def _operation(
-    scenario: Path, out: Path | None, voyages: int, *, seed: int, jobs: int, cache: bool, progress: Progress
-) -> Outcome:
+def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> Outcome:
     """What a watch over the scenario's ship in its weather would find."""
-    case = loaded(scenario, progress)
-    with workers(jobs, load=None, cache=cache):
+    case = loaded(request.scenario, progress)
+    with shared(request, load=None):
         found = foresee_operation(
-            case.vessel, case.environment, voyages=voyages, seed=seed, progress=within(progress, 0.02, 0.97)
+            case.vessel, case.environment, voyages=voyages, seed=request.seed, progress=within(progress, 0.02, 0.97)
         )
     content = OperationContent(
         scenario=case.name,
         vessel=case.vessel.name,
         found=found,
-        command=command_text(requests.Foresee(scenario=scenario, operation=voyages, seed=seed)),
-        version=__version__,
     )
     document = noted(case, operation_document(content))
     files: dict[str, Content] = {
         "operation.json": operation_json(content),
-        "operation.html": partial(document_html, document),
     }
-    return written(case, out, files, document, progress)
+    return written(request, case, files, document, progress, page="operation.html")
 
 
 def _trial(

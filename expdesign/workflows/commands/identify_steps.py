@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export import Content, vessel_toml, write_files
-from expdesign.export.pages import document_html
+from expdesign.export import Content, vessel_toml
 from expdesign.export.step_trial_content import StepTrialContent, Validated, step_model_json
 from expdesign.export.step_trial_page import step_trial_document
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.signals import Record
 from expdesign.step_trials import (
     Sailed,
@@ -29,7 +27,7 @@ from expdesign.step_trials import (
 )
 from expdesign.step_trials import identify_steps as identified
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -37,48 +35,26 @@ SIMULATED_STEP_S = 0.5
 """Least time between samples of a simulation that is compared with data [s]."""
 
 
-def identify_steps(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    throttle: Sequence[str] = (),
-    rudder: Sequence[str] = (),
-    tests: Sequence[Path] = (),
-    steps: Path | None = None,
-    velocity: str = "auto",
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def identify_steps(request: requests.IdentifySteps, *, progress: Progress = silent) -> Outcome:
     """Model and nominal vessel from steps, into `out` or runs/<first data file>.
-
-    Args:
-        data: CSV files, or folders of them.
-        out: folder, or None.
-        vessel: what was known before, which the steps update; None for the model of two degrees of freedom alone.
-        throttle, rudder: names of signals; found by their kinds when empty.
-        tests: files that are simulated only.
-        steps: list of those that were to be sailed, see `listed_steps`; others are not asked to be repeated.
-        velocity: source of the velocities, as in `estimate`.
-        seed: of the calibration of the test for steady state.
-        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the data are no step trial, or tell too little.
     """
-    for path in tests:
-        if path in data:
+    for path in request.tests:
+        if path in request.data:
             raise InputError(f"{path} is given to identify and to test, expected only one of them")
     progress("reading the data", 0.0)
-    ship, told = (None, ()) if vessel is None else equipped(vessel, data)
-    record = _record(data, ship, velocity)
+    ship, told = (None, ()) if request.vessel is None else equipped(request.vessel, request.data)
+    record = _record(request.data, ship, request.velocity)
     names = record.batches[0].input_names
-    controls = controls_of(names, throttle, rudder)
-    listed = None if steps is None else listed_steps(steps, names, controls, ship)
-    apart = _record(tests, ship, velocity).batches if tests else ()
+    controls = controls_of(names, request.throttle, request.rudder)
+    listed = None if request.steps is None else listed_steps(request.steps, names, controls, ship)
+    apart = _record(request.tests, ship, request.velocity).batches if request.tests else ()
     progress("finding steady states and fitting responses", 0.1)
-    trial = identified(record, controls, seed=seed, progress=within(progress, 0.1, 0.7))
+    trial = identified(record, controls, seed=request.seed, progress=within(progress, 0.1, 0.7))
     content = StepTrialContent(
         trial=trial,
         listed=listed,
@@ -87,31 +63,16 @@ def identify_steps(
         own=tuple(_validated(trial, batch) for batch in trial.batches),
         tests=tuple(_validated(trial, _turned(sailed(batch, controls), trial)) for batch in apart),
         notes=(*told, *record.notes),
-        command=command_text(
-            requests.IdentifySteps(
-                data=tuple(data),
-                vessel=vessel,
-                throttle=tuple(throttle),
-                rudder=tuple(rudder),
-                tests=tuple(tests),
-                steps=steps,
-                velocity=velocity,
-                seed=seed,
-            )
-        ),
-        version=__version__,
+        command=repeating(request),
     )
     progress("drawing the page", 0.9)
     document = step_trial_document(content)
     files: dict[str, Content] = {
         "step-model.json": step_model_json(content),
-        "step-trial.html": partial(document_html, document),
     }
     if content.nominal is not None:
         files["vessel-steps.toml"] = vessel_toml(content.nominal, comments=_comments(content))
-    written = write_files(out or Path("runs") / data[0].stem, files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="step-trial.html")
 
 
 def _record(data: Sequence[Path], ship: Vessel | None, velocity: str) -> Record:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -12,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.conventions import OUTPUTS, whole_turns
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content, read_plan, write_files
@@ -61,12 +60,12 @@ from expdesign.importing.mapping import Mapping as Decisions
 from expdesign.kinematics import checked
 from expdesign.progress import Progress, silent, within
 from expdesign.records import load_records
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.scenario import INSTRUMENTS, load_mapping, load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.values import closed
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, workflow
 
 TRUSTED = (GNSS, COMPUTER, OWN, NONE)
 MOST_COMPARED = 200_000
@@ -85,66 +84,45 @@ OF_FRAMES = ("north_m and east_m are metres from",)
 FIRST = ("time_s", "lat_deg", "lon_deg", "north_m", "east_m", "heading_rad", "u_mps", "v_mps", "r_radps")
 
 
-def import_logs(
-    logs: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    plan: Path | None = None,
-    map_file: Path | None = None,
-    sample_time_s: float | None = None,
-    length_m: float | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def import_logs(request: requests.Import, *, progress: Progress = silent) -> Outcome:
     """Runs as CSV files, the mapping, and a page, into `out` or runs/<first log>-runs.
-
-    Args:
-        logs: files of one trial or voyage, in any formats; folders of ROS 2 bags.
-        out: folder, or None.
-        vessel: whose thrusters the channels are numbered after, and whose model the ship's answers are held against.
-        plan: plan.json, whose runs are cut out by their names.
-        map_file: of an earlier import, edited.
-        sample_time_s: between rows that are written [s]; None for what the mapping says.
-        length_m: of the ship [m]; None for what vessel file or mapping say, or for what her speed suggests.
-        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the logs hold nothing that makes a record.
     """
-    names = [path.name for path in logs]
+    names = [path.name for path in request.logs]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise InputError(f"two logs are named {twice}, expected names that differ, as the mapping calls logs by them")
-    for option, value in (("--sample-time", sample_time_s), ("--length-m", length_m)):
-        if value is not None and not 0 < value < math.inf:
-            raise InputError(f"{option} is {value:g}, expected more than 0")
-    ship = None if vessel is None else load_vessel(vessel)
-    given = None if map_file is None else load_mapping(map_file)
-    track = None if plan is None else read_plan(plan)
+    ship = None if request.vessel is None else load_vessel(request.vessel)
+    given = None if request.map_file is None else load_mapping(request.map_file)
+    track = None if request.plan is None else read_plan(request.plan)
     rates = {} if given is None else {clock.file: clock.sample_time_s for clock in given.files}
     read: list[Log] = []
-    for k, path in enumerate(logs):
-        progress(f"reading {path.name}", 0.6 * k / len(logs))
+    for k, path in enumerate(request.logs):
+        progress(f"reading {path.name}", 0.6 * k / len(request.logs))
         beside = sum(log.size for log in read)
         read.append(read_log(path, sample_time_s=rates.get(path.name, 0.0), beside=beside))
     read = joined(read, apart=rates)
-    mapping = guess(read, () if ship is None else ship.actuators) if given is None else _checked(given, read, map_file)
+    mapping = (
+        guess(read, () if ship is None else ship.actuators)
+        if given is None
+        else _checked(given, read, request.map_file)
+    )
     mapping = replace(
         mapping,
-        sample_time_s=sample_time_s or mapping.sample_time_s,
-        length_m=length_m or mapping.length_m or (ship.length_m if ship is not None else 0.0),
+        sample_time_s=request.sample_time_s or mapping.sample_time_s,
+        length_m=request.length_m or mapping.length_m or (ship.length_m if ship is not None else 0.0),
     )
-    folder = out or Path("runs") / f"{logs[0].stem}-runs"
+    folder = request.out or Path("runs") / f"{request.logs[0].stem}-runs"
     notes = [f"{log.source}: {note}" for log in read for note in log.notes]
     used = {use.file for use in mapping.uses if use.column}
     notes += [
         f"{log.source}: nothing of it is used: its channels are none that are read, or those of other logs"
         for log in read if log.channels and log.source not in used
     ]  # fmt: skip
-    command = command_text(requests.Import(
-        logs=tuple(logs), vessel=vessel, plan=plan, map_file=map_file, sample_time_s=sample_time_s, length_m=length_m,
-        out=out,
-    ))  # fmt: skip
+    command = repeating(request, keep={"out"})
     try:
         columns = _columns(read, mapping)
         read = [log.without_readings() for log in read]
@@ -178,7 +156,7 @@ def import_logs(
             logs=tuple(read), mapping=mapping, sampled=found, runs=tuple(kept), files=tuple(tables),
             rejected=tuple(rejected), followed=answers, sensors=sensors, notes=tuple(notes),
             origin_s=_origin_s(found), dated=any(log.clock in (GNSS, COMPUTER) for log in read), command=command,
-            version=__version__, vessel=str(vessel or "VESSEL.toml"),
+            vessel=str(request.vessel or "VESSEL.toml"),
         )  # fmt: skip
         progress("writing", 0.95)
         document = import_document(content, folder)

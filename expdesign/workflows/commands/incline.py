@@ -3,65 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from expdesign import requests
 from expdesign.errors import FileError, NoAnswer
-from expdesign.export import write_files
 from expdesign.export.document import Table
 from expdesign.export.files import finite, strict_json
 from expdesign.loading import Inclining, heel_in_waves, inclining
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.vessel import RollPendulum
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 
 HEADER = ("mass [kg]", "shift [m]", "heel [deg]", "std of GM [m]", "std of GM [%]", "std of inertia [%]")
 
 
-def incline(
-    vessel: Path,
-    out: Path | None,
-    *,
-    mass_kg: Sequence[float],
-    shift_m: Sequence[float],
-    heel_std_deg: float = 0.02,
-    period_std_s: float | None = None,
-    shifts: int = 4,
-    read_s: float = 60.0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def incline(request: requests.Incline, *, progress: Progress = silent) -> Outcome:
     """A row for every mass and shift, into incline.json in `out` or runs/<vessel>-incline.
-
-    Args:
-        vessel: file with [roll]; what is on board by [roll.load] counts as part of the ship.
-        out: folder, or None.
-        mass_kg: of weights that are on board, and are shifted.
-        shift_m: across the ship.
-        heel_std_deg: of one reading of the change of heel, in still water; waves of the file come on top.
-        period_std_s: of the roll period of a decay; None without one.
-        shifts: readings.
-        read_s: time over which each reading of heel is averaged, which counts in waves.
-        progress: of the command.
 
     Raises:
         InputError: the file has no [roll], or a number is not positive.
         NoAnswer: the ship does not stay upright.
     """
-    ship = load_vessel(vessel)
+    ship = load_vessel(request.vessel)
     pendulum = ship.pendulum
     if pendulum is None:
-        raise FileError(vessel, "roll", "is missing, expected a table [roll] with masses and heights")
+        raise FileError(request.vessel, "roll", "is missing, expected a table [roll] with masses and heights")
     if not pendulum.righting_nm > 0:
         raise NoAnswer(
             f"{ship.name} does not stay upright: her metacentric height is {pendulum.metacentric_height_m:.3g} m"
         )
-    pairs = [(mass, shift) for mass in mass_kg for shift in shift_m]
-    rolling, left = (math.degrees(one) for one in heel_in_waves(pendulum, read_s))
+    pairs = [(mass, shift) for mass in request.mass_kg for shift in request.shift_m]
+    rolling, left = (math.degrees(one) for one in heel_in_waves(pendulum, request.read_s))
     left *= math.sqrt(2.0)  # a change of heel is that of two readings
-    heel_in_all_deg = math.hypot(heel_std_deg, left) if heel_std_deg > 0 else heel_std_deg
-    found = [_tested(pendulum, pair, heel_in_all_deg, period_std_s, shifts) for pair in pairs]
+    heel_in_all_deg = math.hypot(request.heel_std_deg, left) if request.heel_std_deg > 0 else request.heel_std_deg
+    found = [_tested(pendulum, pair, heel_in_all_deg, request.period_std_s, request.shifts) for pair in pairs]
     rows = [
         {"mass_kg": mass, "shift_m": shift, **{name: finite(value) for name, value in asdict(one).items()}}
         for (mass, shift), one in zip(pairs, found, strict=True)
@@ -72,16 +50,17 @@ def incline(
         "period_s": pendulum.period_s,
     }
     if pendulum.waves is not None:
-        summary |= {"roll_in_waves_deg": rolling, "left_of_waves_deg": left, "read_s": read_s}
-    told = () if pendulum.waves is None else _in_waves(rolling, left, read_s, heel_std_deg, period_std_s)
-    files = write_files(
-        out or Path("runs") / f"{ship.name}-incline",
-        {"incline.json": strict_json({**summary, "tests": rows, "remarks": list(told)})},
+        summary |= {"roll_in_waves_deg": rolling, "left_of_waves_deg": left, "read_s": request.read_s}
+    told = (
+        ()
+        if pendulum.waves is None
+        else _in_waves(rolling, left, request.read_s, request.heel_std_deg, request.period_std_s)
     )
-    progress("done", 1.0)
+    files = {"incline.json": strict_json({**summary, "tests": rows, "remarks": list(told)})}
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     tests = Table(title="Inclining tests", header=HEADER, rows=tuple(table))
-    return Outcome(files=files, document=document_of({**summary, "remarks": told}, (tests,)))
+    document = document_of({**summary, "remarks": told}, (tests,))
+    return finished(request, Path("runs") / f"{ship.name}-incline", files, document, progress)
 
 
 def _in_waves(

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export import Content, write_files
+from expdesign.export import Content
 from expdesign.export.document import Table
 from expdesign.export.indices_form import Held, IndicesContent, indices_json, verdict_rows, zigzag_rows
 from expdesign.export.indices_page import indices_html
@@ -16,66 +16,47 @@ from expdesign.indices import NotStandard, StandardResults, measured_trial, stan
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped, measured
 
 HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
 
 
-def indices(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path,
-    speed_mps: float | None = None,
-    scale: float = 1.0,
-    antenna_forward_m: float = 0.0,
-    depth_m: float | None = None,
-    wind_mps: float | None = None,
-    sea_state: int | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcome:
     """Turning, zig-zag and stopping indices with the limits of MSC.137(76), into `out` or runs/<vessel>-indices.
 
     Depth of the water, mean true wind and sea state are those of the measured trials, for the form.
     """
-    held = Held(depth_m=depth_m, wind_mps=wind_mps, sea_state=sea_state)
-    if not scale >= 1:
-        raise InputError(f"--scale is {scale:g}, expected ship length by model length, 1 or more")
+    held = Held(depth_m=request.depth_m, wind_mps=request.wind_mps, sea_state=request.sea_state)
+    if not request.scale >= 1:
+        raise InputError(f"--scale is {request.scale:g}, expected ship length by model length, 1 or more")
     progress("reading the vessel", 0.0)
-    ship, told = equipped(vessel, data)
-    _check_place(ship, antenna_forward_m)
-    seen, notes = _measured(data, ship, antenna_forward_m, progress)
+    ship, told = equipped(request.vessel, request.data)
+    _check_place(ship, request.antenna_forward_m)
+    seen, notes = _measured(request.data, ship, request.antenna_forward_m, progress)
     progress("simulating the model's standard trials", 0.6)
-    found, why_not = _simulated(ship, speed_mps, needed=not data)
+    found, why_not = _simulated(ship, request.speed_mps, needed=not request.data)
     content = IndicesContent(
         vessel=ship,
-        scale=scale,
+        scale=request.scale,
         simulated=found,
         simulated_why_not=why_not,
         measured=seen,
         notes=(*told, *notes),
-        command=command_text(
-            requests.Indices(
-                data=tuple(data),
-                vessel=vessel,
-                speed_mps=speed_mps,
-                scale=scale,
-                antenna_forward_m=antenna_forward_m,
-                depth_m=depth_m,
-                wind_mps=wind_mps,
-                sea_state=sea_state,
-            )
-        ),
-        version=__version__,
+        command=repeating(request),
         held=held,
     )
     files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
-    written = write_files(out or Path("runs") / f"{vessel.stem}-indices", files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes_in_words))
+    return finished(
+        request,
+        Path("runs") / f"{request.vessel.stem}-indices",
+        files,
+        document_of(_summary(content), _tables(content), content.notes_in_words),
+        progress,
+    )
 
 
 def _check_place(ship: Vessel, forward_m: float) -> None:

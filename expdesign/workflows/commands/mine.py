@@ -13,19 +13,17 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
 from expdesign.errors import InputError, NotInformative
-from expdesign.export import write_files
 from expdesign.export.document import Table
 from expdesign.export.files import record_csv
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, recorded_information
 from expdesign.progress import Progress, silent, within
 from expdesign.reduction import at_reference_point
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 from expdesign.workflows.steps.labelled import (
-    Asked,
     labelled_design,
     labelled_files,
     labelled_summary,
@@ -35,95 +33,60 @@ from expdesign.workflows.steps.labelled import (
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
 
-def mine(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path,
-    keep: int,
-    piece_s: float | None = None,
-    fixed: Sequence[str] = (),
-    mean: str = "complete",
-    velocity: str = "auto",
-    labels: str | None = None,
-    draws: int = 500,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def mine(request: requests.Mine, *, progress: Progress = silent) -> Outcome:
     """The `keep` batches with the most information together, into `out` or runs/<first data file>.
 
     With labels, the data are cut into pieces of one label each; time is shared out among the labels, and draws of that
     design are compared with random subsets of as many pieces.
 
-    Args:
-        data: CSV files, or folders of them; a gap starts a new batch.
-        out: folder, or None.
-        vessel: nominal model, which simulates the instruments.
-        keep: how many batches to choose.
-        piece_s: cut batches into pieces of about this length [s].
-        fixed: parameters held at the vessel's values.
-        mean: mean subtraction of the estimator that will follow.
-        velocity: source of the velocities, as in `estimate`.
-        labels: where labels are, one of `records.LABEL_SOURCES`; None for a choice of batches.
-        draws: of each design that is compared, with labels.
-        seed: of the draws.
-        progress: of the command.
-
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the data do not inform about every parameter, or the nominal model is unstable.
     """
-    if mean not in MEAN_SUBTRACTIONS:
-        raise InputError(f"--mean is {mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
+    if request.mean not in MEAN_SUBTRACTIONS:
+        raise InputError(f"--mean is {request.mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
     progress("reading the data", 0.02)
-    (ship, told), paths = equipped(vessel, data), data_files(data)
-    command = command_text(requests.Mine(
-        data=tuple(data), vessel=vessel, keep=keep, piece_s=piece_s, fixed=tuple(fixed), mean=mean, velocity=velocity,
-        labels=labels, draws=draws, seed=seed,
-    ))  # fmt: skip
-    folder = out or Path("runs") / data[0].stem
-    if labels is not None:
-        asked = Asked(labels=labels, piece_s=_stated(piece_s), keep=keep, draws=draws, mean=mean, seed=seed)
-        record = reduced_data(paths, ship, velocity=velocity, told=told)
+    (ship, told), paths = equipped(request.vessel, request.data), data_files(request.data)
+    if request.labels is not None:
+        if request.piece_s is None:
+            raise InputError("--labels needs --piece, the length of a piece in seconds")
+        if request.mean == "batch":
+            raise InputError("--mean is batch, expected complete or none with --labels")
+        record = reduced_data(paths, ship, velocity=request.velocity, told=told)
         with doubted(record):
-            return _designed(record, paths, folder, ship.model, fixed, asked, command, within(progress, 0.1, 1.0))
-    record = in_pieces(measured(paths, ship, velocity=velocity, told=told), piece_s)
+            return _designed(request, request.piece_s, record, paths, ship.model, within(progress, 0.1, 1.0))
+    record = in_pieces(measured(paths, ship, velocity=request.velocity, told=told), request.piece_s)
     with doubted(record):
-        return _mined(record, folder, ship, fixed, keep, mean, velocity, command, progress)
+        return _mined(request, record, ship, progress)
 
 
-def _mined(
-    record: Record,
-    folder: Path,
-    ship: Vessel,
-    fixed: Sequence[str],
-    keep: int,
-    mean: str,
-    velocity: str,
-    command: str,
-    progress: Progress,
-) -> Outcome:
+def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progress) -> Outcome:
     """A choice of batches, written."""
     windy = all(batch.wind is not None for batch in record.batches)
-    names, unseen = _parameters(ship.model, fixed, windy=windy)
+    names, unseen = _parameters(ship.model, request.fixed, windy=windy)
     progress("simulating the runs", 0.2)
-    seen = at_reference_point(record, ship.sensors, smoothed=velocity == "smoothed")
+    seen = at_reference_point(record, ship.sensors, smoothed=request.velocity == "smoothed")
     batches = recorded_information(seen, ship.model, names, predictor="basic-wind" if windy else "basic")
     _need_every_parameter(batches, names)
     progress("choosing among them", 0.6)
-    subset = best_subset(batches, names, size=keep, mean_subtraction=mean)
+    subset = best_subset(batches, names, size=request.keep, mean_subtraction=request.mean)
     chosen = [batch for batch in record.batches if batch.name in subset.chosen]
     content = {
-        **_content(subset, batches, names, unseen, mean=mean, command=command),
+        **_content(subset, batches, names, unseen, mean=request.mean, command=repeating(request)),
         "notes": list(record.notes),
     }
     files = {
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "chosen.csv": record_csv(chosen),
     }
-    written = write_files(folder, files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document_of(_summary(content), (_table(subset, batches),), record.notes))
+    return finished(
+        request,
+        Path("runs") / request.data[0].stem,
+        files,
+        document_of(_summary(content), (_table(subset, batches),), record.notes),
+        progress,
+    )
 
 
 SYMMETRIC = "symmetric part of the information"
@@ -131,38 +94,30 @@ MAGNITUDE = "magnitude of the determinant: with this nominal model the symmetric
 MAY_FALL = "that of more batches may be less, and that of some more than 100 %: it is the magnitude of a determinant"
 
 
-def _stated(piece_s: float | None) -> float:
-    if piece_s is None:
-        raise InputError("--labels needs --piece, the length of a piece in seconds")
-    return piece_s
-
-
 def _designed(
+    request: requests.Mine,
+    piece_s: float,
     record: Record,
     paths: Sequence[Path],
-    folder: Path,
     model: VesselModel,
-    fixed: Sequence[str],
-    asked: Asked,
-    command: str,
     progress: Progress,
 ) -> Outcome:
     """A design from labelled data, written."""
     windy = all(batch.wind is not None for batch in record.batches)
-    names, _ = _parameters(model, fixed, windy=windy)
+    names, _ = _parameters(model, request.fixed, windy=windy)
     found = labelled_design(
         record,
         paths,
         model,
         parameters=names,
         predictor="basic-wind" if windy else "basic",
-        asked=asked,
+        asked=request,
+        piece_s=piece_s,
         progress=progress,
     )
-    written = write_files(folder, labelled_files(found, names, model.outputs, command))
-    progress("done", 1.0)
-    tables = labelled_tables(found, model.outputs)
-    return Outcome(files=written, document=document_of(labelled_summary(found), tables, record.notes))
+    files = labelled_files(found, names, model.outputs, repeating(request))
+    document = document_of(labelled_summary(found), labelled_tables(found, model.outputs), record.notes)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
 def in_pieces(record: Record, piece_s: float | None) -> Record:

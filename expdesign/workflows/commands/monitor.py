@@ -19,7 +19,6 @@ from expdesign.export.monitor_page import Moment, MonitorContent, budget_entries
 from expdesign.export.pages import document_html
 from expdesign.export.words import counted
 from expdesign.monitoring import (
-    TUNING,
     RollWatch,
     restored_alarm,
     restored_calibration,
@@ -32,10 +31,10 @@ from expdesign.monitoring import (
 from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
-from expdesign.requests import command_text
-from expdesign.workflows.outcome import Outcome
+from expdesign.requests import repeating
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
-from expdesign.workflows.steps.watched_ship import VESSEL, Asked, Late, Read, check_model, prepared
+from expdesign.workflows.steps.watched_ship import Asked, Late, Read, check_model, prepared
 from expdesign.workflows.steps.watching import (
     HOUR,
     Learning,
@@ -50,7 +49,7 @@ from expdesign.workflows.steps.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 
 def restored_watch(table: Mapping[str, Any]) -> Watch:
@@ -115,76 +114,33 @@ WRITTEN_EVERY_S = 20.0
 """Time between writing files, from which a watch that is ended by force goes on [s]."""
 
 
-def monitor(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    vessel: Path,
-    reference: Sequence[Path] = (),
-    learn_h: float = 24.0,
-    false_alarm_days: float = 30.0,
-    size: float = TUNING.relative_size,
-    every_s: float = 3600.0,
-    port_h: float = 1.0,
-    velocity: str = "auto",
-    model: str = VESSEL,
-    resume: bool = False,
-    jobs: int = 1,
-    progress: Progress = silent,
-) -> Outcome:
-    """Watch a ship in operation, into `out` or runs/<first data file>.
-
-    Args:
-        data: CSV files in the order of time, or `STREAM` for the standard input.
-        out: folder, or None.
-        vessel: the model.
-        reference: files of a period in which the ship was as known; without them the first `learn_h` hours of the data.
-        learn_h: see there [h].
-        false_alarm_days: average time between false alarms [d].
-        size: relative change of parameters, thrust and inertia that matters.
-        every_s: of a stream, time between looks at it [s].
-        port_h: time without way and propulsion, or without data, after which the ship may carry another load [h];
-            infinite for a ship that never does.
-        velocity: where velocities come from, as in `estimate`.
-        model: vessel, the vessel file's, or yaw-full or yaw-simplified, learnt from the reference.
-        resume: go on from the state in `out`.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        progress: of the command.
-    """
-    numbers = {"--learn-h": learn_h, "--false-alarm-days": false_alarm_days, "--every-s": every_s}
-    _check(data, reference, numbers, size, resume=resume)
-    check_model(model)
-    if not port_h > 0:
-        raise InputError(f"--port-h is {port_h:g}, expected more than 0; inf for a ship whose load never changes")
-    folder = out or Path("runs") / (Path(data[0]).stem if data[0] != STREAM else "monitor")
-    data, reference = data_files(data), data_files(reference)
-    ship, told = equipped(vessel, [source for source in (*reference, *data) if source != STREAM])
+@workflow
+def monitor(request: requests.Monitor, *, progress: Progress = silent) -> Outcome:
+    """Watch a ship in operation, into `out` or runs/<first data file>."""
+    _check(request)
+    folder = request.out or Path("runs") / (request.data[0].stem if request.data[0] != STREAM else "monitor")
+    data, reference = data_files(request.data), data_files(request.reference)
+    ship, told = equipped(request.vessel, [source for source in (*reference, *data) if source != STREAM])
     asked = Asked(
-        vessel=ship, told=told, size=size, learn_s=HOUR * learn_h, false_alarm_days=false_alarm_days,
-        port_s=HOUR * port_h, velocity=velocity, model=model,
+        vessel=ship, told=told, size=request.size, learn_s=HOUR * request.learn_h, model=request.model,
+        false_alarm_days=request.false_alarm_days, port_s=HOUR * request.port_h, velocity=request.velocity,
     )  # fmt: skip
-    command = command_text(requests.Monitor(
-        data=tuple(data), vessel=vessel, reference=tuple(reference), learn_h=learn_h,
-        false_alarm_days=false_alarm_days, size=size, every_s=every_s, model=model, port_h=port_h, resume=resume,
-        velocity=velocity, out=out,
-    ))  # fmt: skip
-    now = _resumed(folder / STATE, asked) if resume else _with_reference(Watch(), reference, asked, progress)
+    command = repeating(request.but(data=tuple(data), reference=tuple(reference)), keep={"out"})
+    now = _resumed(folder / STATE, asked) if request.resume else _with_reference(Watch(), reference, asked, progress)
     work = _Work(asked=asked, folder=folder, command=command)
     for number, source in enumerate(data):
-        rows = max(1, round(every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
-        with workers(jobs, load=None):
+        rows = max(1, round(request.every_s / asked.vessel.sample_time_s)) if source == STREAM else MOST_ROWS
+        with shared(request, load=None):
             now = _through(now, source, rows, work, more_follow=number + 1 == len(data), progress=progress)
     if isinstance(now.phase, Learning):
         raise NotInformative(
-            f"the data end before the reference does, which takes {learn_h:g} h: give files of a reference "
+            f"the data end before the reference does, which takes {request.learn_h:g} h: give files of a reference "
             "(--reference) or a shorter one (--learn-h)"
         )
     if isinstance(now.phase, Ready):
         raise NotInformative("the data hold no stretch under way that can be simulated, so that nothing is judged")
     content = _content(now.phase, now, asked, command)
-    written = write_files(folder, _files(content, now, asked))
-    progress("done", 1.0)
-    return Outcome(files=written, document=monitor_document(content))
+    return finished(request, folder, _files(content, now, asked), monitor_document(content), progress)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,20 +182,18 @@ def _save(now: Watch, source: Path, work: _Work) -> None:
         write_files(work.folder, {STATE: _state(now, work.asked)})
 
 
-def _check(
-    data: Sequence[Path], reference: Sequence[Path], numbers: dict[str, float], size: float, *, resume: bool
-) -> None:
-    if not data:
-        raise InputError("no data files are given, expected one or more CSV files, or - for the standard input")
-    if STREAM in data and len(data) > 1:
+def _check(request: requests.Monitor) -> None:
+    if STREAM in request.data and len(request.data) > 1:
         raise InputError("- stands beside other data files, expected it alone")
-    if resume and reference:
+    if request.resume and request.reference:
         raise InputError("--resume and --reference are given, expected one: a state to go on from has its reference")
-    for name, value in numbers.items():
-        if not 0 < value < np.inf:
-            raise InputError(f"{name} is {value:g}, expected more than 0")
-    if not 0 < size < 1:
-        raise InputError(f"--size is {size:g}, expected a share between 0 and 1")
+    if not 0 < request.size < 1:
+        raise InputError(f"--size is {request.size:g}, expected a share between 0 and 1")
+    if not request.port_h > 0:
+        raise InputError(
+            f"--port-h is {request.port_h:g}, expected more than 0; inf for a ship whose load never changes"
+        )
+    check_model(request.model)
 
 
 def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progress: Progress) -> Watch:
@@ -277,7 +231,6 @@ def _content(phase: Watching, now: Watch, asked: Asked, command: str) -> Monitor
         unread_rows=now.reading.unread_rows,
         notes=(*asked.told, *now.reading.notes),
         command=command,
-        version=__version__,
         roll=None if asked.vessel.pendulum is None else now.roll,
     )
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
+from expdesign import requests
 from expdesign.errors import InputError, UnknownName
 from expdesign.export import write_files
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_scenario
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 
 TEMPLATES = files("expdesign") / "templates"
 KINDS = {
@@ -49,30 +49,26 @@ README = """\
 """
 
 
-def new(folder: Path, *, kind: str = "azimuth", progress: Progress = silent) -> Outcome:
+@workflow
+def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     """A folder with scenario, vessel, dictionary and area of a kind of ship, and a page that says what is where.
-
-    Args:
-        folder: where to; made, and its name becomes that of the scenario.
-        kind: a key of `KINDS`.
-        progress: of the command.
 
     Raises:
         UnknownName: no such kind.
         InputError: the folder exists.
     """
-    if kind not in KINDS:
-        raise UnknownName("kind of ship", kind, known=tuple(KINDS))
-    if folder.exists():
-        raise InputError(f"{folder} exists, expected the name of a folder to be made")
-    name = folder.resolve().name
-    texts = {item: _text(f"{kind}/{item}.toml") for item in ("scenario", "vessel", "dictionary")}
+    if request.kind not in KINDS:
+        raise UnknownName("kind of ship", request.kind, known=tuple(KINDS))
+    if request.folder.exists():
+        raise InputError(f"{request.folder} exists, expected the name of a folder to be made")
+    name = request.folder.resolve().name
+    texts = {item: _text(f"{request.kind}/{item}.toml") for item in ("scenario", "vessel", "dictionary")}
     lines = texts["scenario"].splitlines(keepends=True)
     renamed = [f"name = {json.dumps(name)}\n" if line.startswith("name = ") else line for line in lines]
     length_m = next(float(line.split()[2]) for line in texts["vessel"].splitlines() if line.startswith("length_m"))
-    ship = KINDS[kind]
+    ship = KINDS[request.kind]
     paths = write_files(
-        folder,
+        request.folder,
         {
             "scenario.toml": "".join(renamed),
             "vessel.toml": texts["vessel"],
@@ -82,10 +78,10 @@ def new(folder: Path, *, kind: str = "azimuth", progress: Progress = silent) -> 
             "README.md": README.format(name=name, ship=f"{ship[0].upper()}{ship[1:]}"),
         },
     )
-    load_scenario(folder / "scenario.toml")
+    load_scenario(request.folder / "scenario.toml")
     progress("done", 1.0)
-    then = f"expdesign run {folder / 'scenario.toml'}"
-    return Outcome(files=paths, document=document_of({"kind": kind, "ship": ship, "then": then}))
+    then = f"expdesign run {request.folder / 'scenario.toml'}"
+    return Outcome(files=paths, document=document_of({"kind": request.kind, "ship": ship, "then": then}))
 
 
 def _text(name: str) -> str:

@@ -2,61 +2,39 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from expdesign import requests
 from expdesign.durations import with_repeats
 from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, silent, within
-from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import Day, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import check_plannable, plan_files, plan_summary, planned
 from expdesign.workflows.steps.scored import ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 
-def plan(
-    scenario: Path,
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    durations: Path | None = None,
-    seed: int = 0,
-    jobs: int = 1,
-    scheduler: str | None = None,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
-    """One verified trajectory with the runs of a durations file, or of the optimal durations.
-
-    Args:
-        scenario: the scenario file.
-        out: folder.
-        vessel: a vessel file in place of the one that the scenario names.
-        durations: a durations.json made before.
-        seed: of everything drawn.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        scheduler: address of a Dask scheduler whose workers share the work instead.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
-    """
-    case = loaded(scenario, progress, vessel=vessel)
+@workflow
+def plan(request: requests.Plan, *, progress: Progress = silent) -> Outcome:
+    """One verified trajectory with the runs of a durations file, or of the optimal durations."""
+    case = loaded(request.scenario, progress, vessel=request.vessel)
     check_plannable(case)
-    words = command_text(requests.Plan(scenario=scenario, vessel=vessel, durations=durations, seed=seed))
-    with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
-        return _plan(case, out, durations, seed, progress)
+    with (
+        shared(request),
+        drafted(request, case),
+    ):
+        return _plan(request, case, progress)
 
 
-def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, progress: Progress) -> Outcome:
+def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome:
+    seed = request.seed
     information, _ = ready(case, seed=seed, progress=within(progress, 0.02, 0.1))
     design = designed(case, information, seed=seed)
     planning = within(progress, 0.1, 0.95)
-    if durations is not None:
-        design = with_repeats(design, load_repeats(durations, names=design.problem.names))
+    if request.durations is not None:
+        design = with_repeats(design, load_repeats(request.durations, names=design.problem.names))
         day = Day(
             information=information,
             design=design,
@@ -73,4 +51,4 @@ def _plan(case: Scenario, out: Path | None, durations: Path | None, seed: int, p
     )
     files = {**plan_files(case, day.plan, accuracy), **day_files(case, day)}
     document = document_of({**plan_summary(case, day.plan), **day_summary(day)}, day_tables(day))
-    return written(case, out, files, noted(case, document), progress)
+    return written(request, case, files, noted(case, document), progress)

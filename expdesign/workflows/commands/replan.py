@@ -15,7 +15,7 @@ import numpy as np
 from expdesign import requests
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
-from expdesign.export import vessel_toml, write_files
+from expdesign.export import vessel_toml
 from expdesign.export.document import Table
 from expdesign.export.files import Known, replan_json
 from expdesign.export.report.tables import AT_REST, motion
@@ -23,11 +23,11 @@ from expdesign.export.words import place
 from expdesign.information import PrimitiveInformation, estimated_parameters
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -35,42 +35,14 @@ from expdesign.workflows.steps.known import data_parts, expected_std, in_recorde
 from expdesign.workflows.steps.planned import built_route, plan_summary, report_content, trial_files
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
 from expdesign.workflows.steps.scored import growth_summary, ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 VESSEL_FILE = "vessel-used.toml"
 
 
-def replan(
-    scenario: Path,
-    out: Path | None,
-    *,
-    data: Sequence[Path],
-    vessel: Path | None = None,
-    remaining_s: float | None = None,
-    interest: Sequence[str] = (),
-    stopped: bool = False,
-    seed: int = 0,
-    jobs: int = 1,
-    scheduler: str | None = None,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def replan(request: requests.Replan, *, progress: Progress = silent) -> Outcome:
     """Plan the rest of a trial from the ship's present position, with the results of `run`.
-
-    Args:
-        scenario: of the whole trial; its start no longer counts.
-        out: folder, runs/<scenario> when None.
-        data: measured so far; the last row of the last file is where the ship is now.
-        vessel: the model to go on with, e.g. an extended one; estimated from the data when None.
-        remaining_s: informative time left; when None, as long as the scenario's accuracy takes beside the data, or
-            where none is stated, its time less that of the data.
-        interest: parameters that the rest is to be best for, by criterion D_s; the scenario's criterion when empty.
-        stopped: whether the ship stops at its present place before the rest begins.
-        seed: of all chance.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        scheduler: address of a Dask scheduler whose workers share the work instead.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
 
     Raises:
         InputError: something in the files is wrong, the ship is not in safe water, or no time is left.
@@ -78,29 +50,24 @@ def replan(
     """
     progress("reading scenario and data", 0.0)
     state = present_state(
-        scenario,
-        data,
-        vessel=vessel,
-        remaining_s=remaining_s,
-        stopped=stopped,
+        request.scenario,
+        request.data,
+        vessel=request.vessel,
+        remaining_s=request.remaining_s,
+        stopped=request.stopped,
         progress=within(progress, 0.0, 0.02),
     )
-    words = command_text(requests.Replan(
-        scenario=scenario, data=tuple(data), vessel=vessel, remaining_s=remaining_s, interest=tuple(interest),
-        stopped=stopped, seed=seed,
-    ))  # fmt: skip
     with (
-        workers(jobs, scheduler=scheduler, cache=cache),
-        drafted(replace(state.first, start=state.pose, vessel=state.ship), out, command=words),
+        shared(request),
+        drafted(request, replace(state.first, start=state.pose, vessel=state.ship)),
     ):
-        return _replanned(state, out, words, interest=interest, seed=seed, progress=progress)
+        return _replanned(state, request, progress)
 
 
-def _replanned(
-    state: PresentState, out: Path | None, words: str, *, interest: Sequence[str], seed: int, progress: Progress
-) -> Outcome:
-    """Plan the rest and write it; `words` are the command."""
-    case, notes = rest_of(state, interest=interest)
+def _replanned(state: PresentState, request: requests.Replan, progress: Progress) -> Outcome:
+    """Plan the rest and write it."""
+    seed = request.seed
+    case, notes = rest_of(state, interest=request.interest)
     information, growth = ready(case, seed=seed, progress=within(progress, 0.02, 0.05))
     design = designed(
         case, information, stated=state.first.vessel.model, seed=seed, progress=within(progress, 0.05, 0.12)
@@ -118,7 +85,7 @@ def _replanned(
     known = known_of(replace(state, notes=(*state.notes, *notes)), case, day.design, day.plan)
     route = built_route(case, day.plan)
     content = replace(
-        report_content(case, day.information, day.design, day.plan, words),
+        report_content(case, day.information, day.design, day.plan, repeating(request)),
         compared=compared,
         route=route,
         known=known,
@@ -130,12 +97,11 @@ def _replanned(
                                                        f"Its model is {state.origin}."]),
         "replan.json": replan_json(known),
     }  # fmt: skip
-    written = write_files(out or Path("runs") / case.name, files)
-    progress("done", 1.0)
     facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(case, day.plan)}
     summary = {"scenario": case.name, **_summary(known), **facts}
     notes = (*_notes(known), *day.plan.area.notes)
-    return Outcome(files=written, document=document_of(summary, (_table(known), *day_tables(day)), notes))
+    document = document_of(summary, (_table(known), *day_tables(day)), notes)
+    return finished(request, Path("runs") / case.name, files, document, progress)
 
 
 def _stated_before(

@@ -2,60 +2,48 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
-
 from pydantic import RootModel
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export import Content, write_files
+from expdesign.export import Content
 from expdesign.export.files import strict_json
 from expdesign.export.files.text import read_json
-from expdesign.export.pages import document_html
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
 from expdesign.progress import Progress, silent
-from expdesign.requests import command_text
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, finished, workflow
 
 Estimates = RootModel[dict[str, Estimated]]
 
 
-def trial_result(
-    plan: Path,
-    out: Path | None,
-    *,
-    estimate: Path,
-    indices: Path | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def trial_result(request: requests.TrialResult, *, progress: Progress = silent) -> Outcome:
     """The result of a planned trial, from the files of `run`, `estimate` and `indices`, beside the plan.
 
     Raises:
         InputError: a file is wrong, or they are not of the same ship.
     """
-    planned = read_json(plan, PlanResult, "a plan.json as expdesign run writes it")
+    planned = read_json(request.plan, PlanResult, "a plan.json as expdesign run writes it")
     if planned.draft:
-        raise FileError(plan, "draft", "is true: a draft is not sailed, expected the plan that was")
-    tried = read_json(estimate, Estimates, "an estimate.json as expdesign estimate writes it").root
+        raise FileError(request.plan, "draft", "is true: a draft is not sailed, expected the plan that was")
+    tried = read_json(request.estimate, Estimates, "an estimate.json as expdesign estimate writes it").root
     best = next((one for one in tried.values() if one.in_vessel_file), None)
     if best is None or not set(best.parameters) & set(planned.parameters):
-        raise FileError(estimate, "", f"estimates no parameter of the plan, {', '.join(planned.parameters)}")
-    judged = None if indices is None else read_json(indices, Indices, "an indices.json as expdesign indices writes it")
+        raise FileError(request.estimate, "", f"estimates no parameter of the plan, {', '.join(planned.parameters)}")
+    judged = (
+        None
+        if request.indices is None
+        else read_json(request.indices, Indices, "an indices.json as expdesign indices writes it")
+    )
     if judged is not None and judged.vessel != planned.vessel.name:
-        raise InputError(f"{indices}: is of {judged.vessel}, the plan {plan} of {planned.vessel.name}")
+        raise InputError(f"{request.indices}: is of {judged.vessel}, the plan {request.plan} of {planned.vessel.name}")
     content = ResultContent(
         plan=planned,
         estimate=best,
         indices=judged,
-        command=command_text(requests.TrialResult(plan=plan, estimate=estimate, indices=indices)),
-        version=__version__,
     )
     document = result_document(content)
     files: dict[str, Content] = {
         "result.json": strict_json({"ship": planned.vessel.name, "trial": planned.scenario, **document.summary}),
-        "result.html": partial(document_html, document),
     }
-    written = write_files(out or plan.parent, files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document)
+    return finished(request, request.plan.parent, files, document, progress, page="result.html")

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.errors import InputError, UnknownName
-from expdesign.export import Content, vessel_toml, write_files
-from expdesign.export.pages import document_html
+from expdesign.export import Content, vessel_toml
 from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.progress import Progress, silent
 from expdesign.records import load_records
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.roll import (
     TUNING,
     Body,
@@ -34,80 +32,51 @@ from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases
 from expdesign.signals import Batch
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import equipped
 
 
-def roll(
-    data: Sequence[Path],
-    out: Path | None,
-    *,
-    loads: Path,
-    vessel: Path | None = None,
-    rudder: Sequence[str] = (),
-    method: str = "iv",
-    lowpass_hz: float | None = None,
-    scale: float | None = None,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def roll(request: requests.Roll, *, progress: Progress = silent) -> Outcome:
     """Parameters, intervals and what is not told apart, into `out` or runs/<first data file>.
-
-    Args:
-        data: CSV files, one for each load.
-        out: folder, or None.
-        loads: file of load cases.
-        vessel: file of the ship: her [roll] says what is known of masses and places and where the search begins, her
-            actuators how late the rudder is, and vessel-roll.toml is the same ship with the estimate.
-        rudder: signals whose mean steers; found by their kinds when empty.
-        method: "iv" or "ls".
-        lowpass_hz: of the filter; None for one that thinning out needs.
-        scale: of the ship to the model that was tried, for the estimate at full scale, too.
-        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the data tell too little.
     """
-    if scale is not None and not 0 < scale < float("inf"):
-        raise InputError(f"--scale is {scale:g}, expected more than 0")
     progress("reading the data", 0.0)
-    ship, told = (None, ()) if vessel is None else equipped(vessel, data)
-    known = load_cases(loads, ship)
-    if len(known.loads) != len(data):
+    ship, told = (None, ()) if request.vessel is None else equipped(request.vessel, request.data)
+    known = load_cases(request.loads, ship)
+    if len(known.loads) != len(request.data):
         raise InputError(
-            f"{loads}: load: has {len(known.loads)} load cases for {len(data)} data files, expected one each"
+            f"{request.loads}: load: has {len(known.loads)} load cases for {len(request.data)} data files, "
+            "expected one each"
         )
-    for path in data:
-        if sum(path.resolve() == other.resolve() for other in data) > 1:
+    for path in request.data:
+        if sum(path.resolve() == other.resolve() for other in request.data) > 1:
             raise InputError(f"{path}: is given more than once, expected each data file once")
-    cases, notes = _cases(data, known, rudder, ship)
+    cases, notes = _cases(request.data, known, request.rudder, ship)
     notes = (*told, *notes)
-    filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=lowpass_hz)
+    filter_ = low_pass(cases, roll_hz=1.0 / known.period_s, cutoff_hz=request.lowpass_hz)
     problem = build_problem(
         known.body, prepared(cases, filter_), beam_m=known.beam_m, roll_hz=1.0 / known.period_s, known=known.known,
         start=known.start,
     )  # fmt: skip
     progress("estimating", 0.3)
-    estimate = estimate_roll(problem, method=method)
+    estimate = estimate_roll(problem, method=request.method)
     _check_passed(estimate, filter_)
     notes += _turned(estimate)
-    asked = requests.Roll(
-        data=tuple(data), loads=loads, vessel=vessel, rudder=tuple(rudder), method=method, lowpass_hz=lowpass_hz,
-        scale=scale,
-    )  # fmt: skip
     content = RollContent(
         estimate=estimate, report=null_space(estimate), filter=filter_, notes=notes,
-        command=command_text(asked), version=__version__,
-        scale=scale,
+        command=repeating(request),
+        scale=request.scale,
     )  # fmt: skip
     progress("drawing the page", 0.9)
     document = roll_document(content)
-    files: dict[str, Content] = {"roll.json": roll_json(content), "roll.html": partial(document_html, document)}
+    files: dict[str, Content] = {"roll.json": roll_json(content)}
     if ship is not None:
         files["vessel-roll.toml"] = _fitted(ship, content)
-    written = write_files(out or Path("runs") / data[0].stem, files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress, page="roll.html")
 
 
 def _fitted(ship: Vessel, content: RollContent) -> str:

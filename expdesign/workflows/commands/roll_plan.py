@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.durations import Aim, DurationDesign, with_repeats
-from expdesign.errors import FileError, InputError, NoAnswer, NoPlan, UnknownName
+from expdesign.errors import FileError, NoAnswer, NoPlan, UnknownName
 from expdesign.export import Content, write_files
 from expdesign.export.load_page import LoadContent, load_document, load_plan_json, loads_toml, repeats_json
 from expdesign.export.pages import document_html
@@ -17,86 +17,60 @@ from expdesign.information import PrimitiveInformation
 from expdesign.loading import LoadPlan, Question, build_question, choose_loads
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, ending, silent, within
-from expdesign.requests import command_text
+from expdesign.requests import command_text, repeating
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, workflow
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
 from expdesign.workflows.steps.scored import scored
-from expdesign.workflows.steps.workers import load_planner, workers
+from expdesign.workflows.steps.workers import load_planner, shared
 
 Files = dict[str, Content]
-MOST_MINUTES = 30.0
-"""Default of `--minutes`."""
 
 
-def roll_plan(
-    scenario: Path,
-    out: Path | None,
-    *,
-    loads: Path,
-    most_loads: int | None = None,
-    interest: Sequence[str] = (),
-    place: bool = False,
-    minutes: float = MOST_MINUTES,
-    seed: int = 0,
-    jobs: int = 1,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def roll_plan(request: requests.RollPlan, *, progress: Progress = silent) -> Outcome:
     """Load cases and runs, into `out` or runs/<scenario>; with `place` also a plan and run cards of each load case.
-
-    Args:
-        scenario: its vessel has [roll], its dictionary the manoeuvres, and design.total_s the informative time.
-        out: folder, or None.
-        loads: file of load cases, here the candidates.
-        most_loads: at most so many load cases; None for the fewest that tell nearly as much as all.
-        interest: parameters whose precision is to be best; all of them when empty.
-        place: whether each load case is planned on the chart, too.
-        minutes: by the clock, after which the command gives up and writes nothing.
-        seed: of the planner.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NoAnswer: the candidates leave a combination of parameters open, a load case has no plan, or time is up.
     """
-    if not minutes > 0:
-        raise InputError(f"--minutes is {minutes:g}, expected more than 0")
-    limited = ending(progress, most_s=60.0 * minutes, refusal=lambda now: _too_long(minutes, now, cache=cache))
-    case = loaded(scenario, limited)
+    limited = ending(
+        progress,
+        most_s=60.0 * request.minutes,
+        refusal=lambda now: _too_long(request.minutes, now, cache=not request.no_cache),
+    )
+    case = loaded(request.scenario, limited)
     pendulum = case.vessel.pendulum
     if pendulum is None:
         raise FileError(
-            scenario, "vessel", f"is {case.vessel.name!r}, whose file has no [roll], expected a vessel file with it"
+            request.scenario,
+            "vessel",
+            f"is {case.vessel.name!r}, whose file has no [roll], expected a vessel file with it",
         )
-    if place:
+    if request.place:
         check_plannable(case)
-    asked = load_cases(loads, case.vessel)
+    asked = load_cases(request.loads, case.vessel)
     question = build_question(case.vessel, asked.loads, known=asked.known, guess=asked.start)
-    with workers(jobs, load=load_planner if place else None, cache=cache):
+    with shared(request, load=load_planner if request.place else None):
         information = scored(case, progress=within(limited, 0.05, 0.1))
         plan = choose_loads(
             question, [item.primitive for item in information], total_s=case.design.total_s,
-            aim=_aim(question, interest), most_loads=most_loads, progress=within(limited, 0.1, 0.3 if place else 0.9),
+            aim=_aim(question, request.interest), most_loads=request.most_loads,
+            progress=within(limited, 0.1, 0.3 if request.place else 0.9),
         )  # fmt: skip
-        folder = out or Path("runs") / case.name
-        command = command_text(requests.RollPlan(
-            scenario=scenario, loads=loads, most_loads=most_loads, interest=tuple(interest), place=place,
-            minutes=minutes, seed=seed,
-        ))  # fmt: skip
+        folder = request.out or Path("runs") / case.name
+        command = repeating(request)
         content = LoadContent(
             scenario=case.name, plan=plan, known={**_known(pendulum, plan), **asked.known},
-            commands=_commands(scenario, folder, plan),
+            commands=_commands(request.scenario, folder, plan),
             command=command,
-            version=__version__,
         )  # fmt: skip
         placing = within(limited, 0.3, 1.0)
-        placed = _placed(case, information, content, seed, placing) if place else ()
+        placed = _placed(case, information, content, request.seed, placing) if request.place else ()
     document = load_document(content)
     names = {_runs_name(number): repeats_json(content, number) for number in range(len(plan.repeats))}
     files: dict[str, Content] = {

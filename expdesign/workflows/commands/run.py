@@ -7,9 +7,9 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.progress import Progress, in_phases, silent
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -22,7 +22,7 @@ from expdesign.workflows.steps.planned import (
     trial_files,
 )
 from expdesign.workflows.steps.scored import growth_summary, ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 WORK = (0.05, 0.08, 0.02, 0.68, 0.17)
 """Share of the work: scoring, durations, comparing criteria, planning, and writing."""
@@ -30,49 +30,32 @@ WORK_OF_SEARCH = (0.01, 0.02, 0.01, 0.90, 0.06)
 """The same where the shortest day is searched for."""
 
 
-def run(
-    scenario: Path,
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    draft: bool = False,
-    seed: int = 0,
-    jobs: int = 1,
-    scheduler: str | None = None,
-    cache: bool = True,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
     """The main job: score, durations, plan, verification, route files and report, into `out` or runs/<scenario>.
 
     A draft is the first plan that the whole job tries, or a day with fewer manoeuvres searched for, without drawn
     trials and bounds. It is written into `out` or runs/<scenario>-draft, without anything that could be sailed.
 
-    Args:
-        scenario: the scenario file.
-        out: folder.
-        vessel: a vessel file in place of the one that the scenario names.
-        draft: whether a draft is enough.
-        seed: of everything drawn.
-        jobs: processes; 0 for one per core. The results do not depend on it.
-        scheduler: address of a Dask scheduler whose workers share the work instead.
-        cache: read what is remembered, and remember what is computed. The results do not depend on it.
-        progress: of the command.
-
     Raises:
         InputError: a draft would stand beside files of a trial that may be sailed.
     """
-    case = loaded(scenario, progress, vessel=vessel)
-    if draft:
+    case = loaded(request.scenario, progress, vessel=request.vessel)
+    if request.draft:
         case = replace(case, plan=replace(case.plan, draft=True))
-        out = out or Path("runs") / f"{case.name}-draft"
+        out = request.out or Path("runs") / f"{case.name}-draft"
         check_no_trial(out)
+        request = request.but(out=out)
     check_plannable(case)
-    words = command_text(requests.Run(scenario=scenario, vessel=vessel, draft=draft, seed=seed))
-    with workers(jobs, scheduler=scheduler, cache=cache), drafted(case, out, command=words):
-        return _run(case, out, words, seed, progress)
+    with (
+        shared(request),
+        drafted(request, case),
+    ):
+        return _run(request, case, progress)
 
 
-def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Progress) -> Outcome:
+def _run(request: requests.Run, case: Scenario, progress: Progress) -> Outcome:
+    seed = request.seed
     work = WORK if case.design.accuracy is None else WORK_OF_SEARCH
     scoring, designing, comparing, planning, writing = in_phases(progress, *work)
     information, growth = ready(case, seed=seed, progress=scoring)
@@ -82,7 +65,7 @@ def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Prog
     day = planned_day(case, information, design, seed=seed, progress=planning)
     writing("writing routes, run cards and report", 0.0)
     route = None if day.plan.draft else built_route(case, day.plan)
-    content = report_content(case, day.information, day.design, day.plan, words)
+    content = report_content(case, day.information, day.design, day.plan, repeating(request))
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     summary = {
@@ -90,4 +73,4 @@ def _run(case: Scenario, out: Path | None, words: str, seed: int, progress: Prog
         **day_summary(day),
         **plan_summary(case, day.plan),
     }
-    return written(case, out, files, noted(case, document_of(summary, day_tables(day))), progress)
+    return written(request, case, files, noted(case, document_of(summary, day_tables(day))), progress)

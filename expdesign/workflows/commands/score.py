@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
+from expdesign import requests
 from expdesign.dictionary.build import deviating
 from expdesign.progress import Progress, silent, within
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.scored import (
     actuation_remarks,
@@ -18,16 +17,10 @@ from expdesign.workflows.steps.scored import (
 )
 
 
-def score(
-    scenario: Path,
-    out: Path | None,
-    *,
-    vessel: Path | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
     """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
-    case = loaded(scenario, progress, vessel=vessel)
+    case = loaded(request.scenario, progress, vessel=request.vessel)
     information = scored(case, progress=within(progress, 0.05, 0.95))
     summary: dict[str, object] = {
         "primitives": len(information),
@@ -42,4 +35,4 @@ def score(
     if case.remarks or told:
         summary["remarks"] = [*case.remarks, *told]
     document = document_of(summary, (ranking(case, information),))
-    return written(case, out, score_files(case, information), noted(case, document), progress)
+    return written(request, case, score_files(case, information), noted(case, document), progress)

@@ -5,51 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from expdesign import requests
 from expdesign.conventions import Array
-from expdesign.errors import FileError, InputError
-from expdesign.export import (
-    write_files,
-)
+from expdesign.errors import FileError
 from expdesign.export.routes import read_plan
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.simulation import Environment, WeatherSeries, draw_environment, draw_weather, in_waves, measure
 from expdesign.simulation import simulate as simulate_run
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
 
 
-def simulate(
-    plan: Path,
-    out: Path | None,
-    *,
-    truth: Path,
-    until_s: float | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def simulate(request: requests.Simulate, *, progress: Progress = silent) -> Outcome:
     """Run the commands of a plan open loop on another vessel in drawn weather, and record its sensors.
 
     Mean current and wind are drawn around the plan's forecast, and vary from sample to sample as the forecast says;
     where the vessel's file has a current or a wind, around that. Waves of its [roll] roll it. With `until_s` the data
     end at that time, as of a trial broken off.
     """
-    if until_s is not None and not 0 < until_s < np.inf:
-        raise InputError(f"--until is {until_s:g}, expected more than 0 seconds")
     progress("reading the plan", 0.05)
-    track, vessel = read_plan(plan), load_vessel(truth)
+    track, vessel = read_plan(request.plan), load_vessel(request.truth)
     if (vessel.model.inputs, vessel.sample_time_s) != (track.commands.names, track.commands.sample_time_s):
         raise FileError(
-            truth,
+            request.truth,
             "actuators",
             f"takes {', '.join(vessel.model.inputs)} every {vessel.sample_time_s:g} s, the plan commands "
             f"{', '.join(track.commands.names)} every {track.commands.sample_time_s:g} s",
         )
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(request.seed)
     weather = draw_environment(_truth_weather(track.environment, vessel.environment), rng)
     progress("simulating the trial", 0.2)
     begin, met = track.trajectory, _met(weather, track.commands, rng)
@@ -57,10 +45,13 @@ def simulate(
     sailed = in_waves(vessel, sailed, rng)
     columns = measure(vessel, track.commands, sailed, environment=met, rng=rng)
     columns["steered"] = np.zeros(len(track.commands))  # the commands of legs too are those of the plan
-    kept = len(track.commands) if until_s is None else math.ceil(until_s / track.commands.sample_time_s - 1e-9)
+    kept = (
+        len(track.commands)
+        if request.until_s is None
+        else math.ceil(request.until_s / track.commands.sample_time_s - 1e-9)
+    )
     columns = {name: values[:kept] for name, values in columns.items()}
     apart = np.hypot(*(sailed.pose - begin.pose)[: kept + 1, :2].T)
-    files = write_files(out or plan.parent, {"measured.csv": _csv(columns)})
     summary = {
         "trial_s": track.commands.duration_s,
         "samples": len(columns["time_s"]),
@@ -70,7 +61,8 @@ def simulate(
         "wind_to_north_mps": float(weather.wind_to[0]),
         "wind_to_east_mps": float(weather.wind_to[1]),
     }
-    return Outcome(files=files, document=document_of(summary))
+    files = {"measured.csv": _csv(columns)}
+    return finished(request, request.plan.parent, files, document_of(summary), progress)
 
 
 def _truth_weather(forecast: Environment, own: Environment) -> Environment:

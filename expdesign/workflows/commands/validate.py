@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import joblib
@@ -13,56 +12,43 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
-from expdesign.export import vessel_toml, write_files
-from expdesign.export.pages import document_html
+from expdesign.export import Content, vessel_toml
 from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
-from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.steps.workers import shared
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
 INTEGRATORS = ("rk4", "euler")
 
 
-def validate_design(
-    scenario: Path,
-    out: Path | None,
-    *,
-    truth: Path | None = None,
-    trials: int = 100,
-    method: str | None = None,
-    integrator: str = "rk4",
-    jobs: int = 0,
-    scheduler: str | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def validate_design(request: requests.Validate, *, progress: Progress = silent) -> Outcome:
     """The optimised design beside equal shares and random runs, in trials of a true ship or of the scenario's own.
 
     Without a method it is that of the designs' accuracies: iv, or with a steady current where the forecast leaves one
     unknown. An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all
     are done.
     """
-    if integrator not in INTEGRATORS:
-        raise InputError(f"--integrator is {integrator}, expected one of {', '.join(INTEGRATORS)}")
-    case = load_scenario(scenario)
-    method = _method(case, method)
+    if request.integrator not in INTEGRATORS:
+        raise InputError(f"--integrator is {request.integrator}, expected one of {', '.join(INTEGRATORS)}")
+    case = load_scenario(request.scenario)
+    method = _method(case, request.method)
     method_named(method)  # refused before the dictionary is scored
-    ship = case.vessel if truth is None else load_vessel(truth)
+    ship = case.vessel if request.truth is None else load_vessel(request.truth)
     if case.vessel.model.roll is not None:
         raise InputError(
             f"vessel {case.vessel.name!r} has a roll mode, [model.roll], which {method} does not estimate; "
             "expected it in the vessel of --truth only"
         )
-    information, _ = ready(case, seed=seed, progress=within(progress, 0.0, 0.05))
-    design = designed(case, information, seed=seed)
+    information, _ = ready(case, seed=request.seed, progress=within(progress, 0.0, 0.05))
+    design = designed(case, information, seed=request.seed)
     primitives = tuple(item.primitive for item in information)
     rehearsal = Rehearsal(
         truth=ship,
@@ -75,13 +61,13 @@ def validate_design(
         method=method,
         mean_subtraction=case.design.mean_subtraction,
         excitation=case.design.excitation,
-        integrator=integrator,
-        trials=trials,
-        seed=seed,
+        integrator=request.integrator,
+        trials=request.trials,
+        seed=request.seed,
     )
-    folder = out or Path("runs") / case.name
+    folder = request.out or Path("runs") / case.name
     done, keep, forget = _chunk_store(folder / f".validation-{joblib.hash(_identity(rehearsal))}")
-    with workers(jobs, scheduler=scheduler, load=None):
+    with shared(request, load=None):
         results = validate(rehearsal, done=done, keep=keep, progress=within(progress, 0.05, 0.95))
     content = ValidationContent(
         scenario=case.name,
@@ -92,20 +78,14 @@ def validate_design(
             for item, count in zip(information, design.repeats, strict=True)
             if count and not item.excitation_condition
         ),
-        command=command_text(
-            requests.Validate(
-                scenario=scenario, truth=truth, trials=trials, method=method, integrator=integrator, seed=seed
-            )
-        ),
-        version=__version__,
     )
     document = validation_document(content)
-    files = write_files(
-        folder, {"validation.json": validation_json(content), "validation.html": partial(document_html, document)}
-    )
+    files: dict[str, Content] = {
+        "validation.json": validation_json(content),
+    }
+    outcome = finished(request.but(method=method), folder, files, document, progress, page="validation.html")
     forget()
-    progress("done", 1.0)
-    return Outcome(files=files, document=document)
+    return outcome
 
 
 def _method(case: Scenario, stated: str | None) -> str:

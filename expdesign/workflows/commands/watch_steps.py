@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from expdesign import __version__, requests
-from expdesign.errors import FileError, InputError, NotInformative
+from expdesign.errors import FileError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.document import Table as TextTable
 from expdesign.export.step_trial_live import (
@@ -30,7 +30,7 @@ from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Piece, Taken, pieces
 from expdesign.records.file import Inputs, Table, choose_columns
 from expdesign.records.load import check_limits, column_limits
-from expdesign.requests import command_text
+from expdesign.requests import repeating
 from expdesign.step_trials import controls_of
 from expdesign.step_trials.live import (
     Row,
@@ -43,7 +43,7 @@ from expdesign.step_trials.live import (
     restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome, Told, document_of, finished, silently, workflow
 from expdesign.workflows.steps.measured import equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -78,67 +78,33 @@ class _Watch:
     events: int = 0  # told so far
 
 
-def _nothing(line: str) -> None:
-    """Say nothing."""
-
-
-def watch_steps(
-    data: Path,
-    out: Path | None,
-    *,
-    steps: Path,
-    vessel: Path,
-    throttle: Sequence[str] = (),
-    rudder: Sequence[str] = (),
-    learn_s: float | None = None,
-    resume: bool = False,
-    seed: int = 0,
-    tell: Callable[[str], None] = _nothing,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def watch_steps(request: requests.WatchSteps, *, tell: Told = silently, progress: Progress = silent) -> Outcome:
     """Tell when each step of a trial is over and which is next, and write what is left, into `out` or runs/<data file>.
-
-    Args:
-        data: CSV file, or `STREAM` for the standard input.
-        out: folder, or None.
-        steps: a list of steps, see `listed_steps`.
-        vessel: guessed before the trial, for its inputs and how fast it answers.
-        throttle, rudder: names of signals; found by their kinds when empty.
-        learn_s: of the first hold, from which the noise is learnt [s]; None for 120, or most of it where it is planned
-            to be shorter.
-        resume: go on from the state in `out`.
-        seed: of the calibration of the test for steady state.
-        tell: takes each line as it is known.
-        progress: of the command.
 
     Raises:
         InputError: arguments or files that are wrong.
         NotInformative: the data hold no step of the list.
     """
-    if learn_s is not None and not 0 < learn_s < math.inf:
-        raise InputError(f"--learn-s is {learn_s:g}, expected more than 0")
-    ship, told = equipped(vessel, [] if data == STREAM else [data])
-    controls = controls_of(ship.model.inputs, throttle, rudder)
-    wanted = listed_steps(steps, ship.model.inputs, controls, ship)
-    learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if learn_s is None else learn_s
-    setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learnt_s, seed=seed)
-    command = command_text(requests.WatchSteps(
-        data=data, steps=steps, vessel=vessel, throttle=tuple(throttle), rudder=tuple(rudder), learn_s=learn_s,
-        resume=resume, out=out, seed=seed,
-    ))  # fmt: skip
-    folder = out or Path("runs") / ("watch-steps" if data == STREAM else data.stem)
+    ship, told = equipped(request.vessel, [] if request.data == STREAM else [request.data])
+    controls = controls_of(ship.model.inputs, request.throttle, request.rudder)
+    wanted = listed_steps(request.steps, ship.model.inputs, controls, ship)
+    learnt_s = min(LEARN_S, LEARN_SHARE * wanted.first_s) if request.learn_s is None else request.learn_s
+    setup = Setup(steps=wanted, constants_s=expected_constants(ship, wanted), learn_s=learnt_s, seed=request.seed)
+    command = repeating(request, keep={"out"})
+    folder = request.out or Path("runs") / ("watch-steps" if request.data == STREAM else request.data.stem)
     work = _Work(setup=setup, folder=folder, command=command, actuators=ship.model.actuators)
-    now = _resumed(folder / STATE, wanted) if resume else _Watch(state=beginning(setup))
+    now = _resumed(folder / STATE, wanted) if request.resume else _Watch(state=beginning(setup))
     now = replace(now, notes=tuple(dict.fromkeys((*told, *now.notes))))
-    now = _through(now, data, work, tell, progress)
+    now = _through(now, request.data, work, tell, progress)
     _check_learnt(now.state, setup)
     content = _content(now, work)
-    written = write_files(folder, _files(now, work))
-    progress("done", 1.0)
-    return Outcome(files=written, document=document_of(_summary(content), _tables(content), content.notes))
+    return finished(
+        request, folder, _files(now, work), document_of(_summary(content), _tables(content), content.notes), progress
+    )
 
 
-def _through(now: _Watch, data: Path, work: _Work, tell: Callable[[str], None], progress: Progress) -> _Watch:
+def _through(now: _Watch, data: Path, work: _Work, tell: Told, progress: Progress) -> _Watch:
     """Watch all rows of a source; the state is written at every event, and now and then between."""
     due = time.monotonic() + WRITTEN_EVERY_S
     size = data.stat().st_size if data != STREAM and data.is_file() else 0
@@ -260,7 +226,7 @@ def _commands(steps: StepList) -> str:
 def _content(now: _Watch, work: _Work) -> LiveContent:
     return LiveContent(
         steps=work.setup.steps, state=now.state, constants_s=work.setup.constants_s, notes=now.notes,
-        command=work.command, version=__version__,
+        command=work.command,
     )  # fmt: skip
 
 

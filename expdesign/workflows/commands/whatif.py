@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from expdesign import __version__, requests
+from expdesign import requests
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign, efficiencies, optimal_shares
 from expdesign.durations.rounding import whole_runs
 from expdesign.errors import FileError, InputError, NoAnswer
-from expdesign.export import Content, write_files
-from expdesign.export.pages import document_html
+from expdesign.export import Content
 from expdesign.export.whatif_content import Case, WhatIfContent, whatif_json
 from expdesign.export.whatif_page import whatif_document
 from expdesign.information import PrimitiveInformation, estimated_parameters
@@ -27,15 +25,14 @@ from expdesign.plan.verify import track_covariance
 from expdesign.processes import as_finished, reported_together
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
-from expdesign.requests import command_text
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed, duration_problem
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.scored import ready, scored
-from expdesign.workflows.steps.workers import load_plans, workers
+from expdesign.workflows.steps.workers import load_plans, shared
 
 WHOLE_RUNS = "repeats"
 SEARCHED = 0.1
@@ -48,80 +45,52 @@ WORK = (0.5, 0.5, 10.0, 0.5)
 """Relative times of the parts of a case: scoring, sharing out time, planning, comparing criteria."""
 
 
-def whatif(
-    scenario: Path,
-    variants: Sequence[Path],
-    out: Path | None,
-    *,
-    with_plan: bool = False,
-    jobs: int = 0,
-    scheduler: str | None = None,
-    cache: bool = True,
-    seed: int = 0,
-    progress: Progress = silent,
-) -> Outcome:
+@workflow
+def whatif(request: requests.WhatIf, *, progress: Progress = silent) -> Outcome:
     """The scenario and its variants side by side, into `out` or runs/<scenario>-whatif.
 
     Every file is read before anything is computed, and every case's dictionary and durations are checked before
     anything is planned. A variant without an answer is listed as such beside the others.
     Before trials are planned, manoeuvres are searched for that shorten the scenario's day: variants that leave that
     search as it is take over what it found, others the candidates simulated in it.
-
-    Args:
-        scenario: the scenario file.
-        variants: files with what differs.
-        out: folder.
-        with_plan: plan the trials, too.
-        jobs: processes; 0 for one per core.
-        scheduler: address of a Dask scheduler whose workers carry the work instead.
-        cache: read what is remembered, and remember what is computed. Without it the cases share what they compute all
-            the same, in a folder of their own. The results do not depend on it.
-        seed: of everything drawn.
-        progress: of the cases.
     """
-    if not variants:
-        raise InputError("no variant files are given, expected one or more")
     progress("reading the scenario", 0.0)
-    base = load_scenario(scenario)
-    read = [load_variant(scenario, variant) for variant in variants]
+    base = load_scenario(request.scenario)
+    read = [load_variant(request.scenario, variant) for variant in request.variants]
     cases = [(base, ()), *((item.scenario, item.changes) for item in read)]
     names = [case.name for case, _ in cases]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"the name {name!r} is given to {names.count(name)} cases, expected different names")
     done: dict[str, Case] = {}
-    searched = SEARCHED if with_plan and base.design.accuracy else 0.0
+    searched = SEARCHED if request.with_plan and base.design.accuracy else 0.0
     with (
         TemporaryDirectory(prefix="expdesign-") as folder,
-        remembering((user_memory() if cache else None) or Memory(Path(folder))) as memory,
-        workers(jobs, scheduler=scheduler, load=load_plans),
+        remembering((user_memory() if not request.no_cache else None) or Memory(Path(folder))) as memory,
+        shared(request, load=load_plans),
     ):
-        for (case, _), path in zip(cases, (scenario, *variants), strict=True) if with_plan else ():
+        for (case, _), path in (
+            zip(cases, (request.scenario, *request.variants), strict=True) if request.with_plan else ()
+        ):
             with suppress(NoAnswer):
-                _check(case, path, seed)
+                _check(case, path, request.seed)
         if searched:
             with suppress(NoAnswer):  # the case itself says so
-                _search(base, seed, within(progress, 0.0, searched))
+                _search(base, request.seed, within(progress, 0.0, searched))
         with reported_together(within(progress, searched, WORKED), len(cases)) as together:
             tasks = [(*case, reporter) for case, reporter in zip(cases, together.reporters, strict=True)]
-            for found in as_finished(_case, (with_plan, seed, memory), tasks):
+            for found in as_finished(_case, (request.with_plan, request.seed, memory), tasks):
                 done[found.name] = found
                 together.finished(names.index(found.name), f"{found.name} is done")
     content = WhatIfContent(
         cases=tuple(done[name] for name in names),
-        planned=with_plan,
-        command=command_text(
-            requests.WhatIf(scenario=scenario, variants=tuple(variants), with_plan=with_plan, seed=seed)
-        ),
-        version=__version__,
+        planned=request.with_plan,
     )
     if all(case.problem for case in content.cases):
         raise NoAnswer(f"no case has an answer; {content.cases[0].name}: {content.cases[0].problem}")
     document = whatif_document(content)
-    files: dict[str, Content] = {"whatif.json": whatif_json(content), "whatif.html": partial(document_html, document)}
-    written = write_files(out or Path("runs") / f"{base.name}-whatif", files)
-    progress("done", 1.0)
-    return Outcome(files=written, document=document)
+    files: dict[str, Content] = {"whatif.json": whatif_json(content)}
+    return finished(request, Path("runs") / f"{base.name}-whatif", files, document, progress, page="whatif.html")
 
 
 def _check(case: Scenario, path: Path, seed: int) -> None:

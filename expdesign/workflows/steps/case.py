@@ -8,19 +8,24 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from expdesign import __version__
+from expdesign import requests
 from expdesign.errors import FileError, NoPlan
 from expdesign.export import Content, write_files
 from expdesign.export.document import Document
 from expdesign.progress import Progress
+from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, document_of, note_on_roll
+from expdesign.workflows.outcome import Outcome, document_of, finished, note_on_roll
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
 """Names of the files of a draft; no results have them."""
 PLAN = "plan.json"
 """Name of a file that every plan has."""
+ScenarioRequest = (
+    requests.Run | requests.Plan | requests.Score | requests.Durations | requests.Foresee | requests.Replan
+)
+"""Of commands that write results of a scenario."""
 
 
 def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) -> Scenario:
@@ -45,17 +50,21 @@ def noted(case: Scenario, document: Document) -> Document:
 
 
 def written(
-    case: Scenario, out: Path | None, files: Mapping[str, Content], document: Document, progress: Progress
+    request: ScenarioRequest,
+    case: Scenario,
+    files: Mapping[str, Content],
+    document: Document,
+    progress: Progress,
+    *,
+    page: str = "",
 ) -> Outcome:
-    """Write files into `out` or runs/<scenario>, and report them. A plan takes an earlier draft away."""
-    folder = out or Path("runs") / case.name
-    paths = write_files(folder, files)
-    left = _undeleted(folder) if PLAN in files else ()
-    progress("done", 1.0)
-    if left:
+    """Write files into the folder asked for, or runs/<scenario>. A plan takes an earlier draft away."""
+    usual = Path("runs") / case.name
+    outcome = finished(request, usual, files, document, progress, page=page)
+    if left := _undeleted(request.out or usual) if PLAN in files else ():
         said = document_of({"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"})
         document = replace(document, values={**document.values, **said.values}, notes=(*document.notes, *said.notes))
-    return Outcome(files=paths, document=document)
+    return replace(outcome, document=document)
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:
@@ -70,18 +79,18 @@ def _undeleted(folder: Path) -> tuple[str, ...]:
 
 
 @contextmanager
-def drafted(case: Scenario, out: Path | None, *, command: str) -> Iterator[None]:
-    """Leave a draft in `out`, or in runs/<scenario>, where the block refuses a plan; the refusal names it.
+def drafted(request: ScenarioRequest, case: Scenario) -> Iterator[None]:
+    """Leave a draft where the block refuses a plan; the refusal names it.
 
     Results of an earlier attempt stay there, and the draft says that they are none of this one. Other refusals have
     nothing to show on a chart.
     """
-    folder = out or Path("runs") / case.name
+    folder = request.out or Path("runs") / case.name
     try:
         yield
     except NoPlan as error:
         with suppress(FileError):  # the refusal matters more
-            path = write_files(folder, _files(case, folder, error, command))[-1]
+            path = write_files(folder, _files(case, folder, error, repeating(request)))[-1]
             error.remedies += (f"the draft is {path}",)
         raise
 
@@ -101,6 +110,5 @@ def _files(case: Scenario, folder: Path, error: NoPlan, command: str) -> dict[st
         error=error,
         earlier=tuple(name for name in there if name not in DRAFT and not name.startswith(".")),
         command=command,
-        version=__version__,
     )
     return {"refused.json": refused_json(refusal), "refused.html": partial(document_html, refused_document(refusal))}

@@ -67,13 +67,10 @@ def planned_day(
     """The verified trial of a scenario.
 
     Args:
-        case: the scenario.
-        information: of its dictionary.
         design: the optimal durations in total_s, beside what is known.
         reference: those whose accuracy is asked for, where less was known when it was stated; `design` when None.
         stated: as of `duration_problem`.
         seed: of everything drawn.
-        progress: of the planning.
 
     Raises:
         InputError: plans cannot be made for the vessel, or the accuracy cannot be counted.

@@ -75,12 +75,10 @@ def duration_problem(
     """Everything that the scenario's table [design] asks of the durations.
 
     Args:
-        case: the scenario.
         information: of its dictionary, by the nominal model.
         stated: model whose prior covariance design.prior means, where the vessel's own already counts the prior data;
             None for the vessel's own.
         seed: of the models drawn from the prior.
-        progress: of the step.
 
     Raises:
         InputError, UnknownName: settings that do not fit the vessel or the data.

@@ -39,7 +39,6 @@ def updated(
         record: the data, draught over depth among its inputs where the model reads depth.
         fixed: parameters that are not to be estimated.
         prior_counts: whether to combine the estimate with the vessel's values by their standard deviations.
-        progress: of the estimation.
 
     Returns:
         Vessel, where its parameters come from, and notes.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__
+from expdesign import requests
 from expdesign.durations import Constraints, DurationDesign, build_recorded, pool_gains, solve_durations
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
@@ -24,26 +24,6 @@ from expdesign.signals import Batch, Record
 from expdesign.vessel import VesselModel
 
 OPTIMISED, RANDOM = "optimised", "random"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """What is asked of a design from labelled data."""
-
-    labels: str  # source of the labels, see `records.row_labels`
-    piece_s: float  # length of a piece [s]
-    keep: int  # number of pieces in a design
-    draws: int  # of each design
-    mean: str  # subtracted from instruments, "complete" or "none"
-    seed: int  # of the draws
-
-    def __post_init__(self) -> None:
-        if self.keep < 1:
-            raise InputError(f"--keep is {self.keep}, expected 1 or more pieces")
-        if self.draws < 2:
-            raise InputError(f"--draws is {self.draws}, expected 2 or more")
-        if self.mean == "batch":
-            raise InputError("--mean is batch, expected complete or none with --labels")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +45,8 @@ def labelled_design(
     *,
     parameters: Sequence[str],
     predictor: str,
-    asked: Asked,
+    asked: requests.Mine,
+    piece_s: float,
     progress: Progress = silent,
 ) -> Labelled:
     """Shares by the information of each label, and simulation errors of subsets; see `rehearsal.recorded`.
@@ -76,19 +57,19 @@ def labelled_design(
         model: nominal; where all its parameters are zero, the least-squares estimate from all pieces stands for it.
         parameters: names to estimate.
         predictor: "basic" or "basic-wind".
-        asked: the rest.
-        progress: of the work.
+        asked: keep, draws, labels, mean and seed count.
+        piece_s: length of a piece [s].
 
     Raises:
         InputError: labels, lengths or numbers that are wrong.
         NotInformative: the labels together do not inform about every parameter.
     """
-    pieces, labels = labelled_pieces(record, row_labels(record, paths, asked.labels), asked.piece_s)
+    pieces, labels = labelled_pieces(record, row_labels(record, paths, asked.labels or ""), piece_s)
     nominal = _nominal(pieces, model, parameters, predictor)
     progress("simulating the pieces", 0.0)
     batches = recorded_information(pieces, nominal, parameters, predictor=predictor, delivered=True)
     dictionary = by_label(batches, labels)
-    design = _designed(dictionary, labels, parameters, asked)
+    design = _designed(dictionary, labels, parameters, asked, piece_s)
     progress("comparing subsets", 0.1)
     sums = recorded_pieces(pieces, labels, nominal, parameters=parameters, predictor=predictor, mean=asked.mean)
     rng = np.random.default_rng(asked.seed)
@@ -125,7 +106,11 @@ def _nominal(pieces: Record, model: VesselModel, parameters: Sequence[str], pred
 
 
 def _designed(
-    dictionary: Sequence[BatchInformation], labels: Sequence[str], parameters: Sequence[str], asked: Asked
+    dictionary: Sequence[BatchInformation],
+    labels: Sequence[str],
+    parameters: Sequence[str],
+    asked: requests.Mine,
+    piece_s: float,
 ) -> DurationDesign:
     count = {item.name: labels.count(item.name) for item in dictionary}
     if asked.keep > len(labels):
@@ -136,12 +121,12 @@ def _designed(
             "the labelled pieces together do not inform about every parameter; hold known ones with --fixed",
             parameters=tuple(parameters),
         )
-    most = {name: number * asked.piece_s for name, number in count.items() if number < asked.keep}
+    most = {name: number * piece_s for name, number in count.items() if number < asked.keep}
     problem = build_recorded(
         dictionary,
         parameters,
-        run_s=np.full(len(dictionary), asked.piece_s),
-        total_s=asked.keep * asked.piece_s,
+        run_s=np.full(len(dictionary), piece_s),
+        total_s=asked.keep * piece_s,
         mean_subtraction=asked.mean,
         constraints=Constraints(most_s=most),
     )
@@ -193,9 +178,7 @@ def labelled_files(found: Labelled, parameters: Sequence[str], outputs: Sequence
             mean_subtraction=found.design.problem.mean_subtraction,
         ),
         "durations.json": durations_json(found.design),
-        "subsets.json": subsets_json(
-            found.drawn, outputs=outputs, pieces=names, labels=found.labels, command=command, version=__version__
-        ),
+        "subsets.json": subsets_json(found.drawn, outputs=outputs, pieces=names, labels=found.labels, command=command),
         "chosen.csv": record_csv([found.record.batches[place] for place in found.drawn[0].subsets[0]]),
     }
 

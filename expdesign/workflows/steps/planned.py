@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from expdesign import __version__
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
 from expdesign.errors import InputError, NoPlan
@@ -286,7 +285,6 @@ def report_content(
         design=design,
         plan=plan,
         command=command,
-        version=__version__,
         asked=case.design.accuracy,
         remarks=trial_remarks(case, plan),
     )

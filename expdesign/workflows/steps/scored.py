@@ -154,10 +154,8 @@ def grown(
 
     Args:
         case: the scenario; its key design.grow says how.
-        information: of its dictionary.
         always: grow it by the usual settings also without that key.
         seed: of all chance, unless the key has its own.
-        progress: of the search.
     """
     for_durations = None if case.design.accuracy else case.design.grow
     settings = for_durations or ((case.design.grow or GrowSettings()) if always else None)

@@ -208,10 +208,8 @@ def prepared(asked: Asked, text: str, time_s: Array, known: Known) -> Read | Unr
     """A piece of the data, ready to be judged; None where it has no rows.
 
     Args:
-        asked: of the command.
         text: header and rows.
         time_s: (k,) of the rows [s].
-        known: of the ship.
     """
     if len(time_s) < FEWEST_LINES:
         return None

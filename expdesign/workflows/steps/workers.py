@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from expdesign.errors import InputError
 from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors
+from expdesign.requests import Request
 
 FEW_CYCLES = 20_000
 """New objects after which cycles of garbage are looked for: work with arrays leaves few, and a look takes 0.1 s."""
@@ -28,6 +29,13 @@ def load_planner() -> None:
     from expdesign.export.pages.figures import new_figure
 
     new_figure(1.0, 1.0)  # loads what figures are drawn with
+
+
+def shared(request: Request, *, load: Callable[[], None] | None = load_planner) -> AbstractContextManager[None]:
+    """Independent work in this block is shared, and remembered, as a request asks."""
+    asked = vars(type(request)) | vars(request)
+    cache = None if "no_cache" not in asked else not asked["no_cache"]
+    return workers(asked["jobs"], scheduler=asked.get("scheduler"), load=load, cache=cache)
 
 
 @contextmanager
