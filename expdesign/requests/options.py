@@ -82,7 +82,7 @@ class Request:
     """
 
     def __init__(self, **values: object) -> None:
-        """Take values by name; of several a list, or None for an empty one, becomes a tuple.
+        """Take values by name; where several may be given, a list, a single one or None becomes a tuple.
 
         Raises:
             TypeError: a name is unknown or missing.
@@ -93,7 +93,7 @@ class Request:
         if wrong:
             raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
         for name, value in values.items():
-            vars(self)[name] = tuple(value or ()) if get_origin(asked[name].kind) is tuple else value  # type: ignore[arg-type]
+            vars(self)[name] = _several(value) if get_origin(asked[name].kind) is tuple else value
         for name, one in asked.items():
             one.check(getattr(self, name))
 
@@ -110,6 +110,10 @@ class Request:
     def but(self, **changes: object) -> Self:
         """The request with some values changed."""
         return type(self)(**{**vars(self), **changes})
+
+
+def _several(value: Any) -> tuple[Any, ...]:
+    return (value,) if isinstance(value, (str, Path)) else tuple(value or ())
 
 
 def parse_seed(text: str) -> int:

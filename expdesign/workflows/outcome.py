@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
+from inspect import cleandoc
 from pathlib import Path
 
 from expdesign.errors import InputError
@@ -93,6 +94,8 @@ def workflow(work: Callable[..., Outcome]) -> Callable[..., Outcome]:
         asked = alone | dict(zip(in_order, given, strict=False)) | values
         return work(command.request(**asked), progress=progress, **lines)
 
+    values_in_words = f"Takes `requests.{command.request.__name__}`, or its values: {', '.join(names)}."
+    called.__doc__ = f"{cleandoc(work.__doc__ or '')}\n\n{values_in_words}"
     return called
 
 

@@ -50,7 +50,7 @@ def _new(site: Site) -> None:
     ui.label("A new trial").classes("head2")
     with ui.row().classes("line"):
         name = ui.input(label="Name of the folder", value="mytrial")
-        kind = ui.select(list(KINDS), value=next(iter(KINDS)), label="Kind of ship")
+        kind = ui.select(list(KINDS), value=next(iter(KINDS)), label="Kind of ship").classes("kind")
         start = ui.button("Make it")
     place = ui.column()
 
