@@ -114,6 +114,7 @@ class NoPlan(NoAnswer):
         within: the part of the sea area that was planned in, or None where planning did not begin.
         confidence: a lower one that the first plan, which was too risky, would have met; None without any.
         plan: the first plan that was too risky, while a remedy is looked for.
+        spent_s: counted work of sailing runs and legs until one failed [s]; 0 where none were sailed.
     """
 
     def __init__(self, obstacle: str, *, what: str = "", which: str = "", place: Any = None, remedy: str = "") -> None:
@@ -125,6 +126,7 @@ class NoPlan(NoAnswer):
         self.within: Any = None
         self.confidence: float | None = None
         self.plan: Any = None
+        self.spent_s = 0.0
         super().__init__(obstacle)
 
     def __str__(self) -> str:

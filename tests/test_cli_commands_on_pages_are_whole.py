@@ -11,7 +11,7 @@ from expdesign import workflows
 from expdesign.cli.commands import app
 from expdesign.cli.entry import LISTS, repeat_option
 from expdesign.errors import InputError
-from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Request, command_text, repeating
+from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Estimate, Request, command_text, repeating
 from expdesign.requests.options import Argument
 from expdesign.workflows.commands import run
 from expdesign.workflows.outcome import workflow
@@ -69,6 +69,7 @@ def test_a_request_and_its_values_reach_the_same_work(command: Command, monkeypa
 
     work.__name__ = command.workflow
     called, values = workflow(work), unusual(command)
+    assert all(name in (called.__doc__ or "") for name in values)
     asked = command.request(**values)
     by_name = dict(values)
     first = [by_name.pop(one.name) for one in command.request.asked() if isinstance(one.typed, Argument)]
@@ -102,6 +103,11 @@ def test_values_out_of_range_are_refused_in_python_too() -> None:
                     command.request(**{**unusual(command), one.name: wrong})
     with pytest.raises(InputError, match="DATA"):
         workflows.estimate([], None, vessel=Path("ship.toml"))
+
+
+def test_one_value_where_several_may_be_given_is_one_of_them() -> None:
+    asked = Estimate(data=Path("run.csv"), vessel=Path("ship.toml"), methods="ls", tests=None)
+    assert (asked.data, asked.methods, asked.tests) == ((Path("run.csv"),), ("ls",), ())
 
 
 def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monkeypatch, tmp_path) -> None:

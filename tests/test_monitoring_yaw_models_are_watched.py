@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,8 +144,9 @@ def test_stretches_show_the_changes_of_the_ship_that_sailed_them(folder: Path) -
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("model", ["yaw-full", pytest.param("yaw-simplified", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", ["yaw-full", "yaw-simplified"])
 def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, model: str) -> None:
+    """By the share of her inertia: each model has one of its own, into which the simplified one takes what it lacks."""
     reference = [folder / f"reference-{number}.csv" for number in range(REFERENCES)]
     how = {"vessel": folder / "ship.toml", "reference": reference, "model": model, "size": 0.1}
     told = {}
@@ -155,8 +157,11 @@ def test_the_watch_names_more_inertia_and_is_silent_otherwise(folder: Path, mode
     assert told["same"]["alarms"] == []
     alarm = told["heavier"]["alarms"][-1]
     assert alarm["effect"] == "yaw:I_r"
-    assert alarm["value"] / YAW_TRUE["I_r"] == pytest.approx(0.108, abs=0.05)
     notes = " ".join(told["same"]["notes"])
+    learnt = re.search(r"learnt by output error.*?I_r (\S+) ", notes)
+    assert learnt
+    more = 0.2 * 33.7 / 62.4
+    assert abs(alarm["value"] - more * float(learnt[1])) < 3.0 * alarm["std"] < 0.9 * more * float(learnt[1])
     assert "learnt by output error" in notes
     assert "The reference determines" in notes
     assert "By instruments" in notes

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.export import vessel_toml
 from expdesign.indices import standard_results
 from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
 from expdesign.particulars.fit import Problem, fitted
@@ -220,6 +221,15 @@ WRONG = {
     "no thruster": (SHIP + "block_coefficient = 0.7\n", "thrusters"),
     "only tunnels": (SHIP + "block_coefficient = 0.7\n" + SCREW.replace("propeller", "tunnel"), "drives"),
     "out of the ship": (SHIP + "block_coefficient = 0.7\n" + SCREW.replace("-38", "-380"), "thrusters[1].forward_m"),
+    "beside the ship": (
+        SHIP + "block_coefficient = 0.7\n" + SCREW + "starboard_m = -20.0\n", "thrusters[1].starboard_m",
+    ),
+    "two hulls without their beam": (
+        SHIP + "block_coefficient = 0.7\nhulls = 2\n" + SCREW, "ship.beam_over_all_m",
+    ),
+    "hulls wider than both": (
+        SHIP + "block_coefficient = 0.7\nhulls = 2\nbeam_over_all_m = 20.0\n" + SCREW, "ship.beam_over_all_m",
+    ),
     "rudder without area": (SHIP + "block_coefficient = 0.7\n" + SCREW + "[[rudders]]\nforward_m = -40.0\n", "area"),
     "circle without result": (
         SHIP + "block_coefficient = 0.7\n" + SCREW + "[[circles]]\nspeed_kn = 12.0\n", "circles[1]",
@@ -231,6 +241,18 @@ WRONG = {
         SHIP + "block_coefficient = 0.7\n" + SCREW + "[drift]\nwind_kn = 20.0\ndrift_kn = 1.0\n", "windage",
     ),
 }  # fmt: skip
+
+
+def test_a_catamaran_is_as_wide_as_both_hulls(tmp_path: Path) -> None:
+    """Plans keep the vessel's beam off the shore, while the regressions are of one hull."""
+    card = tmp_path / "card.toml"
+    craft = SHIP.replace("80.0", "2.0").replace("13.0", "0.25").replace("5.0", "0.13")
+    screws = "".join(SCREW.replace("-38.0", "-0.9") + f"starboard_m = {side}\n" for side in (-0.4, 0.4))
+    card.write_text(craft + "hulls = 2\nbeam_over_all_m = 1.08\nblock_coefficient = 0.4\n" + screws)
+    problem, out = Problem(load_card(card)), tmp_path / "vessel.toml"
+    out.write_text(vessel_toml(problem.ship))
+    assert problem.card.hull.beam_m == 0.25
+    assert load_vessel(out).beam_m == 1.08
 
 
 @pytest.mark.parametrize("name", WRONG)

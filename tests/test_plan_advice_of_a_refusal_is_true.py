@@ -15,7 +15,7 @@ import pytest
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.plan import PlanSettings, checked, remedies, remedy_changes, solve
+from expdesign.plan import PlanSettings, checked, remedies, remedy_changes, sailing, solve
 from expdesign.plan.assembly import check_connected, leg_water, plan_room, search_space, ship_on_legs
 from expdesign.plan.feasibility import place_of
 from expdesign.plan.legs import LegWater, escapes
@@ -26,6 +26,7 @@ from expdesign.plan.problem import PlanProblem
 from expdesign.plan.remedies import REMEDY_WORK, REPLANS, advised
 from expdesign.plan.runs import draws_for
 from expdesign.plan.solve import plan_trial
+from expdesign.plan.values import WorkBudget
 from expdesign.progress import silent
 from expdesign.scenario import load_scenario
 from expdesign.simulation import CALM, Environment
@@ -330,6 +331,35 @@ def test_no_plan_is_begun_for_which_no_work_is_left_and_the_refusal_names_it(mon
     fits = 1.0 + spent <= REMEDY_WORK
     assert len(made) == fits
     assert ("as much work as planning: design.excluded with deceleration" in text) != fits
+
+
+@pytest.mark.parametrize(("spent", "plans"), [(0.7, 2), (0.8, 1)])
+def test_where_legs_fail_no_plan_is_begun_for_which_no_work_is_left(monkeypatch, story, spent, plans):
+    made = []
+
+    def failed(other, budget):
+        made.append(other)
+        budget.spent_s += spent * PLAN_S
+
+    monkeypatch.setattr(remedies, "first_sailed", failed)
+    refused = NoPlan("no leg leads on", what="sailing", which="deceleration")
+    refused.spent_s = PLAN_S
+    text = str(advised(story, refused))
+    assert len(made) == plans
+    assert ('as much work as planning: design.excluded = ["deceleration"]' in text) == (plans == 1)
+
+
+def test_a_refusal_where_legs_fail_tells_the_work_that_it_took(monkeypatch, story):
+    def failed(voyage, *_):
+        voyage.budget.optimised(1000, 100)
+        raise NoPlan("no leg leads on", what="sailing")
+
+    monkeypatch.setattr(sailing, "_sailed", failed)
+    budget, water = WorkBudget(), leg_water(story, ship_on_legs(story))
+    room = SimpleNamespace(water=water, space=SimpleNamespace(planner=None))
+    with pytest.raises(NoPlan) as refused:
+        sailing.sail_all(story, room, silent, stated=water, budget=budget)
+    assert refused.value.spent_s == budget.spent_s > 0
 
 
 def test_no_design_is_made_without_a_run_where_the_rest_of_the_refused_plan_fails_too(monkeypatch, story, made):

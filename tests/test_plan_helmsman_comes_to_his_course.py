@@ -8,6 +8,7 @@ import pytest
 from expdesign.conventions import wrap_angle
 from expdesign.plan.control import HelmShip, Helmsman, capability
 from expdesign.plan.control.ships import HELM_RUN_UP_HULLS
+from expdesign.plan.legs import recover
 from expdesign.plan.monte_carlo.procedure import HEADING_RAD, YAW_RATE_SHARE
 from expdesign.plan.runs import Fleet, Truths
 from expdesign.plan.values import PlanSettings
@@ -145,3 +146,19 @@ def test_wound_azimuths_steer_by_the_shortest_turn(lively: tuple[Vessel, HelmShi
     unwound = helm.commands(desired, states, standing)
     assert turns.any()
     np.testing.assert_allclose(helm.commands(desired, states, standing + turns), unwound + turns, atol=1e-9)
+
+
+@pytest.mark.parametrize("turns", [0, 2])
+def test_the_check_of_a_turn_ends_where_counter_helm_does_little_more(
+    lively: tuple[Vessel, HelmShip], turns: int
+) -> None:
+    """Sway keeps a ship that is unstable on her course turning slowly: lengths ahead on which no leg can turn her."""
+    vessel, ship = lively
+    water = replace(open_water(vessel), ship=ship)
+    over = ship.approach.inputs + 0.35 * vessel.angles + 2.0 * np.pi * turns * vessel.turns_freely
+    turning = np.array([0.0, 0.0, 0.0, 3.6, -0.35, 0.012])
+    found = recover(turning, over[None], water, ship)
+    assert abs(found.states[-1, 5]) < 0.8 * turning[5]
+    assert np.hypot(*found.states[-1, :2]) < 2.5 * vessel.length_m
+    wound = 2.0 * np.pi * turns * vessel.turns_freely
+    assert (np.abs(found.commands - wound)[:, vessel.turns_freely] < np.pi / 2).all()

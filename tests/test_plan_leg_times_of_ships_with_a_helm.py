@@ -9,7 +9,7 @@ from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.legs import LegTask
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.local_planner.dubins import dubins_m
-from expdesign.plan.local_planner.helm import helm_times
+from expdesign.plan.local_planner.helm import _lengths_and_times, helm_times
 from expdesign.simulation import steady_ahead
 from helm_case import coaster, open_water
 from plan_case import find_leg
@@ -45,7 +45,7 @@ def test_lengths_do_not_change_when_poses_are_moved_turned_mirrored_or_sailed_ba
 def test_a_longer_leg_takes_longer_and_never_less_than_its_length_at_transit_speed():
     times = rule()
     for exit_mps, entry_mps in ((0.0, 5.0), (4.8, 5.0), (1.4, 0.0), (2.4, 5.0)):
-        shortest_m = max(times._table(exit_mps, entry_mps)[0][0], 0.0 if entry_mps else times.at_rest_m)
+        shortest_m = max(_lengths_and_times(times, exit_mps, entry_mps)[0][0], 0.0 if entry_mps else times.at_rest_m)
         length_m = shortest_m + np.linspace(0.0, 4000.0, 200)
         seconds = times.seconds(length_m, exit_mps, entry_mps)
         assert (np.diff(seconds) > 0).all()

@@ -242,6 +242,22 @@ except KeyboardInterrupt:
     assert not living(tmp_path)
 
 
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_interruption_ends_the_processes_where_waiting_tasks_were_called_off(tmp_path):
+    def interrupted():
+        with local_processes(2):
+            shares = [[(10 * many + one, 600.0) for one in range(4)] for many in range(4)]
+            begun = [in_order(marked, (tmp_path,), tasks) for tasks in shares]
+            wait_for(2, tmp_path)
+            for results in begun:
+                results.close()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert not living(tmp_path)
+
+
 def wait_for(count, folder):
     """Until so many tasks have left their mark."""
     until = time.monotonic() + 60.0

@@ -111,7 +111,10 @@ def test_what_an_unknown_tilt_moves_is_not_trusted_and_the_rest_is() -> None:
     blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
     content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="")
     assert one.trusted
-    assert any(text.startswith("d, K_r, K_vd, K_delta are not to be trusted") for text in roll_sentences(content))
+    texts = roll_sentences(content)
+    moved = "d, K_r, K_vd, K_delta, damping by the square"
+    assert any(text.startswith(f"{moved} are not to be trusted") for text in texts)
+    assert not any("estimated beside d" in text for text in texts)
     assert [row[0] for row in parameter_rows(content) if "none to be trusted" in row[3]] == [
         "d",
         "K_r",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from expdesign import requests
 from expdesign.errors import InputError
 from expdesign.plan.values import PlanSettings
 from expdesign.scenario import load_scenario
@@ -151,9 +152,9 @@ def test_values_are_put_where_tables_are_missing_and_taken_away() -> None:
 def test_commands_run_report_and_stop(tmp_path: Path) -> None:
     async def work() -> None:
         jobs = Jobs(tmp_path)
-        made = jobs.start(("new", "craft", "--kind", "asv"))
-        wrong = jobs.start(("run", "nothing.toml"))
-        waiting = jobs.start(("run", "craft/scenario.toml"))
+        made = jobs.start(requests.New(folder=Path("craft"), kind="asv"))
+        wrong = jobs.start(requests.Run(scenario=Path("nothing.toml")))
+        waiting = jobs.start(requests.Run(scenario=Path("craft/scenario.toml")))
         jobs.stop(waiting)
         while made.status is None or wrong.status is None:
             await asyncio.sleep(0.05)

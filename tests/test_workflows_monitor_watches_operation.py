@@ -58,6 +58,8 @@ def test_a_change_of_the_ship_is_told_and_nothing_else(voyages: dict[str, Path],
     assert float(rows[1].split(",")[0]) >= alarm["since_s"]
     page = (tmp_path / "monitor.html").read_text()
     assert "parameter N_r" in page
+    saved = json.loads((tmp_path / "monitor-state.json").read_text())
+    assert len(saved["phase"]["moments"]) >= 1.75 * 6  # of the figures: a watch of an hour is a line, not a point
     assert "http" not in page.replace("http://www.w3.org", "")
 
 

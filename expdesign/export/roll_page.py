@@ -32,6 +32,7 @@ from expdesign.roll import (
 PARAMETER_HEADER = ("Parameter", "Meaning", "Estimate", "95 % interval", "Unit")
 SCALED_HEADER = ("Parameter", "At full scale", "95 % interval", "Unit")
 CURE_HEADER = ("What more", "Directions left open", "Smallest relative sensitivity")
+EFFECT_WORDS = {"quadratic": "damping by the square", "forward": "the sensor's place", "tilt": "the sensor's tilt"}
 NORMAL = 1.96
 LEAST_CHANCE = 1e-4
 """Smallest probability that is written out."""
@@ -116,7 +117,7 @@ def _sentences(content: RollContent) -> Iterator[str]:
         height = f"a metacentric height of {plus_minus(*metacentric_height(estimate, case.load))} m"
         warned = "" if estimate.trusted else "Not to be trusted: "
         yield f"{warned}{case.name}: righting moment {right:.4g} N m/rad, {height}, {upright}{if_so}."
-    if estimate.trusted:
+    if estimate.trusted and estimate.tilt_told:
         yield from _effects(content)
     yield from _open(content)
     for one in report.faint:
@@ -142,10 +143,11 @@ def _sentences(content: RollContent) -> Iterator[str]:
             "helm does; steer by hand or by a course alone, or give what was planned as planned_rudder1_rad."
         )
     if estimate.trusted and estimate.by_tilt:
+        moved = ", ".join([*estimate.by_tilt, *(EFFECT_WORDS[name] for name in estimate.effects)])
         yield (
-            f"{', '.join(estimate.by_tilt)} are not to be trusted, as nothing tells how the sensor is tilted: other "
-            "tilts fit as well, with other values of these. The load and metacentric heights hardly mind. Measure the "
-            "tilt and state sensor_tilt_deg."
+            f"{moved} are not to be trusted, as nothing tells how the sensor is tilted: other tilts fit as well, with "
+            "other values of these. Load and metacentric heights are hardly affected. Measure the tilt and state "
+            "sensor_tilt_deg."
         )
     for name in estimate.reached:
         yield (
@@ -266,7 +268,13 @@ def roll_json(content: RollContent) -> str:
             },
             **({} if content.scale is None else {"at_full_scale": _scaled(content)}),
             "effects": {
-                name: {"value": value, "std": std, "meaning": EFFECTS[name][0], "unit": EFFECTS[name][1]}
+                name: {
+                    "value": value,
+                    "std": std,
+                    "meaning": EFFECTS[name][0],
+                    "unit": EFFECTS[name][1],
+                    "trusted": estimate.trusted and estimate.tilt_told,
+                }
                 for name, (value, std) in estimate.effects.items()
             },
             "metacentric_heights_m": {
@@ -352,7 +360,7 @@ def roll_document(content: RollContent) -> Document:
         about=EQUATION,
         mark=None if estimate.trusted else Mark(text=f"None to be trusted: {headline(content)}", good=False),
         findings=roll_sentences(content),
-        facts={"rank": report.rank, "free": len(report.free)},
+        facts={"parameters_sought": len(report.free), "of_these_determined": report.rank},
         values={
             "trusted": "all" if estimate.trusted else f"none: {headline(content)}",
             "parameters": estimate.values,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -102,8 +103,8 @@ def _inertia(axes: Axes, samples: list[StepSample], surface: Surface, title: str
 
 
 @page_figure
-def simulation_figure(part: Validated, key: str) -> str:
-    """U and r, measured and simulated from the commands alone."""
+def simulation_figure(part: Validated, halves: Sequence[int], key: str) -> str:
+    """U and r, measured and, of the halves that the model has, simulated from the commands alone."""
     figure = new_figure(6.8, 3.6)
     axes = figure.subplots(2, 1, sharex=True)
     every = max(1, len(part.time_s) // MOST_POINTS)
@@ -111,12 +112,12 @@ def simulation_figure(part: Validated, key: str) -> str:
         axes[channel].plot(
             part.time_s[::every], part.measured[::every, channel], color=BLUE, linewidth=0.8, label="measured"
         )
-        axes[channel].plot(
-            part.time_s[::every], part.simulated[::every, channel], color=VERMILION, linewidth=0.9, label="simulated"
-        )
+        if channel in halves:
+            simulated = part.simulated[::every, channel]
+            axes[channel].plot(part.time_s[::every], simulated, color=VERMILION, linewidth=0.9, label="simulated")
         axes[channel].set_ylabel(label)
         light_grid(axes[channel])
-    axes[0].legend(loc="upper right", fontsize=8, ncols=2)
+    axes[halves[0]].legend(loc="upper right", fontsize=8, ncols=2)
     axes[1].set_xlabel("time [s]")
     return svg(figure, key=key, label=f"Speed and yaw rate of {part.name}, measured and simulated")
 
@@ -192,6 +193,7 @@ def step_trial_document(content: StepTrialContent) -> Document:
 
 
 def _simulation(content: StepTrialContent, place: int, part: Validated) -> Figure:
-    fits = (f"{'Ur'[half]} {part.fit_percent[half]:.0f} %" for half, *_ in content.trial.model.halves)
+    halves = [half for half, *_ in content.trial.model.halves]
+    fits = (f"{'Ur'[half]} {part.fit_percent[half]:.0f} %" for half in halves)
     caption = f"{part.name}: simulated from its first state with its commands alone. Fit {', '.join(fits)}."
-    return Figure(draw=partial(simulation_figure, part, f"simulation{place}"), caption=caption)
+    return Figure(draw=partial(simulation_figure, part, halves, f"simulation{place}"), caption=caption)

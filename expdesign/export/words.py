@@ -41,7 +41,10 @@ def duration(seconds: float) -> str:
 
 def hours(time_s: float) -> str:
     """A time in words."""
-    return f"{time_s / HOUR:.2f} h" if time_s < 100 * HOUR else f"{time_s / HOUR / 24:.1f} d"
+    days = time_s / HOUR / 24.0
+    if time_s < 100 * HOUR:
+        return f"{time_s / HOUR:.2f} h"
+    return f"{days:.1f} d" if days < 1000.0 else f"{days / 365.25:.3g} years"
 
 
 def when(time_s: float) -> str:

@@ -39,6 +39,7 @@ class Hull:
     mass_kg: float  # displacement
     gravity_forward_m: float = 0.0  # centre of gravity ahead of midships
     hulls: int = 1  # 2 for a catamaran, each with that beam
+    over_all_m: float | None = None  # beam over all hulls; None where there is one
 
     @property
     def block(self) -> float:

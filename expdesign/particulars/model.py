@@ -115,8 +115,8 @@ def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> 
         }},
     )  # fmt: skip
     return Vessel(
-        name=card.name, length_m=hull.length_m, beam_m=hull.beam_m, draught_m=hull.draught_m, sample_time_s=step,
-        model=model,
+        name=card.name, length_m=hull.length_m, beam_m=hull.over_all_m or hull.beam_m, draught_m=hull.draught_m,
+        sample_time_s=step, model=model,
     )  # fmt: skip
 
 

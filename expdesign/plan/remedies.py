@@ -54,8 +54,8 @@ TURNS_DEG: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))
 CLEARANCE_SHARES = (1.0, 0.75, 0.5, 0.0)  # of the largest clearance with which every run has a place, tried as remedies
 SAILED_SHARES = (0.5, 0.0)  # of the clearance asked for, tried as remedies where legs fail
 MOST_PLANS = 2  # plans made to check remedies
-# counted work of looking for remedies where drawn trials fail, in that of the refused plan; half of planning is not
-# counted, and is remembered
+# counted work of looking for remedies where legs or drawn trials fail, in that of the refused plan; half of planning is
+# not counted, and is remembered
 REMEDY_WORK = 1.75
 # tried as remedies of a refusal, the highest first
 LOWER_CONFIDENCES = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
@@ -229,15 +229,33 @@ def for_confidence(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterato
 
 
 def for_sailing(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
-    """Less clearance, or a design without the run that no leg led to, with which every run is sailed."""
+    """Less clearance, or a design without the run that no leg led to, with which every run is sailed.
+
+    Each takes a plan, which is counted: no more is begun than the refused plan took.
+    """
+    budget, affords = _limit(refused.spent_s)
     asked = problem.settings.clearance_m
     halves = [float(f"{share * asked:.2g}") for share in SAILED_SHARES] if asked > 0 else []
     changes = [of_setting(problem, "clearance_m", value) for value in halves]
     names = {refused.which} - {"", "goal"}
     tries = chain(changes[:1], exclusions(problem, names) if names else (), changes[1:])
     yield from first_that_passes(
-        tries, lambda other: first_sailed(other, WorkBudget()) is not None, SAILED, tell=tell, most=MOST_PLANS
+        tries,
+        lambda other: first_sailed(other, budget) is not None,
+        SAILED,
+        tell=tell,
+        most=MOST_PLANS,
+        affords=affords,
     )
+
+
+def _limit(plan_s: float) -> tuple[WorkBudget, Callable[[], bool]]:
+    """The work budget of remedies where a refused plan took so much [s], and whether another plan fits into it.
+
+    Without limit where no work was counted.
+    """
+    budget = WorkBudget(most_s=REMEDY_WORK * plan_s) if plan_s else WorkBudget()
+    return budget, lambda: budget.spent_s + plan_s <= budget.most_s
 
 
 def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
@@ -249,11 +267,7 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
     that is planned takes.
     """
     first: Refused | None = refused.plan
-    plan_s = 0.0 if first is None else first.spent_s
-    budget = WorkBudget() if first is None else WorkBudget(most_s=REMEDY_WORK * plan_s)
-
-    def affords() -> bool:
-        return budget.spent_s + plan_s <= budget.most_s
+    budget, affords = _limit(0.0 if first is None else first.spent_s)
 
     def passes(other: PlanProblem) -> bool:
         made = first_sailed(other, budget)

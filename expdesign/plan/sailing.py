@@ -205,6 +205,7 @@ def sail_all(
         return _sailed(voyage, room.space, progress)
     except NoPlan as error:
         error.poses = voyage.sailed.trajectory.pose if voyage.line.stretches else None
+        error.spent_s = budget.spent_s
         raise
 
 

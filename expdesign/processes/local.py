@@ -20,6 +20,7 @@ from typing import Any
 
 import cloudpickle
 from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.backend.utils import kill_process_tree
 
 from expdesign.errors import InputError
 
@@ -104,7 +105,11 @@ class Processes:
     def end(self, *, kill: bool) -> None:
         """End the processes, at once or when the tasks that have begun are done."""
         if self._executor is not None:
-            self._executor.shutdown(kill_workers=kill)
+            if kill:  # asked to, loky fails at the first task that was called off, and kills none
+                for process in list((self._executor._processes or {}).values()):
+                    with suppress(ProcessLookupError):
+                        kill_process_tree(process)
+            self._executor.shutdown()
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import MISSING, dataclass, replace
 from functools import cache
@@ -25,7 +24,6 @@ class Option:
     max: float | None = None
     over: float | None = None  # it must be larger, and finite
     parser: Callable[[str], Any] | None = None  # of what is typed
-    check: Callable[[Any], object] | None = None  # of the value, before the work begins
     stated: bool = False  # whether the command that repeats a call states a usual value, too
 
     @property
@@ -66,7 +64,7 @@ class Asked:
         """Check a value, also where no command line has.
 
         Raises:
-            InputError: it is out of its range, or refused by the check of the option.
+            InputError: it is out of its range, or nothing is given.
         """
         if value == () and self.default is MISSING:
             raise InputError(f"no {self.typed.metavar or self.flag} is given, expected one or more")
@@ -74,8 +72,6 @@ class Asked:
             return
         if self.typed.range and not self.typed.allows(value):
             raise InputError(f"{self.flag} is {value:g}, expected {self.typed.range}")
-        if self.typed.check is not None:
-            self.typed.check(value)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -86,7 +82,7 @@ class Request:
     """
 
     def __init__(self, **values: object) -> None:
-        """Take values by name; of several a list, or None for an empty one, becomes a tuple.
+        """Take values by name; where several may be given, a list, a single one or None becomes a tuple.
 
         Raises:
             TypeError: a name is unknown or missing.
@@ -97,7 +93,7 @@ class Request:
         if wrong:
             raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
         for name, value in values.items():
-            vars(self)[name] = tuple(value or ()) if get_origin(asked[name].kind) is tuple else value  # type: ignore[arg-type]
+            vars(self)[name] = _several(value) if get_origin(asked[name].kind) is tuple else value
         for name, one in asked.items():
             one.check(getattr(self, name))
 
@@ -114,6 +110,10 @@ class Request:
     def but(self, **changes: object) -> Self:
         """The request with some values changed."""
         return type(self)(**{**vars(self), **changes})
+
+
+def _several(value: Any) -> tuple[Any, ...]:
+    return (value,) if isinstance(value, (str, Path)) else tuple(value or ())
 
 
 def parse_seed(text: str) -> int:
@@ -134,21 +134,6 @@ def parse_jobs(text: str) -> int:
     return _count("--jobs", text)
 
 
-def check_out(out: Path) -> None:
-    """The folder for results, before hours are spent on something that cannot be written there.
-
-    Raises:
-        InputError: it is a file, lies below a file, or may not be written to.
-    """
-    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
-    if there.is_symlink() and not there.exists():
-        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
-    if not there.is_dir():
-        raise InputError(f"--out {out}: {there} is a file, expected a folder")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: no permission to write in {there}")
-
-
 def _count(option: str, text: str) -> int:
     if not str(text).isdecimal():
         raise InputError(f"{option} is {text}, expected a whole number of 0 or more")
@@ -159,8 +144,8 @@ def _count(option: str, text: str) -> int:
 
 
 def out_option(default: str) -> object:
-    """`--out`, checked; `default` says where results go without it."""
-    return Option("--out", "-o", metavar="FOLDER", check=check_out, help=f"Folder for the results. Default: {default}.")
+    """`--out`; `default` says where results go without it."""
+    return Option("--out", "-o", metavar="FOLDER", help=f"Folder for the results. Default: {default}.")
 
 
 Out = Annotated[Path | None, out_option("runs/<name of the scenario>")]

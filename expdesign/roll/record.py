@@ -13,7 +13,7 @@ from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.roll.estimate import RollEstimate, estimate_roll
 from expdesign.roll.model import PARAMETERS, coefficients
 from expdesign.roll.problem import build_problem
-from expdesign.roll.runs import Case, Run, low_pass, prepared
+from expdesign.roll.runs import Case, Run, level, low_pass, prepared
 from expdesign.signals import AUXILIARY, Batch
 from expdesign.simulation import acting_response, delivered_at_samples, steering_signals
 from expdesign.values import Array
@@ -33,11 +33,9 @@ def missing_columns(batch: Batch) -> tuple[str, ...]:
 
 def levelled(signals: Array, body: Body, step_s: float) -> Array:
     """(k, 4) signals of a run as a sensor above the axis of yaw would read them, that stands level."""
-    tilt_rad = body.tilt_rad or 0.0
-    cos, sin = np.cos(tilt_rad), np.sin(tilt_rad)
-    rate, sensed, turn, rudder = signals.T
-    rolls, turns = cos * rate + sin * turn, cos * turn - sin * rate
-    return np.column_stack([rolls, sensed + body.forward_m * np.gradient(turns, step_s), turns, rudder])
+    found = level(signals, body.tilt_rad or 0.0)
+    found[:, 1] += body.forward_m * np.gradient(found[:, 2], step_s)
+    return found
 
 
 def roll_run(batch: Batch, *, rudder: Sequence[str] = (), ship: Vessel | None = None, body: Body | None = None) -> Run:

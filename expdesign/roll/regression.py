@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run
+from expdesign.roll.runs import LEFT_OUT_SAMPLES, Run, level
 from expdesign.roll.tuning import TUNING
 from expdesign.values import Array, seal
 
@@ -54,11 +54,13 @@ class Rows:
 
 def build_rows(run: Run, noise: NoiseModel) -> Rows:
     """Rows of a run; those whose past reaches before it are not whitened, so that what they miss does not ring on."""
-    table = np.column_stack([run.signals[:, 0], regressors(run.signals)])
-    effects = _effects(run.signals, run.step_s)
+    *linear, tilt_rad = run.effects
+    signals = level(run.signals, tilt_rad)  # first, as the sensor's place counts yaw alone
+    table = np.column_stack([signals[:, 0], regressors(signals)])
+    effects = _effects(signals, run.step_s)
     table[:2], effects[:2] = 0.0, 0.0
     table[:, :3] = unwarped(table[:, :3], run.unwarped)
-    table += np.einsum("kij,i->kj", effects, run.effects)
+    table += np.einsum("kij,i->kj", effects[:, : len(linear)], linear)
     both = np.column_stack([table, effects.reshape(len(table), -1)])
     both = without_start(noise.whitened(both)[LEFT_OUT_SAMPLES:], noise)
     return Rows(y=both[:, 0], X=both[:, 1:6], effects=both[:, 6:].reshape(-1, 3, 6))

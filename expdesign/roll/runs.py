@@ -62,6 +62,13 @@ class Case:
     runs: tuple[Run, ...]  # at least one, all with one time between samples
 
 
+def level(signals: Array, tilt_rad: float) -> Array:
+    """(k, 4) signals with roll and yaw rate as of gyros that are not tilted; their bow end is up by the tilt."""
+    cos, sin = np.cos(tilt_rad), np.sin(tilt_rad)
+    rate, sensed, turn, rudder = signals.T
+    return np.column_stack([cos * rate + sin * turn, sensed, cos * turn - sin * rate, rudder])
+
+
 # Low-pass filter and thinning out of runs, which must pass the roll mode.
 #
 # All signals of a run pass the same symmetric filter, so that the equations between them stay as they are and nothing

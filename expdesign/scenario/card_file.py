@@ -37,6 +37,9 @@ class ShipTable(Table):
     )
     gravity_forward_m: Number = Field(default=0.0, description="the centre of gravity ahead of midships [m]")
     hulls: int = Field(default=1, ge=1, le=2, description="1, or 2 for a catamaran")
+    beam_over_all_m: Positive | None = Field(
+        default=None, description="the beam over both hulls of a catamaran [m], which her room in the water follows"
+    )
     top_speed_kn: Positive | None = Field(
         default=None, description="the speed at full order ahead [kn], in calm deep water at this draught"
     )
@@ -188,16 +191,16 @@ def load_card(path: Path | str) -> Card:
     file = check_table(CardFile, read_toml(entry.path), entry)
     ship, length = file.ship, file.ship.length_m
     for number, one in enumerate(file.thrusters, start=1):
-        _check_place(one.forward_m, length, entry.at("thrusters").item(number))
+        _check_place(one.forward_m, one.starboard_m, file.ship, entry.at("thrusters").item(number))
     for number, rudder in enumerate(file.rudders, start=1):
-        _check_place(rudder.forward_m, length, entry.at("rudders").item(number))
+        _check_place(rudder.forward_m, 0.0, file.ship, entry.at("rudders").item(number))
     rudders = (_rudder(one, ship, entry.at("rudders").item(n)) for n, one in enumerate(file.rudders, start=1))
     windage = file.windage
     card = Card(
         name=ship.name,
         hull=Hull(
             length_m=length, beam_m=ship.beam_m, draught_m=ship.draught_m, mass_kg=_mass(ship, entry.at("ship")),
-            gravity_forward_m=ship.gravity_forward_m, hulls=ship.hulls,
+            gravity_forward_m=ship.gravity_forward_m, hulls=ship.hulls, over_all_m=_over_all_m(ship, entry.at("ship")),
         ),
         thrusters=tuple(_thruster(one, length) for one in file.thrusters),
         rudders=tuple(rudders),
@@ -209,11 +212,24 @@ def load_card(path: Path | str) -> Card:
     return replace(card, stated=tuple(_stated(file, entry)))
 
 
-def _check_place(forward_m: float, length_m: float, entry: Entry) -> None:
-    most = 0.6 * length_m
-    if abs(forward_m) > most:
-        allowed = f"{-most:g} to {most:g}, counted from midships"
-        raise entry.at("forward_m").error(f"is {forward_m:g}, expected {allowed}")
+def _check_place(forward_m: float, starboard_m: float, ship: ShipTable, entry: Entry) -> None:
+    ends = {
+        "forward_m": (forward_m, 0.6 * ship.length_m, "midships"),
+        "starboard_m": (starboard_m, ship.beam_over_all_m or ship.beam_m, "amidships"),
+    }
+    for name, (place, most, middle) in ends.items():
+        if abs(place) > most:
+            raise entry.at(name).error(f"is {place:g}, expected {-most:g} to {most:g}, counted from {middle}")
+
+
+def _over_all_m(ship: ShipTable, entry: Entry) -> float | None:
+    """Beam over both hulls of a catamaran [m]."""
+    stated, least = ship.beam_over_all_m, ship.hulls * ship.beam_m
+    if ship.hulls > 1 and stated is None:
+        raise entry.at("beam_over_all_m").error("is missing, expected it of a ship of two hulls")
+    if stated is not None and stated < least:
+        raise entry.at("beam_over_all_m").error(f"is {stated:g}, expected no less than that of all hulls, {least:g}")
+    return stated
 
 
 def _mass(ship: ShipTable, entry: Entry) -> float:

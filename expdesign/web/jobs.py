@@ -11,9 +11,10 @@ import shlex
 import signal
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from expdesign.requests import Request, command_text
 
 PROGRESS = re.compile(r"\[\s*(\d+)%\] (.*)")
 """A line of progress: share and activity."""
@@ -28,9 +29,8 @@ INTERRUPTED = 130
 class Job:
     """A command that waits, runs or has ended."""
 
-    words: tuple[str, ...]  # after `expdesign`
+    request: Request
     folder: Path  # in which it runs
-    out: str = ""  # folder of its results, in `folder`
     share: float = 0.0  # of its work that is done
     activity: str = "waiting for its turn"
     lines: list[str] = field(default_factory=list)  # printed
@@ -43,7 +43,12 @@ class Job:
     @property
     def command(self) -> str:
         """As one types it in the folder."""
-        return shlex.join(("expdesign", *self.words))
+        return command_text(self.request)
+
+    @property
+    def out(self) -> str:
+        """Folder of its results, in the folder in which it runs."""
+        return str(getattr(self.request, "out", None) or "")
 
     @property
     def state(self) -> str:
@@ -66,9 +71,9 @@ class Jobs:
         self._turns = asyncio.Semaphore(MOST_JOBS)
         self._tasks = set[asyncio.Task[None]]()
 
-    def start(self, words: Sequence[str], *, out: str = "") -> Job:
-        """Run `expdesign WORDS` in the folder."""
-        job = Job(tuple(words), self.folder, out)
+    def start(self, request: Request) -> Job:
+        """Run a command in the folder."""
+        job = Job(request, self.folder)
         self.all.insert(0, job)
         task = asyncio.get_running_loop().create_task(self._run(job))
         self._tasks.add(task)
@@ -96,7 +101,7 @@ class Jobs:
                 return
             job.began_s, job.activity = time.monotonic(), "starting"
             job.process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "expdesign", *job.words),
+                *(sys.executable, "-m", *shlex.split(job.command)),
                 cwd=self.folder,
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,

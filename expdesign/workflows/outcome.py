@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, wraps
+from inspect import cleandoc
 from pathlib import Path
 
+from expdesign.errors import InputError
 from expdesign.export import Content, write_files
 from expdesign.export.document import Document, Section, Table, fact_text
 from expdesign.interruptions import interruptions_wait
@@ -91,6 +94,8 @@ def workflow(work: Callable[..., Outcome]) -> Callable[..., Outcome]:
         asked = alone | dict(zip(in_order, given, strict=False)) | values
         return work(command.request(**asked), progress=progress, **lines)
 
+    values_in_words = f"Takes `requests.{command.request.__name__}`, or its values: {', '.join(names)}."
+    called.__doc__ = f"{cleandoc(work.__doc__ or '')}\n\n{values_in_words}"
     return called
 
 
@@ -106,11 +111,28 @@ def carry_out(request: Request, *, progress: Progress = silent, tell: Told = sil
         NoAnswer: there is none.
     """
     command = command_of(request)
+    if out := getattr(request, "out", None):
+        check_out(out)
     with interruptions_wait():  # some solvers do not stand being interrupted while they load
         from expdesign import workflows
 
         work: Callable[..., Outcome] = getattr(workflows, command.workflow)
     return work(request, progress=progress, **({"tell": tell} if command.tells else {}))
+
+
+def check_out(out: Path) -> None:
+    """The folder for results, before hours are spent on something that cannot be written there.
+
+    Raises:
+        InputError: it is a file, lies below a file, or may not be written to.
+    """
+    there = next(path for path in (out, *out.absolute().parents) if path.exists() or path.is_symlink())
+    if there.is_symlink() and not there.exists():
+        raise InputError(f"--out {out}: {there} is a link to {there.readlink()}, which does not exist")
+    if not there.is_dir():
+        raise InputError(f"--out {out}: {there} is a file, expected a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: no permission to write in {there}")
 
 
 def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), notes: Sequence[str] = ()) -> Document:

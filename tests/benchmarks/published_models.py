@@ -51,6 +51,19 @@ def run(model: Model, speed: float, helm: Callable[[float, np.ndarray], float], 
     return np.array(times), np.array(states)
 
 
+def froude(model: Model, scale: float) -> Model:
+    """The same ship, so many times as long, by Froude's law: times grow with the root of lengths."""
+    root = math.sqrt(scale)
+
+    def rates(x: np.ndarray, delta: float, order: float) -> np.ndarray:
+        return model.rates(x / (root, root, 1.0 / root), delta, order) * (1.0, 1.0, 1.0 / scale)
+
+    return Model(
+        length_m=model.length_m * scale, speed_mps=model.speed_mps * root, rates=rates,
+        helm_rate_radps=model.helm_rate_radps / root,
+    )  # fmt: skip
+
+
 def order_for(model: Model, speed: float) -> float:
     """Engine order at which a speed is steady."""
     low, high = 0.0, 2.0

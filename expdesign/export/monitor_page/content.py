@@ -212,13 +212,13 @@ def _call(content: MonitorContent, call: Call) -> str:
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     statistic, limit = told_apart(alarm.statistic, content.limit)
-    own, who = f"{change.words} by {size_in_words(content, alarm)}", "the ship is another"
+    own, who = f"{change.words} by {size_in_words(content, alarm)}", "the ship has changed"
     if alarm.pushes:
         push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
         if pushed(content, alarm, beyond=AS_LIKELY):
-            own, who = f"{push}, or, explaining the data less well, {own}", "the weather or the ship is another"
+            own, who = f"{push}, or, explaining the data less well, {own}", "the weather or the ship has changed"
         else:
-            own, who = f"{own}, or {push}, which explains the data as well", "the ship or the weather is another"
+            own, who = f"{own}, or {push}, which explains the data as well", "the ship or the weather has changed"
     text = (
         f"Since {when(alarm.since_s)} {who}: {own}. The alarm came at {when(alarm.time_s)}, with the statistic "
         f"{statistic} above the threshold {limit}."
@@ -293,7 +293,7 @@ def monitor_header(content: MonitorContent) -> tuple[str, ...]:
     """Header of `monitor_rows`."""
     since_s = float(content.state.whole.since_s[0])
     anew = any(alarm.since_s < since_s for alarm in content.found)
-    since = f"since {when(since_s)}" if anew else "since the watch began"
+    since = f"since {when(since_s)}, beside what was found" if anew else "since the watch began"
     return ("Change", "Size watched for", "Alarm after", since[:1].upper() + since[1:], "Not distinguishable from")
 
 

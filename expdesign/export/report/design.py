@@ -115,58 +115,42 @@ def short_of_optimum(content: ReportContent) -> str:
 # The steps from the mathematical optimum to the route file: the loss and the proof at each step.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """One step: its name, its result, and the method behind the number."""
-
-    step: str
-    found: str
-    proof: str
+Link = tuple[str, str, str]
+"""One step: its name, its result, and the method behind the number."""
 
 
 def chain(content: ReportContent, *, short_of_optimum: str) -> list[Link]:
     """The links that lead from durations to the route, each with its proof."""
     design, plan, check = content.design, content.plan, content.plan.verification
     links = [
-        Link(
-            step=f"Optimal durations{', which state the accuracy' if _asks_accuracy(content.day) else ''}",
-            found=f"no other allocation of the time is better by more than {short_of_optimum}",
-            proof="equivalence theorem, with the matrices in dictionary.json",
+        (
+            f"Optimal durations{', which state the accuracy' if _asks_accuracy(content.day) else ''}",
+            f"no other allocation of the time is better by more than {short_of_optimum}",
+            "equivalence theorem, with the matrices in dictionary.json",
         ),
-        Link(
-            step="Whole runs",
-            found=f"{words.percent(design.efficiency_repeats)} of that optimum",
-            proof="information of the whole runs",
+        (
+            "Whole runs",
+            f"{words.percent(design.efficiency_repeats)} of that optimum",
+            "information of the whole runs",
         ),
         *_day_links(content.day),
     ]
-    if plan.design_efficiency_placed is not None:
-        links.append(
-            Link(
-                step="Runs as placed",
-                found=f"{words.percent(plan.design_efficiency_placed)} of the information of the optimum",
-                proof="information of the runs alone, with their planned headings and initial velocities",
-            )
-        )
-    if plan.design_efficiency_realised is not None:
-        links.append(
-            Link(
-                step="Whole track",
-                found=f"{words.percent(plan.design_efficiency_realised)} of the information of the optimum",
-                proof="information of the whole track, repositioning included",
-            )
-        )
-    links.append(
-        Link(
-            step="Allowed water",
-            found=(
-                f"least clearance {words.distance(check.clearance_min_m)}, "
-                f"{words.distance(content.clearance_m)} required"
-            ),
-            proof="independent simulation with a ten times smaller step; swept hull against the polygons of the chart",
-        )
+    for step, share, proof in (
+        (
+            "Runs as placed",
+            plan.design_efficiency_placed,
+            "information of the runs alone, with their planned headings and initial velocities",
+        ),
+        ("Whole track", plan.design_efficiency_realised, "information of the whole track, repositioning included"),
+    ):
+        if share is not None:
+            links.append((step, f"{words.percent(share)} of the information of the optimum", proof))
+    water = (
+        "Allowed water",
+        f"least clearance {words.distance(check.clearance_min_m)}, {words.distance(content.clearance_m)} required",
+        "independent simulation with a ten times smaller step; swept hull against the polygons of the chart",
     )
-    return [*links, *_route_links(content)]
+    return [*links, water, *_route_links(content)]
 
 
 def _asks_accuracy(day: ShortestDay | None) -> bool:
@@ -178,10 +162,10 @@ def _day_links(day: ShortestDay | None) -> list[Link]:
         return []
     share = words.percent(day.bound.day_s / day.plan.commands.duration_s)
     return [
-        Link(
-            step="The day",
-            found=f"no day is shorter than {words.duration(day.bound.day_s)}, {share} of this one",
-            proof="transit at the largest speed; an upper bound on the information rate of any motion within limits",
+        (
+            "The day",
+            f"no day is shorter than {words.duration(day.bound.day_s)}, {share} of this one",
+            "transit at the largest speed; an upper bound on the information rate of any motion within limits",
         )
     ]
 
@@ -193,16 +177,12 @@ def _route_links(content: ReportContent) -> list[Link]:
     fit = route.fit
     water = {True: ", every leg in allowed water", False: ", NOT every leg in allowed water", None: ""}[fit.in_water]
     return [
-        Link(
-            step="Exported route",
-            found=(
-                f"{len(route.waypoints)} waypoints; track within {words.number(fit.largest_m)} m of the legs; "
-                f"stated cross-track distance {words.number(route.xtd_m)} m{water}"
-            ),
-            proof=(
-                f"computed at every sample, positions with {DEGREE_DECIMALS} decimals; rhumb lines deviate from the "
-                f"straight legs by {_small(fit.loxodrome_m)}, great circles by {_small(fit.orthodrome_m)}"
-            ),
+        (
+            "Exported route",
+            f"{len(route.waypoints)} waypoints; track within {words.number(fit.largest_m)} m of the legs; "
+            f"stated cross-track distance {words.number(route.xtd_m)} m{water}",
+            f"computed at every sample, positions with {DEGREE_DECIMALS} decimals; rhumb lines deviate from the "
+            f"straight legs by {_small(fit.loxodrome_m)}, great circles by {_small(fit.orthodrome_m)}",
         )
     ]
 
@@ -214,34 +194,21 @@ def _small(length_m: float) -> str:
 # Manoeuvres that a search added to the dictionary, and the gain of each.
 
 
-@dataclass(frozen=True, kw_only=True)
-class GrowthRow:
-    """One manoeuvre that was added."""
-
-    number: int
-    name: str
-    what: str
-    sensitivity: str
-    gain: str
-    efficiency: str
-    excites: bool
-
-
-def growth_rows(growth: Growth, shown: Callable[[str], str]) -> list[GrowthRow]:
-    """Additions in order."""
+def growth_rows(growth: Growth, shown: Callable[[str], str]) -> list[tuple[str, ...]]:
+    """Additions in order: step, name, description, sensitivity before, gain, efficiency, excitation condition."""
     return [_row(number, found, shown) for number, found in enumerate(growth.rounds, start=1)]
 
 
-def _row(number: int, found: GrowRound, shown: Callable[[str], str]) -> GrowthRow:
+def _row(number: int, found: GrowRound, shown: Callable[[str], str]) -> tuple[str, ...]:
     settings = ", ".join(setting(name, value) for name, value in found.settings.items())
-    return GrowthRow(
-        number=number,
-        name=shown(found.name),
-        what=words.family(found.family) + (f"; {settings}" if settings else ""),
-        sensitivity=words.number(found.sensitivity),
-        gain=f"+{words.number(found.log_det_gain, 3)}" if found.log_det_gain >= 0 else words.number(found.log_det_gain),
-        efficiency=words.percent(found.efficiency),
-        excites=found.excitation_condition,
+    return (
+        str(number),
+        shown(found.name),
+        words.family(found.family) + (f"; {settings}" if settings else ""),
+        words.number(found.sensitivity),
+        f"+{words.number(found.log_det_gain, 3)}" if found.log_det_gain >= 0 else words.number(found.log_det_gain),
+        words.percent(found.efficiency),
+        "holds" if found.excitation_condition else "does not hold",
     )
 
 

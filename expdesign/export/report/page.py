@@ -113,7 +113,6 @@ class Fact:
 def report_html(content: ReportContent) -> str:
     """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
     after = content.accuracy
-    rows = parameter_rows(content, after)
     page = page_template("report.html")
     return page.render(
         content=content,
@@ -134,7 +133,7 @@ def report_html(content: ReportContent) -> str:
         legend=chart_legend(content),
         agenda=tables.agenda(content),
         primitives=tables.primitive_rows(content),
-        parameters=rows,
+        parameters=parameter_rows(content, after),
         known_rows=known_rows(content.known),
         known_sentences=known_sentences(content.known, content.plan.area.frame),
         noise=measures_velocity(content),
@@ -153,7 +152,7 @@ def report_html(content: ReportContent) -> str:
         percent=words.percent,
         equation=equation_sentence(content),
         unknown_current=unknown_current_sentence(content),
-        less=any(row.less for row in rows),
+        less=bool(((after.before > 0) & (after.before < after.track)).any()),
         excitation=tables.excitation_sentence(content),
     )
 

@@ -18,37 +18,22 @@ from expdesign.shortest_day import ShortestDay
 # Parameters: expected standard deviations before and after the trial, and their table.
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterRow:
-    """One parameter to be estimated: its term, its value, and how well it is known before and after."""
-
-    name: str
-    term: str
-    nominal: str
-    before: str
-    runs: str
-    track: str
-    gain: str
-    less: bool = False
-
-
-def parameter_rows(content: ReportContent, found: PlannedAccuracy) -> list[ParameterRow]:
-    """Parameters in order; standard deviations in the parameter's own unit."""
+def parameter_rows(content: ReportContent, found: PlannedAccuracy) -> list[tuple[str, ...]]:
+    """By parameter: name, term, value, standard deviation before, after the runs, after the track, and their ratio."""
     model = content.vessel.model
     nominal = dict(zip(found.parameters, found.nominal.tolist(), strict=True))
     left = "T d{}/dt" if model.form == "discrete" else "d{}/dt"
     terms = {term.name: f"{left.format(term.equation)} = ... + {term.name} * {term.expression}" for term in model.terms}
     columns = zip(content.parameters, found.before.tolist(), found.runs.tolist(), found.track.tolist(), strict=True)
     return [
-        ParameterRow(
-            name=name,
-            term=terms[name],
-            nominal=_small(nominal[name], 3),
-            before=_small(before) if before > 0 else "not stated",
-            runs=_std(runs),
-            track=_std(track),
-            gain=f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
-            less=0 < before < track,
+        (
+            name,
+            terms[name],
+            _small(nominal[name], 3),
+            _small(before) if before > 0 else "not stated",
+            _std(runs),
+            _std(track),
+            f"{words.significant(before / track, 2)} times" if before > 0 and track > 0 else "",
         )
         for name, before, runs, track in columns
     ]

@@ -55,6 +55,9 @@ TRANSIT_ENDS_HULLS = 6.0  # of straights before and after it that are optimised 
 STRAIGHT_RAD = 1e-6  # change of course from point to point of a path from which on it bends
 HEADING_ROUNDS = 8  # of the search for the heading that makes good a course in a current
 COUNTER_HELM = 3.0  # helm against a residual turn, per yaw rate, in times of a hull length at transit speed
+# yaw rate in that a hull length before, above which counter helm does little more: the sway of a ship that is unstable
+# on her course keeps her turning slowly, for many lengths
+LITTLE_FELL = 0.5
 RECOVERED_SHARE = 0.05  # yaw rate at which the ship has recovered, in that of a leg's turns
 RECOVERY_HULLS = 8.0  # time after which a recovery ends in any case, in that of a hull length at transit speed
 
@@ -78,14 +81,19 @@ def recover(state: Array, past: Array, water: LegWater, ship: HelmShip) -> Recov
     vessel, approach = water.vessel, ship.approach
     pace_s, swing = vessel.length_m / ship.transit_speed_mps, ship.transit_speed_mps / ship.turning_radius_m
     hardest = approach.helm.hardest(approach.drive) - abs(approach.angle_rad)
-    states, rows = [np.asarray(state)], [past[-1]]
+    states, rows, turning = [np.asarray(state)], [past[-1]], list[float]()  # rates since the helm has come over
+    count = max(1, round(pace_s / vessel.sample_time_s))
     while abs(states[-1][5]) > RECOVERED_SHARE * swing and len(states) * vessel.sample_time_s < RECOVERY_HULLS * pace_s:
         against = float(np.clip(COUNTER_HELM * pace_s * states[-1][5], -hardest, hardest))
         desired = np.array(approach.helm.inputs(approach.drive, approach.angle_rad - approach.starboard * against))
+        desired = nearest_turns(vessel, desired, rows[-1])
         row = within_limits(vessel.actuators, desired[None], sample_time_s=vessel.sample_time_s, before=rows[-1])
         given = past if water.prompt else water.remembered(np.concatenate([past, *(row[None] for row in rows[1:])]))
         states.append(water.states(states[-1], row, given)[-1])
         rows.append(row[0])
+        turning += [abs(states[-1][5])] if np.allclose(row, desired) else []
+        if len(turning) > count and turning[-1] > LITTLE_FELL * turning[-1 - count]:
+            break
     return Recovery(states=np.array(states), commands=np.array(rows[1:]).reshape(-1, len(vessel.limits)))
 
 

@@ -82,7 +82,7 @@ class HelmTimes:
 
     def seconds(self, length_m: Array, exit_mps: float, entry_mps: float) -> Array:
         """(...,) time of legs of such lengths through water from one speed to another [s]."""
-        path_m, time_s = self._table(exit_mps, entry_mps)
+        path_m, time_s = _lengths_and_times(self, exit_mps, entry_mps)
         least_m = path_m[0] if entry_mps > STOPPED_SHARE * self.speed_mps else max(path_m[0], self.at_rest_m)
         return np.asarray(
             np.interp(length_m, path_m, time_s)
@@ -92,7 +92,7 @@ class HelmTimes:
 
     def lost_s(self, exit_mps: float, entry_mps: float, *, made_good: bool) -> float:
         """Least time of a leg, or where its displacement counts, least time lost against transit speed [s]."""
-        length_m, time_s = self._table(exit_mps, entry_mps)
+        length_m, time_s = _lengths_and_times(self, exit_mps, entry_mps)
         return float((time_s - made_good * length_m / self.speed_mps).min())
 
     def between_s(
@@ -108,10 +108,11 @@ class HelmTimes:
         """
         straight_m = self._straight_m(entry_mps)
         begins, ends = moved(froms, recovery[None, :3]), moved(tos, np.array([[-straight_m, 0.0, 0.0]]))
-        along_m, leg_s = float(np.hypot(*recovery[:2])) + straight_m, np.zeros(len(tos))
+        along_m = float(np.hypot(*recovery[:2])) + straight_m
         # legs are first guessed over ground: no turn all round
         over_ground_m = dubins_m(begins, ends, radius_m=self.radius_m)
-        for _ in range(DRIFT_ROUNDS if current_to.any() else 1):
+        leg_s = self.seconds(over_ground_m + along_m, exit_mps, entry_mps)
+        for _ in range(1, DRIFT_ROUNDS if current_to.any() else 1):
             through = np.column_stack([ends[:, :2] - leg_s[:, None] * current_to, ends[:, 2]])
             length_m = dubins_m(begins, through, radius_m=self.radius_m)
             length_m = np.where(over_ground_m > length_m + np.pi * self.radius_m, over_ground_m, length_m)
@@ -122,16 +123,18 @@ class HelmTimes:
         """Straight before a run, with room to settle, or before a stop."""
         return self.run_up_m if entry_mps > STOPPED_SHARE * self.speed_mps else self.steady_m / 2
 
-    def _table(self, exit_mps: float, entry_mps: float) -> tuple[Array, Array]:
-        """Lengths and times of legs with higher and higher peak speeds."""
-        first, last = (float(np.clip(speed, 0.0, self.speed_mps)) for speed in (exit_mps, entry_mps))
-        runs = last > STOPPED_SHARE * self.speed_mps
-        before_s = self.answer_s if first else 0.0  # from rest the table has it
-        steady_m = self.steady_m + self.spare_m if runs else 0.0
-        after_s = steady_m / last if runs else self.answer_s
-        peak = np.linspace(max(first, last), self.speed_mps, TABLED_SPEEDS)
-        path_m, time_s = (_between(self.speeding_up, first, peak) + _between(self.stopping, last, peak)).T
-        return path_m + steady_m + before_s * first, time_s + before_s + after_s
+
+@lru_cache(maxsize=256)
+def _lengths_and_times(times: HelmTimes, exit_mps: float, entry_mps: float) -> tuple[Array, Array]:
+    """Lengths and times of legs with higher and higher peak speeds."""
+    first, last = (float(np.clip(speed, 0.0, times.speed_mps)) for speed in (exit_mps, entry_mps))
+    runs = last > STOPPED_SHARE * times.speed_mps
+    before_s = times.answer_s if first else 0.0  # from rest the table has it
+    steady_m = times.steady_m + times.spare_m if runs else 0.0
+    after_s = steady_m / last if runs else times.answer_s
+    peak = np.linspace(max(first, last), times.speed_mps, TABLED_SPEEDS)
+    path_m, time_s = (_between(times.speeding_up, first, peak) + _between(times.stopping, last, peak)).T
+    return path_m + steady_m + before_s * first, time_s + before_s + after_s
 
 
 @lru_cache(maxsize=16)

@@ -175,10 +175,12 @@ class PartialPlans:
 
     def alike(self, rows: np.ndarray) -> Alike:
         """Positions in `rows` of plans after the same run at the same exit speed."""
-        found: dict[tuple[int, float], list[int]] = {}
-        for where, index in enumerate(rows):
-            found.setdefault((int(self.last[index]), float(self.exit_mps[index])), []).append(where)
-        return {key: np.array(where) for key, where in found.items()}
+        keys = list(zip(self.last.tolist(), self.exit_mps.tolist(), strict=True))
+        kinds = {key: kind for kind, key in enumerate(dict.fromkeys(keys))}
+        kind_of = np.array([kinds[key] for key in keys], dtype=int)[rows]
+        found = {key: np.flatnonzero(kind_of == kind) for key, kind in kinds.items()}
+        first = {key: where[0] for key, where in found.items() if len(where)}
+        return {key: found[key] for key in sorted(first, key=first.__getitem__)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from nicegui import events, ui
 
+from expdesign import requests
 from expdesign.errors import InputError
 from expdesign.web.folder import MOST_UPLOAD_BYTES
 from expdesign.web.jobs import Job
@@ -15,16 +15,17 @@ from expdesign.web.site import Site, framed, page_of, shown_job, wrong
 LOGS = "logs"
 """Folder of logs that were dropped in."""
 PAGES = {
-    "import": "import.html",
-    "estimate": "estimate.html",
-    "diagnose": "diagnosis.html",
-    "monitor": "monitor.html",
-    "indices": "indices.html",
-    "replan": "report.html",
-    "trial-result": "result.html",
+    requests.Import: "import.html",
+    requests.Estimate: "estimate.html",
+    requests.Diagnose: "diagnosis.html",
+    requests.Monitor: "monitor.html",
+    requests.Indices: "indices.html",
+    requests.Replan: "report.html",
+    requests.TrialResult: "result.html",
 }
 """Command -> its page."""
-COMMANDS = ("import", *(name for name in PAGES if name != "import"))
+OnRuns = type[requests.Estimate | requests.Diagnose | requests.Indices | requests.Monitor]
+"""Commands on runs and a vessel file."""
 
 
 def register(site: Site) -> None:
@@ -63,17 +64,17 @@ class _Data:
         ).classes("field")
         ui.label("3. What they tell").classes("head2")
         with ui.row().classes("line"):
-            ui.button("Estimate", on_click=lambda: self._on_runs("estimate"))
-            ui.button("Diagnose", on_click=lambda: self._on_runs("diagnose"))
-            ui.button("Indices", on_click=lambda: self._on_runs("indices")).props("outline")
-            ui.button("Monitor", on_click=lambda: self._on_runs("monitor")).props("outline")
+            ui.button("Estimate", on_click=lambda: self._on_runs(requests.Estimate))
+            ui.button("Diagnose", on_click=lambda: self._on_runs(requests.Diagnose))
+            ui.button("Indices", on_click=lambda: self._on_runs(requests.Indices)).props("outline")
+            ui.button("Monitor", on_click=lambda: self._on_runs(requests.Monitor)).props("outline")
             if self.scenario:
                 ui.button("Plan the rest of the trial", on_click=self._replan).props("outline")
                 ui.button("Trial result", on_click=self._result).props("outline")
         self.place = ui.column().classes("work").props('aria-live="polite"')
         with self.place:
             for job in self.site.jobs.all:
-                if job.words[0] in COMMANDS:
+                if type(job.request) in PAGES:
                     shown_job(self.site, job, ended=self._ended)
                     break
 
@@ -100,16 +101,15 @@ class _Data:
         if not self.logs.value:
             self._refuse("drop or choose a log first")
             return
-        out = f"runs/{Path(self.logs.value[0]).stem}-runs"
-        ship = ("--vessel", self.ship.value) if self.ship.value else ()
-        self._start(("import", *self.logs.value, *ship, "--out", out), out)
+        logs, out = tuple(map(Path, self.logs.value)), Path(f"runs/{Path(self.logs.value[0]).stem}-runs")
+        self._start(requests.Import(logs=logs, vessel=Path(self.ship.value) if self.ship.value else None, out=out))
 
-    def _on_runs(self, command: str) -> None:
+    def _on_runs(self, command: OnRuns) -> None:
         if not self.runs.value or not self.ship.value:
             self._refuse("choose runs and a vessel file first")
             return
-        out = self._out(command)
-        self._start((command, *self.runs.value, "--vessel", self.ship.value, "--out", out), out)
+        out = Path(self._out(command.__name__.lower()))
+        self._start(command(data=tuple(map(Path, self.runs.value)), vessel=Path(self.ship.value), out=out))
 
     def _out(self, command: str) -> str:
         """The folder of what a command finds in the runs that are chosen."""
@@ -124,31 +124,31 @@ class _Data:
             self._refuse("plan the scenario's trial, choose its runs and estimate from them first")
             return
         judged = f"{self._out('indices')}/indices.json"
-        more = ("--indices", judged) if self.site.folder.path(judged).is_file() else ()
-        out = self._out("result")
-        self._start(("trial-result", plan, "--estimate", found, *more, "--out", out), out)
+        indices = Path(judged) if self.site.folder.path(judged).is_file() else None
+        out = Path(self._out("result"))
+        self._start(requests.TrialResult(plan=Path(plan), estimate=Path(found), indices=indices, out=out))
 
     def _replan(self) -> None:
         if not self.runs.value:
             self._refuse("choose the runs that were measured so far")
             return
-        out = f"{self.site.out_of(self.scenario)}-replanned"
-        self._start(("replan", self.scenario, "--data", *self.runs.value, "--out", out), out)
+        data, out = tuple(map(Path, self.runs.value)), Path(f"{self.site.out_of(self.scenario)}-replanned")
+        self._start(requests.Replan(scenario=Path(self.scenario), data=data, out=out))
 
     def _refuse(self, text: str) -> None:
         self.place.clear()
         with self.place:
             wrong(text)
 
-    def _start(self, words: Sequence[str], out: str) -> None:
+    def _start(self, request: requests.Request) -> None:
         self.place.clear()
         with self.place:
-            shown_job(self.site, self.site.jobs.start(words, out=out), ended=self._ended)
+            shown_job(self.site, self.site.jobs.start(request), ended=self._ended)
 
     def _ended(self, job: Job) -> None:
-        page = f"{job.out}/{PAGES[job.words[0]]}"
+        page = f"{job.out}/{PAGES[type(job.request)]}"
         if self.site.folder.path(page).is_file():
             with self.place:
                 page_of(page)
-        if job.words[0] == "import" and job.status == 0:
+        if isinstance(job.request, requests.Import) and job.status == 0:
             self.runs.set_options(list(self._runs()), value=[job.out])

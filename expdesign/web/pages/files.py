@@ -43,7 +43,9 @@ def _shown(site: Site, scenario: str, file: str, watched: Watched) -> None:
         page_of(file)
         return
     text = ui.codemirror(
-        path.read_text(encoding="utf-8", errors="replace"), language="TOML" if path.suffix == ".toml" else None
+        path.read_text(encoding="utf-8", errors="replace"),
+        language="TOML" if path.suffix == ".toml" else None,
+        theme="vscodeDark" if site.night else "vscodeLight",
     )
     text.props('aria-label="Text of the file"').classes("toml")
     place = ui.column().props('role="status"')

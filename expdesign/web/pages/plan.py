@@ -10,6 +10,7 @@ from urllib.parse import quote, urlencode
 from nicegui import ui
 
 from expdesign.export import words
+from expdesign.requests import Run
 from expdesign.web import answers
 from expdesign.web.jobs import Job
 from expdesign.web.pages.sea import chart_element
@@ -53,14 +54,14 @@ class _Plan:
     async def draw(self) -> None:
         """Buttons, commands at work, the chart with the player, and the results."""
         with ui.row().classes("line"):
-            ui.button(
-                "Draft", on_click=lambda: self._start("run", self.scenario, "--draft", "--out", f"{self.out}-draft")
-            ).tooltip("A quick look: nominal ship, no drawn trials, no route files")
-            ui.button("Plan the trial", on_click=lambda: self._start("run", self.scenario, "--out", self.out))
+            ui.button("Draft", on_click=lambda: self._start(draft=True)).tooltip(
+                "A quick look: nominal ship, no drawn trials, no route files"
+            )
+            ui.button("Plan the trial", on_click=lambda: self._start(draft=False))
         self.work = ui.column().classes("work")
         with self.work:
             for job in self.site.jobs.all:
-                if job.words[0] == "run" and self.scenario in job.words:
+                if isinstance(job.request, Run) and job.request.scenario == Path(self.scenario):
                     shown_job(self.site, job, ended=self._ended if job.status is None else None)
                     break
         with ui.row().classes("two"):
@@ -92,11 +93,11 @@ class _Plan:
     def _at(self, event: Any) -> None:
         self.button.text = "Pause" if event.args["playing"] else "Play"
 
-    def _start(self, *words: str) -> None:
-        out = words[-1]
+    def _start(self, *, draft: bool) -> None:
+        request = Run(scenario=Path(self.scenario), draft=draft, out=Path(f"{self.out}-draft" if draft else self.out))
         self.work.clear()
         with self.work:
-            shown_job(self.site, self.site.jobs.start(words, out=out), ended=self._ended)
+            shown_job(self.site, self.site.jobs.start(request), ended=self._ended)
 
     def _ended(self, job: Job) -> None:
         ui.timer(0.0, self._show_newest, once=True)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlencode
+from urllib.parse import urlencode
 
 from nicegui import events, ui
 
@@ -248,11 +248,6 @@ def chart_element(*marks: tuple[str, str]) -> ui.leaflet:
         for words, colour in (*LEGEND, *marks):
             ui.html(f'<span style="--mark: {colour}">{words}</span>', sanitize=False)
     return leaflet.classes("chart").props('tabindex="0" aria-label="Chart"')
-
-
-def link_to(page: str, scenario: str) -> str:
-    """The address of a page of a scenario."""
-    return f"{page}?scenario={quote(scenario)}"
 
 
 def _corners(points: list[dict[str, float]]) -> list[list[float]]:

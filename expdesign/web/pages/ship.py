@@ -7,6 +7,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
+from expdesign.requests import Nominal
 from expdesign.scenario.card_file import CardFile
 from expdesign.scenario.vessels.vessel_file import vessel_of
 from expdesign.scenario.vessels.vessel_tables import ACTUATOR_TABLES, VesselTable
@@ -72,7 +73,7 @@ def _card(site: Site, scenario: str, asked: str) -> None:
     def make() -> None:
         place.clear()
         with place:
-            shown_job(site, site.jobs.start(("nominal", card, "--out", out), out=out), ended=ended)
+            shown_job(site, site.jobs.start(Nominal(card=Path(card), out=Path(out))), ended=ended)
 
     def ended(job: Job) -> None:
         if job.status == 0:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from urllib.parse import quote
 
 from nicegui import ui
 
+from expdesign.requests import New
 from expdesign.web import answers
 from expdesign.web.jobs import Job
 from expdesign.web.site import Site, framed, shown_job, told, wrong
@@ -48,7 +50,7 @@ def _new(site: Site) -> None:
     ui.label("A new trial").classes("head2")
     with ui.row().classes("line"):
         name = ui.input(label="Name of the folder", value="mytrial")
-        kind = ui.select(list(KINDS), value=next(iter(KINDS)), label="Kind of ship")
+        kind = ui.select(list(KINDS), value=next(iter(KINDS)), label="Kind of ship").classes("kind")
         start = ui.button("Make it")
     place = ui.column()
 
@@ -58,10 +60,10 @@ def _new(site: Site) -> None:
             if "/" in name.value or name.value.startswith(("-", ".")) or not name.value:
                 wrong(f"{name.value!r} is no name of a folder in this one")
                 return
-            shown_job(site, site.jobs.start(("new", name.value, "--kind", kind.value)), ended=made)
+            shown_job(site, site.jobs.start(New(folder=Path(name.value), kind=kind.value)), ended=made)
 
     def made(job: Job) -> None:
-        if job.status == 0:
-            ui.navigate.to(f"/sea?scenario={quote(job.words[1])}/scenario.toml")
+        if job.status == 0 and isinstance(job.request, New):
+            ui.navigate.to(f"/sea?scenario={quote(str(job.request.folder))}/scenario.toml")
 
     start.on_click(make)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from nicegui import ui
 
+from expdesign.requests import WhatIf
 from expdesign.scenario.tables import read_toml
 from expdesign.scenario.variants import changed_entries
 from expdesign.web.jobs import Job
@@ -65,7 +67,7 @@ class _Variants:
         self.place = ui.column().classes("work")
         with self.place:
             for job in self.site.jobs.all:
-                if job.words[:2] == ("whatif", self.scenario):
+                if isinstance(job.request, WhatIf) and job.request.scenario == Path(self.scenario):
                     shown_job(self.site, job, ended=self._ended)
                     return
             self._results()
@@ -132,8 +134,11 @@ class _Variants:
             if not self.chosen:
                 wrong("no variant is ticked")
                 return
-            words = ("whatif", self.scenario, *sorted(self.chosen), *["--plan"] * with_plan, "--out", self.out)
-            shown_job(self.site, self.site.jobs.start(words, out=self.out), ended=self._ended)
+            request = WhatIf(
+                scenario=Path(self.scenario), variants=tuple(map(Path, sorted(self.chosen))), with_plan=with_plan,
+                out=Path(self.out),
+            )  # fmt: skip
+            shown_job(self.site, self.site.jobs.start(request), ended=self._ended)
 
     def _ended(self, job: Job) -> None:
         if job.status == 0:

@@ -26,11 +26,12 @@
     const map = mapOf(id);
     const first = !charts[id];
     const mine = (charts[id] = charts[id] || { group: L.layerGroup().addTo(map), places: L.layerGroup().addTo(map), player: null });
+    if (first) map.createPane("sea").style.zIndex = 350;  // below tracks and zones, and darker at night
     mine.group.clearLayers();
     if (answer.problem) return;
     answer.layers.forEach((layer, index) => {
       layer.rank = index - 1;
-      L.geoJSON(layer.geometry, { style: () => styled(layer), interactive: false }).addTo(mine.group);
+      L.geoJSON(layer.geometry, { pane: "sea", style: () => styled(layer), interactive: false }).addTo(mine.group);
     });
     for (const zone of answer.closed) {
       L.geoJSON(zone.geometry, { style: () => ({ color: "#a3261c", weight: 1, fillOpacity: 0.15 }) })

@@ -21,10 +21,7 @@ def plan(request: requests.Plan, *, progress: Progress = silent) -> Outcome:
     """One verified trajectory with the runs of a durations file, or of the optimal durations."""
     case = loaded(request.scenario, progress, vessel=request.vessel)
     check_plannable(case)
-    with (
-        shared(request),
-        drafted(request, case),
-    ):
+    with shared(request), drafted(request, case):
         return _plan(request, case, progress)
 
 

@@ -57,10 +57,7 @@ def replan(request: requests.Replan, *, progress: Progress = silent) -> Outcome:
         stopped=request.stopped,
         progress=within(progress, 0.0, 0.02),
     )
-    with (
-        shared(request),
-        drafted(request, replace(state.first, start=state.pose, vessel=state.ship)),
-    ):
+    with shared(request), drafted(request, replace(state.first, start=state.pose, vessel=state.ship)):
         return _replanned(state, request, progress)
 
 

@@ -47,10 +47,7 @@ def run(request: requests.Run, *, progress: Progress = silent) -> Outcome:
         check_no_trial(out)
         request = request.but(out=out)
     check_plannable(case)
-    with (
-        shared(request),
-        drafted(request, case),
-    ):
+    with shared(request), drafted(request, case):
         return _run(request, case, progress)
 
 

@@ -50,6 +50,7 @@ KEPT_ROWS = 7200
 MOST_MOMENTS = 1000
 """Largest number of moments kept for the page."""
 HOUR, DAY = 3600.0, 86_400.0
+MOMENT_S = 600.0  # of data between two points of the page's figures, at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -257,7 +258,7 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     assert not isinstance(now.phase, Learning)
     calibration, offset_s = now.phase.calibration, now.reading.offset_s
     grams = read.at(known_of(now), asked, offset_s=offset_s)
-    first, hour = int(np.searchsorted(grams.time_s, first_s)), round(HOUR / calibration.stretch_s)
+    first, several = int(np.searchsorted(grams.time_s, first_s)), max(1, round(MOMENT_S / calibration.stretch_s))
     if first == len(grams):
         return now
     on = now.phase if isinstance(now.phase, Watching) else _begun(now.phase, float(grams.time_s[first]))
@@ -266,7 +267,7 @@ def _watched(now: Watch, piece: Piece, read: Read, asked: Asked, *, first_s: flo
     again = _again(late, known_of(now), asked)
     while first < len(grams):
         before = on.state
-        on, more, used = _hour(on, grams.part(slice(first, first + hour)), rules_of(calibration, asked), again)
+        on, more, used = _moment(on, grams.part(slice(first, first + several)), rules_of(calibration, asked), again)
         raised += more
         first += used
         if on.state.shift is not before.shift and first < len(grams):
@@ -310,7 +311,7 @@ def _begun(ready: Ready, time_s: float) -> Watching:
     )
 
 
-def _hour(on: Watching, grams: Grams, rules: Rules, again: Again) -> tuple[Watching, list[Alarm], int]:
+def _moment(on: Watching, grams: Grams, rules: Rules, again: Again) -> tuple[Watching, list[Alarm], int]:
     """Watch the stretches of one moment of the page; returns the alarms raised and the number of stretches used."""
     state, alarms, steps, used = watch(on.calibration, on.state, grams, rules=rules, again=again)
     value, std = estimates(state, on.calibration)
