@@ -1,6 +1,7 @@
 """Backward elimination drops causes without held-out gain and causes whose size may be zero."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +18,7 @@ from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain, judged
 from expdesign.diagnosis.motion.simulation import initial_states
-from expdesign.diagnosis.select import backward_elimination
+from expdesign.diagnosis.select import backward_elimination, forward_selection
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
 from expdesign.diagnosis.select.fitted_candidate import fit_candidate
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward, to_take_out
@@ -349,6 +350,34 @@ def test_a_cause_with_fewer_numbers_comes_first_where_it_simulates_held_out_data
     one = item("wind", 1, 59.5, about)
     for fewer in (item("wind", 3, 90.0, about), item("wind", 1, 58.5, about), one):
         assert (_best_on_held_out(wind, [wind, fewer], validation) is fewer) == (fewer is one)  # type: ignore[arg-type,list-item]
+
+
+@pytest.mark.parametrize(("fits", "tried"), [((60.0, 70.0, 80.0, 85.0), 4), ((60.0, 60.05, 80.0, 85.0), 2)])
+def test_smaller_causes_beside_a_block_end_where_one_improves_nothing_held_out(monkeypatch, fits, tried):
+    """As the search itself does; the first is not asked."""
+    asked = iter(steps_of(*fits).steps)
+    search = SimpleNamespace(
+        validation=SimpleNamespace(of=errors), round=lambda _base, most: (next(asked, None), ())
+    )  # fmt: skip
+    block = SimpleNamespace(chosen=SimpleNamespace(keys=("a", "b", "c", "d"), fit=50.0), before=50.0)
+    monkeypatch.setattr(forward_selection, "log_likelihood_gain", lambda *_: 100.0)
+    path = forward_selection._smaller_causes(block, search)  # type: ignore[arg-type]
+    assert [step.chosen.fit for step in path] == [*fits[:tried]]
+
+
+def test_stretches_are_not_simulated_for_what_is_ruled_out_already():
+    """A later cause whose whole runs gain nothing; one that gains without certainty is asked in stretches."""
+    spread = np.array([[-9.0], [-9.0], [-9.0], [12.0], [12.0], [12.0]])
+    for later, asked in ((55.0, False), (72.0 + spread, True)):
+        calls = list[str]()
+
+        def ahead(fit_percent: float, calls: list[str] = calls) -> HeldOut:
+            calls.append("")
+            return errors(fit_percent)
+
+        held = [replace(errors(value), ahead=partial(ahead, 60.0)) for value in (50.0, 70.0, later)]
+        improves_held_out(steps_of("first", "later"), held, 0)
+        assert bool(calls) is asked
 
 
 def test_what_physics_excludes_is_no_finding():

@@ -99,11 +99,12 @@ def test_intervals_are_exact(count: int, trials: int) -> None:
     assert interval(count, trials) == pytest.approx((known.low, known.high), abs=1e-9)
 
 
-def test_page_file_and_table_agree(found: OperationForesight) -> None:
+def test_page_file_and_table_agree() -> None:
+    found = foresee_operation(CASE.vessel, WEATHER, voyages=1, hours=0.2, sizes=(0.2,), references=1, seed=4)
     content = OperationContent(scenario="story", vessel="tender", found=found)
     told, page = json.loads(operation_json(content)), document_html(operation_document(content))
     assert [row["found"] for row in told["changes"]] == [item.found for item in found.rows]
-    assert f"{found.nominal} voyages" in told["sentences"][0]
+    assert f"Of {found.nominal} voyage of" in told["sentences"][0]
     for row in operation_rows(found):
         assert row[0] in page
     assert all(text.endswith(".") for text in operation_sentences(found))

@@ -16,6 +16,7 @@ from expdesign.monitoring import saved
 from expdesign.records import read_levels
 from expdesign.step_trials import controls_of, levels_of
 from expdesign.step_trials.live import Row, State, after_row, beginning, restored_state, step_list
+from expdesign.step_trials.live.watch import still_to_come
 from expdesign.workflows.steps.step_list import listed_steps
 from export_case import plan, plan_files
 from live_case import SHORT, Crew, list_csv, plateau_of, rows_csv, watch_setup
@@ -133,6 +134,13 @@ def test_a_stream_tells_what_a_file_does_and_a_broken_off_watch_goes_on(
             assert json.loads(one)["finished"] == json.loads(other)["finished"]
         else:
             assert one == other
+
+
+def test_what_a_step_still_brings_is_the_mean_of_its_exponential() -> None:
+    constants_s = np.array([4.0, 1.5])
+    time_s = np.linspace(9.0, 19.0, 20_001)
+    missing = [np.exp(-time_s / constant).mean() for constant in constants_s]
+    assert still_to_come(constants_s, passed_s=9.0, lasts_s=10.0) == pytest.approx(missing, rel=1e-3)
 
 
 def test_speeds_are_over_ground_and_are_called_so(sailed: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -56,7 +56,7 @@ FEWER_TRIALS = 0.4  # time that trying the transitions of a plan takes, beside t
 # how long phases take beside each other, on average of the examples on two cores: measuring the water, trying
 # transitions, placing runs, sailing them, verifying and sailing drawn trials
 WORK = (1.0, 3.0, 1.0, 2.5, 4.0)
-MORE_CORNERS = ((1.0, 700), (16.0, 12000))  # the same, where no path was found through water with so few
+MORE_CORNERS = ((1.0, 700), (16.0, 12000))  # as `CORNERS` of charts, where these left no path
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

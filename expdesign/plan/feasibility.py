@@ -28,7 +28,6 @@ BOXES = 400_000  # of places and headings at most; with more of them it stays op
 LEAST_SLACK_CELLS = 3.0  # slack in cells of the clearance grid at which that stays open, too
 # distances in hull lengths, and bearings off the course, at which a ship that starts under way is tried to stop
 STOP_HULLS = (16.0, 8.0, 4.0, 2.0)
-# distances in hull lengths, and bearings off the course, at which a ship that starts under way is tried to stop
 STOP_BENDS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
 LOOKUPS = 200_000  # clearances looked up at a time
 LEG_S = 40.0  # work budget of one leg [s]

@@ -39,8 +39,8 @@ from expdesign.simulation.run import SUBSTEPS
 from expdesign.values import Array, seal
 from expdesign.vessel import Vessel
 
-SINGLE_TRIALS = 5  # the same of random runs, simulated trial by trial: processes share smaller chunks more evenly
 CHUNK_TRIALS = 20  # trials in one chunk; each chunk has its own random stream
+SINGLE_TRIALS = 5  # those of random runs, simulated trial by trial: processes share smaller chunks more evenly
 
 RANDOM = "random"
 GOLDEN_ANGLE_RAD = np.pi * (3.0 - 5.0**0.5)

@@ -38,9 +38,9 @@ from expdesign.simulation import CALM
 from expdesign.values import Array
 from expdesign.vessel import Vessel
 
-# the same of agile ships, and lengths of their straight legs besides the best transitions, beyond the run-up
+# stretches of the shortest path to the goal, in hull lengths; the whole path is always tried too
 AGILE_PATH_STRETCHES = (1.5, 2.5, 4.0, 7.0, 12.0, 25.0, 50.0, 100.0)
-# the same of agile ships, and lengths of their straight legs besides the best transitions, beyond the run-up
+# lengths of straight legs besides the best transitions, beyond the run-up, in hull lengths
 AGILE_STRAIGHTS = (1.5, 2.5, 6.0)
 # courses of those legs to a full turn, from the heading that the run before ends with, and headings of runs, from that
 # heading or from the direction of the path

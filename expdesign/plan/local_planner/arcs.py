@@ -13,7 +13,6 @@ from expdesign.values import Array
 
 # turns of arcs, and the straight after them beyond the run-up in hull lengths
 ARC_TURNS_DEG = (0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180)
-# turns of arcs, and the straight after them beyond the run-up in hull lengths
 ARC_STRAIGHTS = (0.0, 1.0, 2.0, 3.0, 4.5, 6.0)
 PATH_HEADINGS_DEG = (0, 30, -30, 60, -60, 90, -90, 135, -135, 180)  # headings of runs on it, from its direction
 

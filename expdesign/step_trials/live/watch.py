@@ -299,7 +299,7 @@ def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> Sta
         return _failed(state, held, why, now, setup, quiet=quiet)
     u, r = plateau.state.tolist()
     if held.step is not None:
-        std = plateau.std.tolist()
+        std = np.hypot(plateau.std, _to_come(held, state, plateau, setup)).tolist()
         done = Finished(
             number=held.step.number, begins_s=held.rows[0].time_s,
             steady_s=held.rows[held.steady].time_s - held.rows[0].time_s, state=(u, r), state_std=(std[0], std[1]),
@@ -311,6 +311,22 @@ def _over(state: State, held: Held, setup: Setup, *, quiet: bool = False) -> Sta
         following=None if quiet else _following(state, setup),
     )  # fmt: skip
     return state, (over, *_end(state, now))
+
+
+def _to_come(held: Held, state: State, after: Plateau, setup: Setup) -> Array:
+    """(2,) by which means of U and r miss what the step still brings; constants are rough, so it is an error."""
+    if state.before is None:
+        return np.zeros(2)
+    assert held.steady is not None
+    begin_s, steady_s, end_s = (held.rows[place].time_s for place in (0, held.steady, -1))
+    share = still_to_come(np.array(setup.constants_s), passed_s=steady_s - begin_s, lasts_s=end_s - steady_s)
+    return np.asarray(np.abs(after.state - state.before[1].state) * share)
+
+
+def still_to_come(constants_s: Array, *, passed_s: float, lasts_s: float) -> Array:
+    """(n,) share of exponential steps that is missing on average, when some time has passed, as long as it lasts."""
+    lasts = np.maximum(lasts_s, 1e-9) / constants_s
+    return np.asarray(np.exp(-passed_s / constants_s) * -np.expm1(-lasts) / lasts)
 
 
 def _end(state: State, now: float) -> tuple[Event, ...]:
