@@ -234,3 +234,20 @@ def test_unknown_signals_of_commands_are_named():
     commands = Commands(sample_time_s=1.0, names=("n1", "a1"), values=np.zeros((2, 2)))
     with pytest.raises(UnknownName, match="'n2', did you mean 'n1'"):
         commands.column("n2")
+
+
+@pytest.mark.parametrize("turns", [0.5, 1.0, 2.0])
+def test_a_thrust_that_goes_round_winds_an_azimuth_no_farther_than_its_turns(turns: float):
+    """Without stops it follows three times round; with them it unwinds, and pushes as asked where its slew allows."""
+    bearing = np.linspace(0.0, 6.0 * np.pi, 400)
+    wish = np.stack([5.0 * np.cos(bearing), 5.0 * np.sin(bearing), np.zeros(400)], axis=1)
+    most = 2.0 * np.pi * turns
+    speed, angle = Limit(low=0.0, high=10.0), Limit(low=-most, high=most)
+    free, stopped = (
+        allocate((azimuth(speed=speed, angle=one),), wish, sample_time_s=1.0, before=np.zeros(2))
+        for one in (FREE, angle)
+    )
+    assert free[:, 1].max() == pytest.approx(6.0 * np.pi)
+    assert np.abs(stopped[:, 1]).max() <= most
+    given = stopped[:, :1] * np.stack([np.cos(stopped[:, 1]), np.sin(stopped[:, 1])], axis=1)
+    np.testing.assert_allclose(given, wish[:, :2], atol=1e-9)

@@ -40,7 +40,7 @@ def test_with_k_known_all_else_is_found_of_the_model_and_by_froude_s_law_of_the_
     loads = stated(tmp_path, "\n[[load]]\n" + KNOWN + UNKNOWN + K_KNOWN)
     outcome = roll(three(tmp_path), tmp_path / "out", loads=loads, scale=24.0)
     found = outcome.summary
-    assert (found["rank"], found["free"], found["held"]) == (8, 8, [])
+    assert (found["of_these_determined"], found["parameters_sought"], found["held"]) == (8, 8, [])
     assert "wrong sign" not in str(outcome.document)
     values, stds = found["parameters"], found["std"]
     assert isinstance(values, dict)
@@ -121,9 +121,9 @@ def test_one_file_gives_five_parameters_and_two_give_seven(tmp_path: Path) -> No
     text = f"\n[known]\nK_vd = {truth('K_vd')}\nz_f = {truth('z_f')}\n"
     files = three(tmp_path)
     one = roll(files[:1], tmp_path / "one", loads=stated(tmp_path, "\n[[load]]\n" + text)).summary
-    assert (one["rank"], one["free"]) == (5, 5)
+    assert (one["of_these_determined"], one["parameters_sought"]) == (5, 5)
     two = roll([files[0], files[2]], tmp_path / "two", loads=stated(tmp_path, "\n[[load]]\n" + UNKNOWN + text)).summary
-    assert (two["rank"], two["free"]) == (7, 7)
+    assert (two["of_these_determined"], two["parameters_sought"]) == (7, 7)
     for found in (one, two):
         values, stds = found["parameters"], found["std"]
         assert isinstance(values, dict)

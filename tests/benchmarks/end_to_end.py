@@ -22,6 +22,7 @@ import re
 import tempfile
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,6 +31,7 @@ import numpy as np
 import published_models as published
 from expdesign.cli import main as expdesign
 from expdesign.dictionary import Primitive, build_dictionary
+from expdesign.errors import InputError
 from expdesign.export import vessel_toml
 from expdesign.particulars import Stated, nominal
 from expdesign.particulars.trials import Fleet
@@ -220,8 +222,9 @@ def outcome(
     inside = np.array([], dtype=bool)
     if told == 0:
         before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
-        errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
-        error = float(np.median(np.abs(errors)))
+        with suppress(InputError):  # hardly any ship that the estimate draws brakes, or steers to the right side
+            errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
+            error = float(np.median(np.abs(errors)))
     said = "not asked for"
     if diagnosed:
         status = expdesign(["diagnose", *common, "--out", str(folder / "diagnosis")])

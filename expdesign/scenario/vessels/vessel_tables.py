@@ -180,7 +180,10 @@ def _actuator_table(name: str, words: str, stems: tuple[str, ...], *, free: bool
 _PROPELLER = _actuator_table("PropellerTable", "A tunnel thruster or a propeller on a fixed shaft.", KINDS["tunnel"])
 ACTUATOR_TABLES: dict[str, type[ActuatorTable]] = {
     "azimuth": _actuator_table(
-        "AzimuthTable", "An azimuth thruster; without angle limits it turns freely.", KINDS["azimuth"], free=True
+        "AzimuthTable",
+        "An azimuth thruster; without angle limits it turns freely. Wide limits say how many turns it may wind.",
+        KINDS["azimuth"],
+        free=True,
     ),
     "tunnel": _PROPELLER,
     "propeller": _PROPELLER,
