@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -140,6 +141,18 @@ def test_regressors_and_times_since_changes_are_those_of_the_data(clean):
     assert (late[changed] == 0).all()
     assert set(late[:, 1:][changed[:, :-1]].tolist()) <= {0.0, clean.windows.sample_s}
     assert not has_sign(finding(("lag:n",)))
+
+
+@pytest.mark.parametrize("key", ["gain", "asymmetry"])
+def test_the_force_ahead_of_a_ship_with_a_rudder_is_that_of_her_propellers(key):
+    vessel, n1 = vessel_of("coaster"), np.linspace(-2.0, 3.0, 11)
+    found = SimpleNamespace(
+        vessel=vessel, extended=vessel, record=hidden_record("coaster", seed=3, batches=1, samples=20)
+    )
+    at = {name: np.full(11, 0.1) for name in ("u", "v", "r", "rudder1", "time")} | {"n1": n1}
+    values, label = suspected_force(found, finding((key,), "thrust_gain"), at)
+    np.testing.assert_allclose(values, np.abs(n1) * n1)
+    assert label.startswith("ahead force")
 
 
 def test_of_several_parameters_the_clearest_is_drawn(clean):

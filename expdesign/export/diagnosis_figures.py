@@ -92,7 +92,8 @@ def signals(ship: ExtendedModel, at: Mapping[str, Array]) -> dict[str, Array]:
     shoal = ship.draught_m / at["depth"] if "depth" in at else np.zeros_like(nothing)
     motion = {name: at.get(name, nothing) for name in MOTION_SIGNALS} | {SHOAL: shoal}
     table = {name: np.broadcast_to(force, nothing.shape) for name, force in zip(FORCE_SIGNALS, forces, strict=True)}
-    return table | {name: at[name] for name in ship.model.inputs} | motion
+    table |= {name: at[name] for name in ship.model.inputs} | motion
+    return table | {name: product.evaluate(table, NUMPY) for name, product in ship.input_products.items()}
 
 
 def suspected(found: Diagnosis, item: Finding) -> tuple[Array, str]:
