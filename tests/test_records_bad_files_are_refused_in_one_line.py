@@ -8,7 +8,7 @@ import pytest
 
 from expdesign.errors import FileError
 from expdesign.records import load_records
-from record_files import Columns, csv_text, motion, texts
+from record_files import Columns, csv_text, motion, texts, write_trial
 
 VESSEL = ("n1", "rudder1")
 DEGREES = 180 / np.pi
@@ -364,3 +364,17 @@ def test_a_bad_file_gives_one_line(tmp_path: Path, kind: str) -> None:
         load_records([path], vessel_inputs=VESSEL, sample_time_s=0.5)
     assert str(caught.value) == f"{path}: {message}"
     assert "\n" not in message
+
+
+@pytest.mark.parametrize("speed_mps", [2.0, 0.0])
+def test_noise_is_no_mistake(tmp_path: Path, speed_mps: float) -> None:
+    """Of 60 short records straight ahead or at rest, with noise in heading, place and velocities, none is refused."""
+    rng, noise = np.random.default_rng(0), {"heading_rad": 0.03, "r_radps": 0.02}
+    if not speed_mps:
+        noise |= {"north_m": 1.0, "east_m": 1.0, "u_mps": 0.4, "v_mps": 0.4}
+    for number in range(60):
+        columns = motion(count := int(rng.integers(22, 90)))
+        straight = {"u_mps": speed_mps, "v_mps": 0.0, "north_m": speed_mps * columns["time_s"], "east_m": 0.0}
+        columns |= {name: np.broadcast_to(value, count) for name, value in straight.items()}
+        columns |= {name: straight.get(name, 0.0) + std * rng.standard_normal(count) for name, std in noise.items()}
+        load_records([write_trial(tmp_path / f"{number}.csv", columns)], vessel_inputs=VESSEL, sample_time_s=0.5)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pyproj
+import scipy
 
 from expdesign.conventions import KNOTS_PER_MPS, whole_turns
 from expdesign.errors import FileError
@@ -198,6 +199,9 @@ COURSE_SPREAD = 0.02  # circular variance of course less heading below which it 
 COURSE_AXIS_RAD = 0.5  # distance of an axis at which headings may begin [rad]
 EQUALLY_GOOD = 1.5  # ratio of remaining differences below which explanations are named together
 TURNING_RAD = 0.05  # change of heading over a window (root mean square) below which no turn is compared [rad]
+# change of the pose over a window (root mean square) that noise alone may make: of heading [rad] and of place [m]
+NOISE_RAD, NOISE_M = 0.2, 5.0
+BY_CHANCE = 1e-3  # probability from which noise may look like a mistake
 
 
 DEGREE = np.pi / 180.0
@@ -232,6 +236,20 @@ class Mistake:
         """Root-mean-square difference relative to the larger of both."""
         size = max(float(np.linalg.norm(self.moved)), float(np.linalg.norm(self.expected)))
         return float(np.linalg.norm(self.moved - self.expected)) / size if size else 0.0
+
+    @property
+    def change(self) -> float:
+        """Root-mean-square change of the pose over a window."""
+        return float(np.sqrt(np.mean(np.sum(self.moved**2, axis=1))))
+
+    @property
+    def by_chance(self) -> float:
+        """Least probability that white noise in place of the pose is as near to the direction of what is expected.
+
+        It is the share of the sphere in d dimensions that lies within that angle (S. Li, Concise formulas for the area
+        and volume of a hyperspherical cap, Asian Journal of Mathematics and Statistics 4, 2011, 66-70).
+        """
+        return float(0.5 * scipy.special.betainc((self.moved.size - 1) / 2, 0.5, min(self.difference, 1.0) ** 2))
 
 
 def check_agreement(table: Table, batches: tuple[slice, ...], sample_time_s: float) -> Table:
@@ -283,8 +301,8 @@ def _check_turning(table: Table, windows: Array, sample_time_s: float) -> Table:
     expected = _integral(table.columns["r_radps"][:, None], windows, sample_time_s)
     mistakes = [Mistake(text=text, moved=turned, expected=factor * expected) for text, factor in RATE_UNITS]
     as_is = Mistake(text="", moved=turned, expected=expected)
-    _raise_explained(table, "r_radps", "disagrees with the change of heading", as_is, mistakes)
-    if as_is.difference > POSE_DISAGREEMENT and np.sqrt(np.mean(turned**2)) > TURNING_RAD:
+    _raise_explained(table, "r_radps", "disagrees with the change of heading", as_is, mistakes, noise=NOISE_RAD)
+    if as_is.difference > POSE_DISAGREEMENT and as_is.change > TURNING_RAD:
         return table.noted(f"heading and r_radps disagree by {as_is.difference:.0%} over {WINDOW_S:g} s")
     return table
 
@@ -312,7 +330,7 @@ def _check_moving(table: Table, windows: Array, sample_time_s: float) -> Table:
     swapped = _change(_swapped(table), windows)
     names = f"{table.sources['north_m'].header} and {table.sources['east_m'].header}"
     mistakes.append(Mistake(text=f"{names} are exchanged", moved=swapped, expected=as_is.expected))
-    _raise_explained(table, "u_mps", "disagrees with the positions", as_is, mistakes)
+    _raise_explained(table, "u_mps", "disagrees with the positions", as_is, mistakes, noise=NOISE_M)
     if as_is.difference > POSE_DISAGREEMENT:
         disagree = f"positions and measured velocities disagree by {as_is.difference:.0%} over {WINDOW_S:g} s"
         return table.noted(disagree + _heading_offset(as_is))
@@ -330,8 +348,12 @@ def _heading_offset(as_is: Mistake) -> str:
     return f", only by {corrected.difference:.0%} with {offset / DEGREE:+.0f} degrees added to the heading"
 
 
-def _raise_explained(table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake]) -> None:
-    """Raise where a mistake explains the disagreement."""
+def _raise_explained(
+    table: Table, name: str, problem: str, as_is: Mistake, mistakes: list[Mistake], *, noise: float
+) -> None:
+    """Raise where a mistake explains the disagreement, and not as chance would: noise may look like any of them."""
+    if as_is.change < noise and len(mistakes) * min(mistake.by_chance for mistake in mistakes) > BY_CHANCE:
+        return
     best = min(mistake.difference for mistake in mistakes)
     if as_is.difference <= POSE_SUSPICION or best > POSE_EXPLAINED * as_is.difference:
         return
