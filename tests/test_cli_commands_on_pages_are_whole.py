@@ -1,6 +1,6 @@
 """A command is stated once: its workflow takes the same values; the line that repeats it is read back as they are."""
 
-from dataclasses import MISSING
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import get_args, get_origin
 
@@ -8,10 +8,12 @@ import pytest
 from typer.main import get_command
 
 from expdesign import workflows
+from expdesign.assessment import EstimateOptions
 from expdesign.cli.commands import app
 from expdesign.cli.entry import LISTS, repeat_option
 from expdesign.errors import InputError
-from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Estimate, Request, command_text, repeating
+from expdesign.monitoring.tuning import TUNING
+from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Estimate, Monitor, Request, command_text, repeating
 from expdesign.requests.options import Argument
 from expdesign.workflows.commands import run
 from expdesign.workflows.outcome import workflow
@@ -40,6 +42,15 @@ def read_back(command: Command, words: list[str]) -> dict[str, object]:
         found = {name: value for name, value in context.params.items() if name not in ("quiet", "json")}
     asked = command.request(**found)
     return {one.name: getattr(asked, one.name) for one in command.request.asked()}
+
+
+def test_usual_values_are_those_of_what_a_command_calls() -> None:
+    """Requests are below the rooms that work on them, and state their usual values once more."""
+    asked = {one.name: one.default for one in Estimate.asked()}
+    both = {item.name: item.default for item in fields(EstimateOptions) if item.name in asked}
+    assert len(both) == 12
+    assert both == {name: asked[name] for name in both}
+    assert Monitor.size == TUNING.relative_size
 
 
 def test_every_command_is_there() -> None:
