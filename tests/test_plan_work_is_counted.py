@@ -50,7 +50,7 @@ def test_no_phase_does_more_than_its_limit(made_once, name):
     assert not excess, "done and limit"
 
 
-@pytest.mark.parametrize("name", [pytest.param("harbour", marks=pytest.mark.thorough), "model-ship"])
+@pytest.mark.parametrize("name", LIMITS)
 def test_the_work_is_what_the_phases_are_for(made_once, name):
     done = example_work(made_once, name)
     assert done["placing and legs"]["solves"] > 0
