@@ -127,3 +127,8 @@ def test_a_report_is_reproduced_with_the_vessel_file_that_it_was_made_with(monke
     scenario, vessel = SCENARIOS / "story.toml", SCENARIOS / "vessels" / "tender-20m-true.toml"
     workflows.run(scenario, tmp_path, vessel=vessel, seed=3)
     assert told == [f"expdesign run {scenario} --vessel {vessel} --seed 3"]
+
+
+def test_a_request_says_which_values_it_does_not_know_and_which_it_needs() -> None:
+    with pytest.raises(TypeError, match=r"^Estimate knows no colour and needs data, vessel$"):
+        Estimate(colour="red")

@@ -89,9 +89,11 @@ class Request:
             InputError: a value is not allowed.
         """
         asked = {one.name: one for one in self.asked()}
-        wrong = {*values} - {*asked} | {name for name, one in asked.items() if values.get(name, one.default) is MISSING}
-        if wrong:
-            raise TypeError(f"{type(self).__name__} has no value of {', '.join(sorted(wrong))}, or knows none")
+        unknown = sorted({*values} - {*asked})
+        missing = [name for name, one in asked.items() if values.get(name, one.default) is MISSING]
+        if wrong := [("knows no", unknown)] * bool(unknown) + [("needs", missing)] * bool(missing):
+            words = " and ".join(f"{what} {', '.join(names)}" for what, names in wrong)
+            raise TypeError(f"{type(self).__name__} {words}")
         for name, value in values.items():
             vars(self)[name] = _several(value) if get_origin(asked[name].kind) is tuple else value
         for name, one in asked.items():
