@@ -6,7 +6,10 @@ import numpy as np
 
 from expdesign.diagnosis.causes.candidate import Candidate
 from expdesign.diagnosis.fit.held_out import HeldOut
-from expdesign.diagnosis.select.selection import Selection
+from expdesign.diagnosis.select.fitted_candidate import fit_candidate
+from expdesign.diagnosis.select.score_tests import ScoreTest
+from expdesign.diagnosis.select.selection import Selection, Step
+from expdesign.diagnosis.select.starting_point import starting_point
 
 DEVIATION = np.ones((6, 3))
 POSSIBLE = SimpleNamespace(is_possible=lambda _keys: True)
@@ -31,3 +34,13 @@ def steps_of(*keys: str) -> Selection:
     ]  # fmt: skip
     first, last = SimpleNamespace(keys=()), SimpleNamespace(value=lambda _key: 0.0, ship=POSSIBLE)
     return Selection(steps=tuple(steps), first=first, last=last, last_tests=())  # type: ignore[arg-type]
+
+
+def added(base, windows, candidate: Candidate) -> Step:
+    """A cause that is fitted beside a fit, whatever it gains."""
+    scored = ScoreTest(
+        candidate=candidate, statistic=0.0, p_value=1.0, step=np.zeros(len(candidate.free)), multiplicity=20.0
+    )
+    chosen = fit_candidate(base, windows, starting_point(base, scored))
+    assert chosen is not None
+    return Step(chosen=chosen, p_value=0.0, alternatives=(), before=base, tests=())

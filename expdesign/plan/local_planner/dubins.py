@@ -56,7 +56,7 @@ def _square(value: Array) -> Array:
 
 def _turn(angle: Array) -> Array:
     """Angles as turns to one side, from 0 to less than 2 pi; rounding does not make a whole turn of none."""
-    turn = angle - 2 * np.pi * np.floor(angle / (2 * np.pi))  # ten times as fast as a remainder, of nan fifty times
+    turn = angle - 2 * np.pi * np.floor(angle / (2 * np.pi))  # six times as fast as a remainder, of nan fifty times
     return np.where(turn > 2 * np.pi - 1e-9, 0.0, turn)
 
 

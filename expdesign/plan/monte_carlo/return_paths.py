@@ -165,9 +165,8 @@ class PathFollowers:
             speed = speed * np.where(near, 1.0, np.maximum(off, BEND_SPEED))
         north, east = (course * speed[:, None]).T
         c, s = np.cos(heading), np.sin(heading)
-        rate = (
-            np.zeros(len(ships)) if keeps else self._curvature[ships, at] * speed
-        )  # arcs are steered from their bends on
+        # arcs are steered from their bends on
+        rate = np.zeros(len(ships)) if keeps else self._curvature[ships, at] * speed
         rows = [states[:, 0], states[:, 1], heading, north * c + east * s, east * c - north * s, rate]
         return np.array(rows).T
 
