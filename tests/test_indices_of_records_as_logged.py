@@ -15,7 +15,8 @@ import pytest
 
 from expdesign.cli import main
 from expdesign.export.indices_form import IndicesContent
-from expdesign.export.indices_page import indices_html
+from expdesign.export.indices_page import indices_document
+from expdesign.export.pages import document_html
 from expdesign.indices import Circle, NotStandard, Stop, ZigZag, criteria, judge, measured_trial, standard_results
 from expdesign.indices.criteria import Verdict
 from expdesign.records import load_records
@@ -277,7 +278,7 @@ def test_the_distance_to_ten_degrees_of_heading_is_not_given_where_the_helm_is_r
 def content(found: tuple[object, ...]) -> IndicesContent:
     return IndicesContent(
         vessel=SHIP, scale=1.0, simulated=standard_results(nomoto_ship(), speed_mps=7.0), simulated_why_not="",
-        measured=found, notes=("log.csv: odd",), command="",
+        measured=found, notes=("log.csv: odd",),
     )  # fmt: skip
 
 
@@ -293,7 +294,7 @@ def test_counts_are_of_what_they_say_and_every_remark_is_on_the_page() -> None:
     assert form.counted("simulated") == {"met": simulated.count(True), "not met": simulated.count(False)}
     assert form.remarks[0] == ("odd", "no result: no helm")
     assert ("simulation", "is at 7 m/s, the runs at 4 m/s: --speed-mps makes them alike") in form.remarks
-    page = indices_html(form)
+    page = document_html(indices_document(form))
     assert "Measured results beside their criteria: 0 met, 1 not met, 1 open." in page
     assert all(remark in page for _, remark in form.remarks)
 
@@ -315,7 +316,7 @@ def test_the_terminal_counts_apart_and_says_why_a_run_gives_nothing(
     assert main(given) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "short.csv: no result: one helm order, and the heading changes by" in printed
-    assert "measured criteria met 0" in printed
+    assert "Measured results beside their criteria: none." in printed
 
 
 POND = sorted(path.name for path in OUTSIDE.glob("esso-osaka-3m/*.csv") if path.stem.startswith(("zigzag", "turn")))

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from expdesign.errors import InputError
+from expdesign.export import words
 from expdesign.export.files import strict_json
 from expdesign.indices import Circle, NotStandard, StandardResults, Stop, Verdict, ZigZag, judge
 from expdesign.indices.criteria import LEAST_LENGTH_M
@@ -52,7 +53,6 @@ class IndicesContent:
     simulated_why_not: str  # why it cannot, or ""
     measured: tuple[Found, ...]  # results of measured runs
     notes: tuple[str, ...]  # remarks on the files, one sentence each
-    command: str  # the command line
     held: Held = field(default_factory=Held)  # depth and weather of the measured trials
 
     @property
@@ -149,25 +149,6 @@ def verdict_rows(content: IndicesContent) -> list[tuple[str, ...]]:
     return rows
 
 
-def zigzag_rows(content: IndicesContent) -> list[tuple[str, ...]]:
-    """Source, run, approach speed, angles, headings at the reversals that overshoots follow, and these [deg]."""
-    rows: list[tuple[str, ...]] = []
-    for source, trial in content.trials:
-        if isinstance(trial, ZigZag):
-            reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
-            rows.append(
-                (
-                    source,
-                    trial.name,
-                    "" if trial.speed_mps is None else f"{trial.speed_mps:.3g} m/s",
-                    f"{degrees(trial.heading_rad)} / {degrees(trial.helm_rad)}",
-                    ", ".join(degrees(order.heading_rad) for order in reversals),
-                    overshoots(trial),
-                )
-            )
-    return rows
-
-
 def overshoots(trial: ZigZag) -> str:
     """All of them, and the largest tolerance [deg]."""
     reversals = trial.executes[1 : len(trial.overshoots_rad) + 1]
@@ -177,7 +158,7 @@ def overshoots(trial: ZigZag) -> str:
 
 def degrees(angle_rad: float) -> str:
     """With one decimal."""
-    return f"{math.degrees(angle_rad):.1f}"
+    return words.number(math.degrees(angle_rad), 1)
 
 
 def indices_json(content: IndicesContent) -> str:

@@ -1,16 +1,27 @@
-"""The form as one page that prints on paper."""
+"""The circular's form as a document, which prints on paper."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from dataclasses import dataclass
+from itertools import zip_longest
+
+from markupsafe import Markup
 
 from expdesign.export import words
-from expdesign.export.indices_form import IndicesContent, overshoots, shown, verdict_rows, verdict_word
-from expdesign.export.pages import page_template
+from expdesign.export.document import Document, Items, Section, Table, filled, notes_of, section
+from expdesign.export.indices_form import IndicesContent, degrees, overshoots, shown, verdict_rows, verdict_word
 from expdesign.export.words import speed
-from expdesign.indices import DEPTH_BY_DRAUGHT, HIGHEST_SEA, STRONGEST_WIND, Circle, Stop, Verdict, ZigZag, beaufort
+from expdesign.indices import (
+    DEPTH_BY_DRAUGHT,
+    HIGHEST_SEA,
+    STRONGEST_WIND,
+    Circle,
+    NotStandard,
+    Stop,
+    Verdict,
+    ZigZag,
+    beaufort,
+)
 
 # The reporting form: ship, conditions, and results to port and to starboard beside the criterion.
 #
@@ -33,61 +44,149 @@ GROUPS = (
 KIND_NAMES = {"azimuth": "azimuth thruster", "tunnel": "tunnel thruster"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """One result in a cell: the value, the same by length, the run it is from, and one of `VERDICT_WORDS`."""
+NO_RESULT = "no\N{NO-BREAK SPACE}result"
+MARKS = {
+    "met": Markup('<span class="mark yes">\N{CHECK MARK}</span>'),
+    "not met": Markup('<span class="mark no">\N{BALLOT X} exceeds</span>'),
+    "open": Markup('<span class="mark open">open</span>'),
+    "no result": "",
+}
+"""Word of `VERDICT_WORDS` -> what stands beside the result."""
+HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
+FORM = ("Trial", "Index", "To port", "To starboard", "Criterion, at most")
+SHIP = ("Particular", "Value")
+CONDITIONS = ("Condition", "Value", "Limit", "Verdict")
+CIRCLES = (
+    "From", "Run", "To", "Approach", "Helm [°]", "Advance [m]", "Transfer [m]", "Tactical diameter [m]",
+    "Steady diameter [m]", "Current removed, north, east [m/s]",
+)  # fmt: skip
+ZIGZAGS = (
+    "From", "Run", "First to", "Approach", "Overshoots [°]\nbeyond the heading at the order",
+    "Orders: time, and heading [°]", "Heading / helm [°]", "Distance to 10° of heading [m]",
+)  # fmt: skip
+STOPS = (
+    "From", "Run", "Approach", "Track reach", "Head reach", "To starboard", "Change of heading [°]", "Time [s]",
+)  # fmt: skip
+DEFINITIONS = (
+    "Advance, transfer and tactical diameter refer to the midship point. They are measured from the rudder order, "
+    "along and across the approach heading.",
+    "An order starts when the rudder begins to move. An overshoot is the largest heading less the heading at the "
+    "order, not less the nominal heading (MSC.137(76)); in simulations the two are the same.",
+    'The time of an order is known to one sample of the record. "±" is how far the ship goes or turns in one sample '
+    'at the order; noise of the sensors is not in it. A result is "open" where its limit lies within this tolerance.',
+    "A run that begins with the helm over has no approach and no first order. Overshoots are given from its second "
+    "reversal on, and have no criterion.",
+    "A zig-zag is listed under the side of its first turn. L/V uses the approach speed of the full-scale ship.",
+    "A uniform current is estimated and removed from measured turns of 540 degrees or more. Shorter turns are not "
+    "corrected. No result is corrected for wind, loading or depth.",
+    "Simulations are in calm, deep water. The stop is full astern with the helm unchanged.",
+)
 
-    value: str
-    by_length: str
-    run: str
-    verdict: str
+
+def indices_document(content: IndicesContent) -> Document:
+    """The results beside their criteria, for people."""
+    sources = _sources(content)
+    refused = sum(isinstance(item, NotStandard) for item in content.measured)
+    measured = {"measured_runs": len(content.measured), "measured_runs_without_result": refused}
+    found = content.simulated
+    return Document(
+        kind="Manoeuvring indices of IMO resolution MSC.137(76), in the form of MSC/Circ.1053, appendix 6",
+        title=content.vessel.name,
+        name=f"Manoeuvring indices of {content.vessel.name}",
+        findings=(*(_counts(content, source) for source in sources), content.applies),
+        facts={
+            **({} if found is None else {"simulated_at_mps": found.speed_mps, "simulated_helm": found.helm}),
+            **(measured if content.measured else {}),
+        },
+        values=_values(content),
+        sections=filled(
+            section("Ship", Table(header=SHIP, rows=ship_rows(content), texts=2, on="page")),
+            section(
+                "Conditions of the measured trials",
+                Table(header=CONDITIONS, rows=condition_rows(content), texts=4, on="page"),
+            ),
+            _verdicts(content),
+            *(
+                section(f"Results, {source}", Table(header=FORM, rows=form_rows(content, source), texts=5, on="page"))
+                for source in sources
+            ),
+            section("Turning circles", Table(header=CIRCLES, rows=_circles(content), texts=4, on="page")),
+            section("Zig-zags", Table(header=ZIGZAGS, rows=_zigzags(content), texts=6)),
+            section("Stopping", Table(header=STOPS, rows=_stops(content), texts=3, on="page")),
+            *(
+                [section("Missing results and remarks", *notes_of(content.notes_in_words))]
+                if content.notes_in_words
+                else []
+            ),
+            section("Definitions", Items(DEFINITIONS)),
+        ),
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Line:
-    """One line of the form; `both` holds results that have no side."""
-
-    trial: str
-    name: str
-    port: tuple[Result, ...]
-    starboard: tuple[Result, ...]
-    both: tuple[Result, ...]
-    criterion: str
+def _verdicts(content: IndicesContent) -> Section:
+    tolerance = any(verdict.tolerance for _, verdict in content.verdicts)
+    return section(
+        f"MSC.137(76): {content.vessel.name}{' (± is one sample of the record at the order)' * tolerance}",
+        Table(header=HEADER, rows=verdict_rows(content), texts=8, on="terminal"),
+    )
 
 
-def form_lines(content: IndicesContent, source: str) -> list[Line]:
-    """The results of "measured" or "simulated" trials, those that were not run included."""
+def _values(content: IndicesContent) -> dict[str, object]:
+    """More numbers, for JSON."""
+    return {
+        "vessel": content.vessel.name,
+        **{
+            f"{source}_criteria_{word.replace(' ', '_')}": number
+            for source in _sources(content)
+            for word, number in content.counted(source).items()
+        },
+        "results": {
+            f"{source} {v.run}: {v.criterion.key}": {
+                "value": v.value, "tolerance": v.tolerance, "limit": v.criterion.limit, "met": v.met
+            }
+            for source, v in content.verdicts
+        },
+    }  # fmt: skip
+
+
+def _sources(content: IndicesContent) -> list[str]:
+    """Where the trials are from, whether or not they give a result."""
+    return ["measured"] * bool(content.measured) + ["simulated"] * (content.simulated is not None)
+
+
+def _counts(content: IndicesContent, source: str) -> str:
+    """How many results there are and how they stand to their criteria."""
+    counted = content.counted(source)
+    parts = ", ".join(f"{number} {word}" for word, number in counted.items()) if any(counted.values()) else "none"
+    return f"{source.capitalize()} results beside their criteria: {parts}."
+
+
+def form_rows(content: IndicesContent, source: str) -> list[tuple[str, ...]]:
+    """Trial, index, to port, to starboard, criterion of "measured" or "simulated" trials, those not run included.
+
+    An index that several runs to a side show has as many rows; a result without a side stands to port, and says so.
+    """
     verdicts = [verdict for origin, verdict in content.verdicts if origin == source]
-    lines = []
+    rows: list[tuple[str, ...]] = []
     for trial, indices in GROUPS:
         for number, (key, name) in enumerate(indices):
-            of_index = [verdict for verdict in verdicts if verdict.criterion.key == key]
-            cells = {
-                side: tuple(_result(content, verdict) for verdict in of_index if verdict.side == side)
-                for side in ("port", "starboard", "")
-            }
-            lines.append(
-                Line(
-                    trial="" if number else trial,
-                    name=name,
-                    port=cells["port"],
-                    starboard=cells["starboard"],
-                    both=cells[""],
-                    criterion=_criterion(content, of_index, key),
-                )
-            )
-    return lines
+            found = [verdict for verdict in verdicts if verdict.criterion.key == key]
+            sides = [[one for one in found if one.side in at] for at in (("port", ""), ("starboard",))]
+            missing = [NO_RESULT] * all(one.side for one in found)
+            cells = [[_cell(content, one, of=len(side)) for one in side] or missing for side in sides]
+            named = ("" if number else trial, name)
+            for place, both in enumerate(zip_longest(*cells, fillvalue="")):
+                rows.append(("", "", *both, "") if place else (*named, *both, _criterion(content, found, key)))
+    return rows
 
 
-def _result(content: IndicesContent, verdict: Verdict) -> Result:
-    value = verdict.value
-    metric = verdict.criterion.key.endswith("_m") and value is not None
-    return Result(
-        value=shown(verdict.criterion.key, value, verdict.tolerance),
-        by_length=f"{value / content.vessel.length_m:.2f} L" if metric and value is not None else "",
-        run=verdict.run,
-        verdict=verdict_word(verdict),
-    )
+def _cell(content: IndicesContent, verdict: Verdict, *, of: int) -> str:
+    """A result, the same by length, and its verdict; where others stand beside it, its run in a second line."""
+    limit, value = verdict.criterion, verdict.value
+    length = f"{value / content.vessel.length_m:.2f} L " if limit.key.endswith("_m") and value is not None else ""
+    below = verdict.run if of > 1 else "" if verdict.side else "no side"
+    text = f"{shown(limit.key, value, verdict.tolerance)} {length}".replace(" ", words.NB)
+    return Markup("{}{}\n{}").format(text.replace(f"{words.NB}±", " ±"), MARKS[verdict_word(verdict)], below).strip()
 
 
 RULES = {
@@ -96,6 +195,7 @@ RULES = {
     "initial_turning_m": 2.5,
     "track_reach_m": 15.0,
 }
+"""Index -> its limit in ship lengths."""
 
 
 def _criterion(content: IndicesContent, verdicts: list[Verdict], key: str) -> str:
@@ -141,70 +241,36 @@ def _length_by_speed(content: IndicesContent) -> str:
     return ", ".join(found)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shown:
-    """A condition of the measured trials beside its limit; `met` is None where it was not stated."""
-
-    name: str
-    found: str
-    limit: str
-    met: bool | None
-
-
-def condition_rows(content: IndicesContent) -> list[Shown]:
-    """Water depth, wind and sea of the measured trials."""
+def condition_rows(content: IndicesContent) -> list[tuple[str, ...]]:
+    """Condition, value, limit and verdict of the measured trials; what was not stated stays open."""
     held, draught = content.held, content.vessel.draught_m
     ratio = None if held.depth_m is None else held.depth_m / draught
     force = None if held.wind_mps is None else beaufort(held.wind_mps)
     return [
-        Shown(
-            name="Water depth / mean draught",
-            found="" if ratio is None else f"{held.depth_m:g} m / {draught:g} m = {ratio:.1f}",
-            limit=f"more than {DEPTH_BY_DRAUGHT:g}",
-            met=None if ratio is None else ratio > DEPTH_BY_DRAUGHT,
+        (
+            "Water depth / mean draught",
+            "" if ratio is None else f"{held.depth_m:g} m / {draught:g} m = {ratio:.1f}",
+            f"more than {DEPTH_BY_DRAUGHT:g}",
+            "" if ratio is None else _kept(ratio > DEPTH_BY_DRAUGHT),
         ),
-        Shown(
-            name="Wind",
-            found="" if force is None else f"{speed(held.wind_mps or 0.0)}, Beaufort {force}",
-            limit=f"Beaufort {STRONGEST_WIND} at most",
-            met=None if force is None else force <= STRONGEST_WIND,
+        (
+            "Wind",
+            "" if force is None else f"{speed(held.wind_mps or 0.0)}, Beaufort {force}",
+            f"Beaufort {STRONGEST_WIND} at most",
+            "" if force is None else _kept(force <= STRONGEST_WIND),
         ),
-        Shown(
-            name="Sea state",
-            found="" if held.sea_state is None else f"{held.sea_state}",
-            limit=f"{HIGHEST_SEA} at most",
-            met=None if held.sea_state is None else held.sea_state <= HIGHEST_SEA,
+        (
+            "Sea state",
+            "" if held.sea_state is None else f"{held.sea_state}",
+            f"{HIGHEST_SEA} at most",
+            "" if held.sea_state is None else _kept(held.sea_state <= HIGHEST_SEA),
         ),
+        ("Place and date", "", "", ""),
     ]
 
 
-def indices_html(content: IndicesContent) -> str:
-    """One HTML page without outside references."""
-    sources = tuple(dict.fromkeys(source for source, _ in content.trials))
-    page = page_template("indices.html")
-    return page.render(
-        content=content,
-        rows=verdict_rows(content),
-        sources=sources,
-        forms={source: form_lines(content, source) for source in sources},
-        ship=ship_rows(content),
-        conditions=condition_rows(content),
-        counts=[_counts(content, source) for source in sources],
-        circles=[_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)],
-        zigzags=[_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)],
-        stops=[_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)],
-    )
-
-
-def _counts(content: IndicesContent, source: str) -> str:
-    """How many results there are and how they stand to their criteria."""
-    counted = content.counted(source)
-    parts = ", ".join(f"{number} {word}" for word, number in counted.items()) if any(counted.values()) else "none"
-    return f"{source.capitalize()} results beside their criteria: {parts}."
-
-
-def _degrees(angle_rad: float) -> str:
-    return words.number(math.degrees(angle_rad), 1)
+def _kept(kept: bool) -> str:
+    return MARKS["met" if kept else "not met"]
 
 
 def _metres(value: float | None) -> str:
@@ -219,24 +285,36 @@ def _with_tolerance(value: float | None, tolerance_m: float) -> str:
     return shown("_m", value, tolerance_m).removesuffix(" m") if value is not None else ""
 
 
+def _circles(content: IndicesContent) -> list[tuple[str, ...]]:
+    return [_circle(source, trial) for source, trial in content.trials if isinstance(trial, Circle)]
+
+
 def _circle(source: str, trial: Circle) -> tuple[str, ...]:
     advance = _with_tolerance(trial.advance_m, trial.tolerance_m)
     lengths = (trial.transfer_m, trial.tactical_diameter_m, trial.steady_diameter_m)
     current = ""
     if trial.current_north_mps is not None and trial.current_east_mps is not None:
         current = f"{trial.current_north_mps:.3f}, {trial.current_east_mps:.3f}"
-    head = (source, trial.name, trial.side, _degrees(trial.helm_rad), _speed(trial.speed_mps), advance)
+    head = (source, trial.name, trial.side, _speed(trial.speed_mps), degrees(trial.helm_rad), advance)
     return (*head, *(_metres(length) for length in lengths), current)
 
 
+def _zigzags(content: IndicesContent) -> list[tuple[str, ...]]:
+    return [_zigzag(source, trial) for source, trial in content.trials if isinstance(trial, ZigZag)]
+
+
 def _zigzag(source: str, trial: ZigZag) -> tuple[str, ...]:
-    executes = ", ".join(f"{order.time_s:.1f} s at {_degrees(order.heading_rad)}" for order in trial.executes)
+    executes = ", ".join(f"{order.time_s:.1f} s at {degrees(order.heading_rad)}" for order in trial.executes)
     initial = _with_tolerance(trial.initial_turning_m, trial.tolerance_m)
-    head = (source, trial.name, trial.side, f"{_degrees(trial.heading_rad)} / {_degrees(trial.helm_rad)}")
-    return (*head, _speed(trial.speed_mps), overshoots(trial), initial, executes)
+    head = (source, trial.name, trial.side, _speed(trial.speed_mps), overshoots(trial), executes)
+    return (*head, f"{degrees(trial.heading_rad)} / {degrees(trial.helm_rad)}", initial)
+
+
+def _stops(content: IndicesContent) -> list[tuple[str, ...]]:
+    return [_stop(source, trial) for source, trial in content.trials if isinstance(trial, Stop)]
 
 
 def _stop(source: str, trial: Stop) -> tuple[str, ...]:
     reach = [shown("_m", value, trial.tolerance_m) for value in (trial.track_reach_m, trial.head_reach_m)]
-    times = (_degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
+    times = (degrees(trial.heading_change_rad), f"{trial.time_s:.0f}")
     return (source, trial.name, words.speed(trial.speed_mps), *reach, shown("_m", trial.lateral_m), *times)

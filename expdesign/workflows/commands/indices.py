@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export import Content
-from expdesign.export.document import Table
-from expdesign.export.indices_form import Held, IndicesContent, indices_json, verdict_rows, zigzag_rows
-from expdesign.export.indices_page import indices_html
-from expdesign.indices import NotStandard, StandardResults, measured_trial, standard_results
+from expdesign.export.indices_form import Held, IndicesContent, indices_json
+from expdesign.export.indices_page import indices_document
+from expdesign.indices import StandardResults, measured_trial, standard_results
 from expdesign.indices.measured import Found
 from expdesign.progress import Progress, silent
 from expdesign.reduction import at_reference_point
-from expdesign.requests import repeating
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped, measured
-
-HEADER = ("From", "Run", "Index", "Result", "", "Limit", "Rule", "Verdict")
 
 
 @workflow
@@ -46,16 +40,15 @@ def indices(request: requests.Indices, *, progress: Progress = silent) -> Outcom
         simulated_why_not=why_not,
         measured=seen,
         notes=(*told, *notes),
-        command=repeating(request),
         held=held,
     )
-    files: dict[str, Content] = {"indices.json": indices_json(content), "indices.html": partial(indices_html, content)}
     return finished(
         request,
         Path("runs") / f"{request.vessel.stem}-indices",
-        files,
-        document_of(_summary(content), _tables(content), content.notes_in_words),
+        {"indices.json": indices_json(content)},
+        indices_document(content),
         progress,
+        page="indices.html",
     )
 
 
@@ -93,45 +86,3 @@ def _simulated(ship: Vessel, speed_mps: float | None, *, needed: bool) -> tuple[
         if needed:
             raise
         return None, str(error)
-
-
-def _summary(content: IndicesContent) -> dict[str, object]:
-    refused = sum(isinstance(item, NotStandard) for item in content.measured)
-    found = content.simulated
-    return {
-        "vessel": content.vessel.name,
-        "measured_runs": len(content.measured),
-        **({"measured_runs_without_result": refused, **_counts(content, "measured")} if content.measured else {}),
-        **({"simulated_at_mps": found.speed_mps, **_counts(content, "simulated")} if found else {}),
-        "results": {
-            f"{source} {v.run}: {v.criterion.key}": {
-                "value": v.value, "tolerance": v.tolerance, "limit": v.criterion.limit, "met": v.met
-            }
-            for source, v in content.verdicts
-        },
-    }  # fmt: skip
-
-
-def _counts(content: IndicesContent, source: str) -> dict[str, object]:
-    """How many results of a source stand how to their criteria."""
-    counted = content.counted(source).items()
-    return {f"{source}_criteria_{word.replace(' ', '_')}": number for word, number in counted}
-
-
-def _tables(content: IndicesContent) -> tuple[Table, ...]:
-    criteria = f"MSC.137(76): {content.vessel.name}"
-    if any(verdict.tolerance for _, verdict in content.verdicts):
-        criteria += " (± is one sample of the record at the order)"
-    zigzags = (
-        "From",
-        "Run",
-        "Approach",
-        "Heading / helm, deg",
-        "Heading at reversals, deg",
-        "Overshoot from there, deg",
-    )
-    tables = (
-        (criteria, HEADER, verdict_rows(content)),
-        ("Zig-zags", zigzags, zigzag_rows(content)),
-    )
-    return tuple(Table(title=title, header=header, rows=tuple(rows)) for title, header, rows in tables if rows)
