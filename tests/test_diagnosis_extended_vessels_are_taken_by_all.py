@@ -23,8 +23,9 @@ from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.tables import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
 from expdesign.export import vessel_toml
-from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_page import diagnosis_document
 from expdesign.export.diagnosis_results import extended_vessel
+from expdesign.export.pages import document_html
 from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel
 from expdesign.signals import Record
@@ -200,7 +201,7 @@ def test_the_page_of_a_lost_simulation_shows_no_astronomic_numbers(clean):
         errors=(clean.windows.measured,),
         step_residuals=(clean.residuals,),
     )
-    page = diagnosis_html(found, command="made up")
+    page = document_html(diagnosis_document(found))
     text = re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL)
     assert text.count("diverged") >= 3
     assert not re.search(r"\binf\b|e\+\d|100000000", text)

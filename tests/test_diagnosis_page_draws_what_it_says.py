@@ -14,8 +14,9 @@ from expdesign.diagnosis.data.windows import cut_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
 from expdesign.export import diagnosis_figures as diagnosis_figures
 from expdesign.export.diagnosis_figures import has_sign, is_force, suspected, suspected_force
-from expdesign.export.diagnosis_page import diagnosis_html
+from expdesign.export.diagnosis_page import diagnosis_document
 from expdesign.export.diagnosis_results import diagnosis_json
+from expdesign.export.pages import document_html
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
 
@@ -173,10 +174,10 @@ def test_two_findings_of_one_cause_have_a_picture_each(clean):
         for name in ("X_u", "Y_v")
     )
     found = replace(clean, findings=items, errors=(clean.windows.measured,) * 2, step_residuals=(clean.residuals,) * 2)
-    page = diagnosis_html(found, command="made up")
+    page = document_html(diagnosis_document(found))
     assert "X_u: u" in page
     assert "Y_v: v" in page
-    assert page.index("Missing acceleration") < page.index('id="finding1"')
+    assert page.index("Missing acceleration") < page.index("<h2>1. ")
 
 
 def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
@@ -187,7 +188,7 @@ def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
         variables={name: values[:5] for name, values in clean.residuals.variables.items()},
     )
     found = replace(clean, residuals=short)
-    assert "too short for that" in diagnosis_html(found, command="made up")
+    assert "too short for that" in document_html(diagnosis_document(found))
     assert json.loads(diagnosis_json(found))["residuals"]["p_values"]["u"]["heading"] is None
 
 
@@ -195,4 +196,4 @@ def test_data_too_short_for_the_residuals_are_noted(clean, monkeypatch):
 def test_one_variable_is_not_called_several(clean, names, words, monkeypatch):
     monkeypatch.setattr(diagnosis_figures, "svg", lambda *_, **__: "")  # only the words are read
     some = replace(clean.residuals, variables={name: clean.residuals.variables[name] for name in names})
-    assert f"{words}</summary>" in diagnosis_html(replace(clean, residuals=some), command="")
+    assert f"{words}</summary>" in document_html(diagnosis_document(replace(clean, residuals=some)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from expdesign.diagnosis import Diagnosis, Finding
 from expdesign.diagnosis.accuracy import Dependence, dependence
 from expdesign.diagnosis.model import ExtendedModel, ahead_force, ahead_force_text, group_columns
 from expdesign.diagnosis.vessel_file import extended_model
+from expdesign.export.document import Figure
 from expdesign.export.estimate_figures import AXES, thinned
 from expdesign.export.pages.figures import BLUE, GREY, VERMILION, light_grid, new_figure, page_figure, short, svg
 from expdesign.values import Array
@@ -273,8 +275,8 @@ def _scatter(axes: Axes, x: Array, y: Array, *, signed: bool) -> None:
     axes.set_ylim(low - 0.1 * (high - low + 1e-12), high + 0.1 * (high - low + 1e-12))
 
 
-def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
-    """Figures of the missing acceleration against every variable, clearest first, and its significance."""
+def residual_figures(found: Diagnosis) -> list[tuple[bool, Figure]]:
+    """Of the missing acceleration against every variable, clearest first: whether it is significant, and the figure."""
     residuals = found.residuals
     if not residuals.sufficient:
         return []
@@ -291,7 +293,7 @@ def residual_figures(found: Diagnosis) -> list[tuple[bool, str]]:
     return [
         (
             any(item.p_value < clear for item in tests[name]),
-            _residual_figure(name, residuals.outputs, tests[name], limits, clear, places),
+            Figure(draw=partial(_residual_figure, name, residuals.outputs, tests[name], limits, clear, places)),
         )
         for name in ranked
     ]

@@ -1,13 +1,13 @@
-"""The page about a diagnosis."""
+"""A diagnosis as a document."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from expdesign.conventions import plus_minus
 from expdesign.diagnosis import Diagnosis, Finding
@@ -26,10 +26,15 @@ from expdesign.export.diagnosis_figures import (
     suspect_figure,
     window_figure,
 )
-from expdesign.export.diagnosis_results import RollVerdict, roll_sentences
-from expdesign.export.pages import page_template
-from expdesign.export.pages.figures import report_style
-from expdesign.progress import Progress, silent
+from expdesign.export.diagnosis_results import (
+    CAUSE_HEADER,
+    RollVerdict,
+    accuracy_entry,
+    cause_rows,
+    finding_entry,
+    roll_sentences,
+)
+from expdesign.export.document import Block, Document, Figure, Gallery, Section, Table, filled, section
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 DRAWN_STRETCHES = 4  # stretches of data drawn in a diagnosis
@@ -100,29 +105,78 @@ def estimate_words(name: str, cause: str) -> str:
 NO_NUMBER = "\N{EN DASH}"
 
 
-def diagnosis_html(
-    found: Diagnosis, *, command: str, roll: RollVerdict | None = None, progress: Progress = silent
-) -> str:
-    """One HTML page without any outside reference."""
-    figures = _figures(found, progress)
-    page = page_template("diagnosis.html")
-    return page.render(
-        found=found,
-        verdict=found.verdict.partition(". "),
-        alarm=f"{SELECTION_TUNING.accepted_p_value:g}",
-        apart=found.unit,
-        findings=[_finding(item, found) for item in found.findings],
-        before=accuracy_in_words(found.before),
-        astray=has_diverged(found.before) or has_diverged(found.after),
-        outputs=", ".join(found.before.outputs),
-        whole=_mean_missing(found),
-        tested=[(cause_title(cause), p_value) for cause, p_value in found.screened],
-        accuracy=accuracy_rows(found),
-        data=_data(found),
-        roll=roll_sentences(roll),
+FITS = (
+    "Output",
+    *(
+        f"{what}\n{model}"
+        for model in ("model in use", "extended model")
+        for what in ("Fit", "RMS error", "Mean error")
+    ),
+)
+ABOUT_FITS = (
+    "The fit is 100\N{NO-BREAK SPACE}% for a perfect simulation. It is 0\N{NO-BREAK SPACE}% for one that is as good as "
+    "the mean of the measured velocity, and negative for a worse one. u is the surge speed ahead, v the sway speed to "
+    "starboard, r the yaw rate to starboard."
+)
+ASTRAY = (
+    "A fit far below zero means that the simulation of a whole run diverges from the ship. The model is then "
+    "course-unstable, or its parameters are far off. In that case read the figure of the error growth instead of the "
+    "fit: its simulations start again from measured states."
+)
+GROWTH = (
+    "Error growth: error of the simulation against the time since it started from a measured state. Sensor noise "
+    "gives a level line. A wrong model or an unmeasured disturbance gives a rising one. Where a line leaves the "
+    "figure, the simulation has diverged from the ship."
+)
+TOO_SHORT = "These data are too short for that analysis, or have too many gaps."
+ROLL = Markup(
+    "The roll of <code>[roll]</code> does not act back on the path, so that the findings hold whatever it is. Roll "
+    "rate, lateral acceleration, yaw rate and rudder give the coefficients of the roll equation; instruments come from "
+    "the rudder. They are compared with those of the file, within the errors of both. The accelerometer feels gravity, "
+    "so that a change of the hull's righting moment and one of the load differ. K_vd and z_f, which one load case does "
+    "not tell, are as in the file. Where a single explanation is left, <code>vessel-extended.toml</code> has it."
+)
+METHOD = Markup(
+    "Each cause of a catalogue has its own effect on the simulation error. Score tests search the error for these "
+    "effects. They allow for the correlation of successive errors, for a slowly varying current, and for how runs "
+    "differ. Parameters with a <code>parameter_std</code> in the vessel file may move within it in every test. The "
+    "best cause is fitted and added to the model. This repeats until no cause is significant. The gains are measured "
+    "by cross-validation on held-out {}; the causes themselves were selected with all data. "
+    "<code>vessel-extended.toml</code> holds the model with the findings, except where the notes say otherwise."
+)
+
+
+def diagnosis_document(found: Diagnosis, roll: RollVerdict | None = None) -> Document:
+    """The causes and what adding them gains, for people."""
+    rolls, many = roll_sentences(roll), len(found.findings)
+    before = (f"Without {'it' if many == 1 else 'them'}, {accuracy_in_words(found.before)}.",) if many else ()
+    return Document(
+        kind="Diagnosis of the simulation model",
+        title=found.vessel.name,
+        name=f"Diagnosis {found.vessel.name}",
+        about=_data(found),
+        findings=(found.verdict, *before, *rolls),
+        values={
+            "verdict": found.verdict,
+            "baseline": accuracy_entry(found.before),
+            "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
+            **({"roll": " ".join(rolls)} if rolls else {}),
+        },
+        sections=(
+            *filled(
+                section(
+                    "Causes of the simulation error", Table(header=CAUSE_HEADER, rows=cause_rows(found), on="terminal")
+                )
+            ),
+            _accuracy(found),
+            section("Missing acceleration", *_missing(found)),
+            *(_finding(found, index) for index in range(many)),
+            *([section("Roll", ROLL)] if rolls else []),
+            section("Before and after", *_stretches(found)),
+            _tested(found),
+            section("Method", METHOD.format(found.unit)),
+        ),
         notes=diagnosis_notes(found),
-        figures=figures,
-        command=command,
     )
 
 
@@ -132,23 +186,72 @@ def diagnosis_notes(found: Diagnosis) -> tuple[str, ...]:
     return (*found.record.doubts, *found.notes, *rest)
 
 
-def _figures(found: Diagnosis, progress: Progress) -> dict[str, object]:
-    """Figures by their places in the page."""
-    windows, causes = drawn(found), range(len(found.findings))
-    drawing: list[Callable[[], Any]] = [
-        partial(growth_figure, found),
-        partial(residual_figures, found),
-        *(partial(window_figure, found, index) for index in windows),
-        *(partial(suspect_figure, found, index, f"suspect{index}") for index in causes),
-    ]
-    done: list[Any] = []
-    with report_style():
-        for figure in drawing:
-            progress("drawing the page", len(done) / len(drawing))
-            done.append(figure())
-    growth, residuals, *others = done
-    stretches = [(_stretch(found, index), others.pop(0)) for index in windows]
-    return {"windows": stretches, "growth": growth, "residuals": residuals, "suspects": others}
+def _accuracy(found: Diagnosis) -> Section:
+    astray = has_diverged(found.before) or has_diverged(found.after)
+    return section(
+        "Accuracy of the simulation",
+        f"{ABOUT_FITS} {ASTRAY}" if astray else ABOUT_FITS,
+        Table(
+            title="Simulation of the vessel file against the data, and after what was found",
+            header=FITS,
+            rows=accuracy_rows(found),
+        ),
+        "Each run is simulated from its first measured state with the measured inputs. Measurement noise counts as "
+        "misfit. This table uses the data that the extended model was fitted to. The gains below use "
+        f"{found.unit} held out of the fit.",
+        Figure(draw=partial(growth_figure, found), caption=GROWTH),
+    )
+
+
+def _missing(found: Diagnosis) -> Iterator[Block]:
+    """The acceleration that the model lacks, against all that it may depend on."""
+    yield Markup(
+        "This section assumes no cause. The data are cut into stretches of {}\N{NO-BREAK SPACE}s. Each is simulated "
+        "from the measured state at its beginning. The rate at which measurement and simulation diverge is the "
+        "acceleration that the model lacks: ahead (u), to starboard (v) and in yaw (r). The figures show it against "
+        "the states, inputs, heading, time and run, as means over groups of stretches with two standard errors. The "
+        "clearest dependence comes first. All figures of an output have the same scale. <b>Orange</b> means differ "
+        "by more than chance explains. Correlated variables may be orange for one reason, such as u and the input "
+        "that drives it. Unmeasured disturbances also show: a varying current depends on the heading. The tests of "
+        "causes{} allow for that."
+    ).format(f"{found.residuals.stretch_s:g}", " below" if found.findings else "")
+    figures = residual_figures(found)
+    if not figures:
+        yield Markup("<b>{}</b>").format(TOO_SHORT)
+        return
+    yield f"Mean missing acceleration, with one standard error: {', '.join(_mean_missing(found))}."
+    clear = tuple(figure for is_clear, figure in figures if is_clear)
+    others = tuple(figure for is_clear, figure in figures if not is_clear)
+    many = len(others) > 1
+    yield (
+        Gallery(clear)
+        if clear
+        else Markup("<b>Its dependence on each of {} variables is within chance.</b>").format(len(others))
+    )
+    if others:
+        which = "The other" if clear else "These" if many else "This"
+        yield Gallery(others, folded=f"{which} {f'{len(others)} variables' if many else 'variable'}")
+
+
+def _stretches(found: Diagnosis) -> Iterator[Figure]:
+    for index in drawn(found):
+        caption = Markup("<b>{}</b>").format(_stretch(found, index))
+        yield Figure(draw=partial(window_figure, found, index), caption=caption, above=True)
+
+
+def _tested(found: Diagnosis) -> Section:
+    above = " with the findings above in the model" if found.findings else ""
+    return section(
+        "Other causes that were tested",
+        f"p-values of all other causes{above}, corrected for the number of tests. 1 means no evidence. A cause becomes "
+        f"a finding if its p-value after the fit is at most {SELECTION_TUNING.accepted_p_value:g} and adding it "
+        f"reduces an error of held-out {found.unit} by an interval that excludes zero.",
+        Table(
+            header=("Cause", "p-value"),
+            rows=[(cause_title(cause), f"{p_value:.2g}") for cause, p_value in found.screened],
+            on="page",
+        ),
+    )
 
 
 def _mean_missing(found: Diagnosis) -> list[str]:
@@ -196,34 +299,65 @@ def accuracy_rows(found: Diagnosis) -> list[tuple[str, ...]]:
     return rows
 
 
-def _finding(item: Finding, found: Diagnosis) -> dict[str, object]:
-    low, high = item.gain_interval
-    rows = [
+def _finding(found: Diagnosis, index: int) -> Section:
+    item, several = found.findings[index], len(found.findings) > 1
+    fits = (
         f"{name} {_fit(float(a))} \N{RIGHTWARDS ARROW} {_fit(float(b))}"
         for name, a, b in zip(found.before.outputs, item.fit_before, item.fit_after, strict=True)
-    ]
-    return {
-        "cause": item.cause,
-        "title": cause_title(item.cause),
-        "explanation": item.explanation,
-        "estimates": [
-            (estimate_words(one.name, item.cause), _with_error(one).replace("-", words.MINUS), _says(one))
+    )
+    reductions = [_reduction(one) for one in item.error_reductions if np.isfinite(one.share)]
+    low, high = item.gain_interval
+    nb = words.NB
+    rows = [
+        *(
+            (estimate_words(one.name, item.cause), f"{_with_error(one)}\n{_says(one)}".strip())
             for one in item.estimates
-        ],
-        "p_value": _p_value(item.p_value),
-        "gain": words.number(item.gain, 1),
-        "interval": f"{words.number(low, 1)} to {words.number(high, 1)}",
-        "fits": rows,
-        "signed": has_sign(item),
-        "force": is_force(found, item),
-        "reductions": [_reduction(reduction) for reduction in item.error_reductions if np.isfinite(reduction.share)],
-        "alternatives": alternatives(item),
-        "distinguishing": None if item.would_tell_apart is None else manoeuvre(item.would_tell_apart),
-    }
+        ),
+        ("p-value, corrected for the number of causes tested", _p_value(item.p_value)),
+        (
+            f"Fit on held-out {found.unit}, without and with this cause"
+            f"{'; the findings before it are in the model' if several else ''}",
+            Markup("<br>").join(fits),
+        ),
+        (f"Reduction of the error on these {found.unit}, 95{nb}% interval", Markup("<br>").join(reductions)),
+        (
+            f"Gain of fit, mean of {', '.join(found.before.outputs)}",
+            f"{words.number(item.gain, 1)} points\n95{nb}% interval {words.number(low, 1)} to {words.number(high, 1)}",
+        ),
+    ]
+    force, signed = is_force(found, item), has_sign(item)
+    what = "Missing acceleration" if force else "Measured minus simulated"
+    return section(
+        f"{index + 1}. {cause_title(item.cause)}",
+        Markup("<b>{}</b>").format(item.explanation),
+        Table(header=("Quantity", "Value"), rows=[row for row in rows if row[1]], texts=2, on="page"),
+        _alternatives(item),
+        Figure(
+            draw=partial(suspect_figure, found, index, f"suspect{index}"),
+            caption=f"{what} of the model without this cause, against the variable that this cause makes it depend on. "
+            f"Grey: each {'stretch' if force else 'sample'}. Colour: {'means' if signed else 'root mean squares'} of "
+            f"groups. Without such a cause, the coloured line stays {'near zero' if signed else 'level'}.",
+        ),
+    )
+
+
+def _alternatives(item: Finding) -> str:
+    """What explains the data as well, and what would tell it apart."""
+    others = alternatives(item)
+    if not others:
+        return "No other cause of the catalogue explains the data nearly as well."
+    text = Markup("<b>Alternatives:</b> {}. {} the data as well.").format(
+        ", or ".join(others), "It explains" if len(others) == 1 else "They explain"
+    )
+    if item.would_tell_apart is None:
+        return text
+    return text + Markup(
+        " To distinguish them, run <b>{}</b>. The explanations disagree most there, per minute."
+    ).format(manoeuvre(item.would_tell_apart))
 
 
 def _with_error(item: Estimate) -> str:
-    return f"{plus_minus(item.value, item.std)} {item.unit}".rstrip()
+    return f"{plus_minus(item.value, item.std)} {item.unit}".rstrip().replace("-", words.MINUS)
 
 
 def _says(item: Estimate) -> str:

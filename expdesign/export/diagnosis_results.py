@@ -210,9 +210,12 @@ def _in_file(item: Estimate) -> str:
     return "" if item.stated is None else f" (file: {plus_minus(item.stated, 0.0)})"
 
 
-def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header, and one row per finding."""
-    rows: list[tuple[str, ...]] = [
+CAUSE_HEADER = ("cause", "estimate", "p", "gain of fit [points]", "not distinguishable from")
+
+
+def cause_rows(found: Diagnosis) -> list[tuple[str, ...]]:
+    """One row per finding, below `CAUSE_HEADER`."""
+    return [
         (
             item.cause,
             ", ".join(f"{one.name} {plus_minus(one.value, one.std)}{_in_file(one)}" for one in item.estimates),
@@ -222,7 +225,6 @@ def diagnosis_tables(found: Diagnosis) -> tuple[tuple[str, ...], list[tuple[str,
         )
         for item in found.findings
     ]
-    return ("cause", "estimate", "p", "gain of fit [points]", "not distinguishable from"), rows
 
 
 def extended_vessel(found: Diagnosis, *, command: str, roll: RollVerdict | None = None) -> str:

@@ -52,6 +52,14 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Gallery:
+    """Small figures beside each other."""
+
+    figures: tuple[Figure, ...]
+    folded: str = ""  # what they are, where the reader opens them
+
+
+@dataclass(frozen=True)
 class Items:
     """A list of explanations."""
 
@@ -78,7 +86,7 @@ class Note:
         return f"{self.of}: {self.text}" if self.of else self.text
 
 
-Block = str | Markup | Table | Figure | Items | Listing | Note
+Block = str | Markup | Table | Figure | Gallery | Items | Listing | Note
 """Of a section; a text is a paragraph that explains."""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 from expdesign import __version__
-from expdesign.export.document import Block, Document, Figure, Table, fact_rows
+from expdesign.export.document import Block, Document, Figure, Gallery, Table, fact_rows
 from expdesign.export.formats.format import xml_text
 from expdesign.progress import Progress, in_phases, silent
 
@@ -48,12 +48,16 @@ def document_html(document: Document, *, progress: Progress = silent) -> str:
         sections=sections,
         facts=list(fact_rows(document.facts)),
         contents=contents if len(contents) >= MANY_SECTIONS else (),
-        drawn=_drawn([block for part in sections for block in part.blocks if isinstance(block, Figure)], progress),
+        drawn=_drawn([figure for part in sections for block in part.blocks for figure in _figures(block)], progress),
     )
 
 
 def _on_page(block: Block) -> bool:
     return not isinstance(block, Table) or block.on != "terminal"
+
+
+def _figures(block: Block) -> tuple[Figure, ...]:
+    return block.figures if isinstance(block, Gallery) else (block,) if isinstance(block, Figure) else ()
 
 
 def _drawn(figures: list[Figure], progress: Progress) -> dict[int, object]:

@@ -6,29 +6,19 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from expdesign import requests
-from expdesign.diagnosis import Diagnosis, Proposal
+from expdesign.diagnosis import Proposal
 from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
 from expdesign.export import Content
-from expdesign.export.diagnosis_page import accuracy_rows, diagnosis_html, diagnosis_notes
-from expdesign.export.diagnosis_results import (
-    RollVerdict,
-    accuracy_entry,
-    diagnosis_json,
-    diagnosis_tables,
-    extended_vessel,
-    finding_entry,
-    roll_sentences,
-)
-from expdesign.export.document import Table
+from expdesign.export.diagnosis_page import diagnosis_document
+from expdesign.export.diagnosis_results import RollVerdict, diagnosis_json, extended_vessel
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.requests import repeating
@@ -38,7 +28,7 @@ from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
 from expdesign.workflows.steps.workers import shared
 
@@ -65,17 +55,19 @@ def diagnose(request: requests.Diagnose, *, progress: Progress = silent) -> Outc
         )
     reported.after = 0.0
     roll = _roll(ship, record)
-    command = repeating(request)
     files: dict[str, Content] = {
         "diagnosis.json": diagnosis_json(found, roll),
-        "diagnosis.html": partial(
-            diagnosis_html, found, command=command, roll=roll, progress=reported.part(drawing, 0.0)
-        ),
-        "vessel-extended.toml": extended_vessel(found, command=command, roll=roll),
+        "vessel-extended.toml": extended_vessel(found, command=repeating(request), roll=roll),
     }
-    summary = {**_summary(found), **({} if roll is None else {"roll": " ".join(roll_sentences(roll))})}
-    document = document_of(summary, _tables(found), diagnosis_notes(found))
-    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
+    return finished(
+        request,
+        Path("runs") / request.data[0].stem,
+        files,
+        diagnosis_document(found, roll),
+        progress,
+        page="diagnosis.html",
+        drawing=reported.part(drawing, 0.0),
+    )
 
 
 def with_alarms(ship: Vessel, data: Sequence[Path]) -> tuple[Vessel, dict[str, str]]:
@@ -146,24 +138,3 @@ def as_inputs(commands: Commands, vessel: Vessel, model: VesselModel) -> Array:
             f"{', '.join(wanted)}; expected a scenario of the ship in the data"
         )
     return np.column_stack([table[name] for name in wanted])
-
-
-def _summary(found: Diagnosis) -> dict[str, object]:
-    return {
-        "verdict": found.verdict,
-        "baseline": accuracy_entry(found.before),
-        "findings": [finding_entry(item, found.before.outputs) for item in found.findings],
-    }
-
-
-def _tables(found: Diagnosis) -> tuple[Table, ...]:
-    fits = ("output", "fit, %", "rms error", "mean error", "fit after", "rms error after", "mean error after")
-    accuracy = Table(
-        title="Simulation of the vessel file against the data, and after what was found",
-        header=fits,
-        rows=tuple(accuracy_rows(found)),
-    )
-    if not found.findings:
-        return (accuracy,)
-    header, rows = diagnosis_tables(found)
-    return Table(title="Causes of the simulation error", header=header, rows=tuple(rows)), accuracy
