@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.estimation.methods import METHODS
+from expdesign.estimation.methods import ESTIMATORS, METHODS
+from expdesign.estimation.regression import UNKNOWN
 from expdesign.signals import Commands
 from measured_trials import EULER, MODEL_SHIP, MODEL_SHIP_TRUE, model_ship_commands, write_run
 
@@ -171,7 +172,10 @@ def test_the_page_stands_alone_and_names_everything(told: tuple[Path, dict]) -> 
     assert np.isclose(page.count("<svg"), 4)
 
 
-def test_help_names_every_method(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_names_every_estimator_and_all_that_may_be_unknown_and_explain_every_method(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main(["estimate", "--help"]) == 0
-    words = set(re.findall(r"[a-z-]+", capsys.readouterr().out))
-    assert {method.name for method in METHODS} <= words
+    assert {*ESTIMATORS, *UNKNOWN} <= set(re.findall(r"[a-z-]+", capsys.readouterr().out))
+    assert main(["explain", "methods"]) == 0
+    assert {method.name for method in METHODS} <= set(re.findall(r"[a-z-]+", capsys.readouterr().out))

@@ -9,8 +9,8 @@ from estimation_case import CURRENT, NOMINAL, QUIET, TRUE, commands, measured, r
 from expdesign.errors import InputError, NotInformative, UnknownName
 from expdesign.estimation.disturbance import READINGS, current_moments
 from expdesign.estimation.instrumental import Settings
-from expdesign.estimation.methods import METHODS, estimate
-from expdesign.estimation.regression import build_layout, build_regression
+from expdesign.estimation.methods import ESTIMATORS, METHODS, estimate, method_for, method_named, methods_for
+from expdesign.estimation.regression import UNKNOWN, build_layout, build_regression
 from expdesign.estimation.solve.solution import Weighting
 from expdesign.signals import Batch
 from expdesign.simulation import Environment, Variation
@@ -251,3 +251,30 @@ def test_unusable_requests_say_what_is_missing() -> None:
     with pytest.raises(InputError, match="expected n1, a1, n2, a2"):
         estimate(record(replace(batch, input_names=("n1", "a1", "n2", "rudder1"))), NOMINAL)
     assert len({method.name for method in METHODS}) == len(METHODS)
+
+
+def test_a_method_is_an_estimator_and_what_is_unknown_of_the_weather_and_keeps_its_name() -> None:
+    """Names as scripts outside have them."""
+    assert {method.name for method in METHODS} == {
+        "ls", "ls-air", "ls-augmented", "ls-wind", "ls-no-current", "ls-no-wind", "iv", "iv-air", "iv-augmented",
+        "iv-wind", "iv-no-current", "iv-no-wind", "iv-current", "iv-air-current", "oe", "oe-air", "oe-current",
+        "oe-air-current",
+    }  # fmt: skip
+    for method in METHODS:
+        weather = method.weather
+        assert method_for(method.solver, weather.unknown, wind=weather.wind) == method_named(method.name) == method
+    assert methods_for((), "nothing", wind=True) == ("ls-air", "iv-air", "oe-air")
+    assert methods_for((), "both", wind=True) == ("ls-augmented", "iv-augmented")
+    assert methods_for(("oe", "iv"), "steady-current", wind=False) == ("oe-current", "iv-current")
+    for solver in ESTIMATORS:
+        for unknown in UNKNOWN:
+            method = method_for(solver, unknown, wind=False)
+            if method is None:
+                with pytest.raises(InputError, match=f"{solver} has no method for {unknown} unknown, expected one of"):
+                    methods_for((solver,), unknown, wind=False)
+            else:
+                assert (method.solver, method.weather.unknown, method.weather.wind) == (solver, unknown, False)
+    with pytest.raises(UnknownName, match="unknown estimator 'iv-air'"):
+        methods_for(("iv-air",), "current", wind=True)
+    with pytest.raises(UnknownName, match="known: nothing, current, wind, both, steady-current"):
+        methods_for((), "currents and tides", wind=True)

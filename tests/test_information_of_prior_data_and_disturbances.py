@@ -178,6 +178,6 @@ def test_designs_and_estimates_have_the_same_columns(predictor: str):
     )
     record = Record(batches=(batch,))
     layout = build_layout(model_for(ship.model, record), record, predictor=predictor)
-    assert method_named(f"iv-{predictor}").predictor == predictor
+    assert method_named(f"iv-{predictor}").weather.name == predictor
     assert set(wide.parameters) == set(layout.names)
     assert wide.interest == layout.parameters

@@ -73,7 +73,7 @@ def test_designs_are_tested_by_the_method_whose_accuracy_they_count(name, method
     case = load_scenario(SCENARIOS / f"{name}.toml")
     assert _method(case, None) == method
     assert _method(case, "ls") == "ls"
-    assert method_named(method).estimates_steady_current == (case.environment.current_std_mps > 0)
+    assert method_named(method).weather.steady == (case.environment.current_std_mps > 0)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from expdesign.assessment.actuator_times import (
 from expdesign.assessment.held_out import HeldOut, ranked
 from expdesign.assessment.misfit import ESTIMATION, TEST, Limits, check_run, decomposed, one_step
 from expdesign.assessment.trials import (
-    USES_WIND,
     Trial,
     Work,
     attempted,
@@ -41,7 +40,7 @@ from expdesign.estimation.disturbance import combined_moments, current_moments, 
 from expdesign.estimation.excitation import EQUATION_WISE, check_excitation, worst_case
 from expdesign.estimation.methods import Method, method_named
 from expdesign.estimation.output_error import ActuatorTime
-from expdesign.estimation.regression import CURRENT, PREDICTORS
+from expdesign.estimation.regression import CURRENT
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
@@ -55,7 +54,6 @@ METHOD_WORK, PREDICTION_WORK, DECOMPOSITION_WORK = 0.9, 0.9, 0.1
 
 
 NO_TESTS = Record(batches=())
-TELL_CURRENT = tuple(item.name for item in PREDICTORS if CURRENT in item.unknown or item.steady)
 
 
 def default_methods(vessel: Vessel, record: Record) -> tuple[str, ...]:
@@ -196,7 +194,7 @@ def _output_error_too(work: Work) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def limits_of(item: Assessed, integration: Integration, *, progress: Progress = silent) -> tuple[Limits, ...]:
     """The decomposed misfit of every run simulated with an estimate."""
-    wind, found = USES_WIND[item.method.predictor], []
+    wind, found = item.method.weather.wind, []
     total = sum(len(run.batch) for run in item.runs)
     for run in item.runs:
         found.append(decomposed(item.model, run, item.estimate, wind=wind, integration=integration))
@@ -222,7 +220,7 @@ def _assessed(work: Work, tests: Record, trial: Trial) -> Assessed:
     vessel, record, options, method, found = work.vessel, work.record, work.options, trial.method, trial.found
     if options.prior == PARAMETER_STD:
         found = with_prior(found, vessel.model)
-    wind = USES_WIND[method.predictor]
+    wind = method.weather.wind
     now = with_times(vessel, found_times(found, vessel))
     found = with_held_noted(with_times_noted(found, record, work.stated, vessel), record, work.stated)
     model = found.model(now.model)
@@ -249,9 +247,10 @@ def _assessed(work: Work, tests: Record, trial: Trial) -> Assessed:
 
 
 def _disturbances(found: Estimate, record: Record, vessel: Vessel, method: Method) -> Disturbances:
-    noise, tells = vessel.sensors.heading_rad, method.predictor in TELL_CURRENT and tells_current(found)
+    noise, weather = vessel.sensors.heading_rad, method.weather
+    tells = (weather.steady or CURRENT in weather.disturbances) and tells_current(found)
     return Disturbances(
         current=current_moments(found, heading_std_rad=noise) if tells else None,
         combined=combined_moments(found, heading_std_rad=noise),
-        wind=measured_wind(record) if USES_WIND[method.predictor] else None,
+        wind=measured_wind(record) if method.weather.wind else None,
     )

@@ -323,7 +323,7 @@ def one_step(
     method = method_named(found.method)
     record = as_read(record, method)
     layout = build_layout(
-        model_for(model, record), record, predictor=method.predictor, fixed=tuple(fixed), quadrature=quadrature
+        model_for(model, record), record, predictor=method.weather.name, fixed=tuple(fixed), quadrature=quadrature
     )
     regression = build_regression(layout, record).regression
     names, values = (*found.names, *found.nuisance_names), np.concatenate([found.values, found.nuisance_values])

@@ -23,7 +23,6 @@ from expdesign.estimation.excitation import worst_case
 from expdesign.estimation.instrumental import STARTS, Settings
 from expdesign.estimation.methods import Method, estimate, method_named
 from expdesign.estimation.output_error import ActuatorTime, Begun
-from expdesign.estimation.regression import PREDICTORS
 from expdesign.estimation.solve import Weighting
 from expdesign.estimation.values import Estimate
 from expdesign.progress import Progress, in_phases, silent
@@ -32,9 +31,6 @@ from expdesign.signals import Record
 from expdesign.vessel import Vessel, VesselModel
 
 WORTH_WHOLE = 1.5  # runs so many horizons long are compared with simulations of their whole length too
-
-
-USES_WIND = {item.name: item.wind for item in PREDICTORS}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,7 +127,7 @@ def starts_of(work: Work, trials: Sequence[Trial]) -> list[Trial]:
     """Least squares, which output error starts from, where it is not among the methods: it must not be lost to it."""
     found: list[Trial] = []
     for trial in trials:
-        name = "ls-air" if USES_WIND[trial.method.predictor] else "ls"
+        name = "ls-air" if trial.method.weather.wind else "ls"
         if trial.method.solver != "oe" or any(name == other.method.name for other in (*trials, *found)):
             continue
         method = method_named(name)
@@ -163,7 +159,7 @@ def predictions_of(work: Work, trials: Sequence[Trial]) -> tuple[HeldOut, ...]:
             method=trial.method,
             horizon_s=trial.horizon_s,
             model=ship.model,
-            wind=USES_WIND[trial.method.predictor],
+            wind=trial.method.weather.wind,
             again=again,
         )
 

@@ -14,8 +14,10 @@ from expdesign.estimation.instrumental import Settings, instrumental_estimate, l
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
     PREDICTORS,
+    UNKNOWN,
     Integers,
     Layout,
+    Predictor,
     Regression,
     Rows,
     build_layout,
@@ -38,42 +40,34 @@ from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.vessel import NOT_SUPPORTED, VesselModel
 
+ESTIMATORS = {"ls": "least squares", "iv": "instrumental variables", "oe": "output error"}
+"""Name -> title; "iv" has simulated, refined instruments, "oe" the least simulation error."""
+
 
 @dataclass(frozen=True)
 class Method:
-    """One way to estimate."""
+    """One way to estimate: an estimator, and what is known and unknown of the weather."""
 
-    name: str  # as users type it
-    title: str  # for tables
-    predictor: str  # a name in `predictors.PREDICTORS`
-    solver: str  # "ls", "iv" (with simulated, refined instruments) or "oe" (least simulation error)
+    solver: str  # one of `ESTIMATORS`
+    weather: Predictor
 
     @property
-    def estimates_steady_current(self) -> bool:
-        """Whether the current itself is a parameter, so that terms keep their own."""
-        return next(item.steady for item in PREDICTORS if item.name == self.predictor)
+    def name(self) -> str:
+        """As users type it and files have it, "iv-air"."""
+        return "-".join(filter(None, (self.solver, self.weather.suffix)))
+
+    @property
+    def title(self) -> str:
+        """For tables."""
+        return ESTIMATORS[self.solver] + self.weather.title
+
+    @property
+    def exists(self) -> bool:
+        """Whether its equations are here: output error has no nuisance regressors, a steady current needs refining."""
+        return not (self.weather.nuisance if self.solver == "oe" else self.weather.steady and self.solver == "ls")
 
 
-METHODS = (
-    Method("ls", "least squares", "basic", solver="ls"),
-    Method("ls-air", "least squares with measured wind", "basic-wind", solver="ls"),
-    Method("ls-augmented", "least squares, augmented", "augmented", solver="ls"),
-    Method("ls-wind", "least squares, augmented, with measured wind", "wind", solver="ls"),
-    Method("ls-no-current", "least squares, augmented for wind alone", "no-current", solver="ls"),
-    Method("ls-no-wind", "least squares, augmented for a current alone", "no-wind", solver="ls"),
-    Method("iv", "instrumental variables", "basic", solver="iv"),
-    Method("iv-air", "instrumental variables with measured wind", "basic-wind", solver="iv"),
-    Method("iv-augmented", "instrumental variables, augmented", "augmented", solver="iv"),
-    Method("iv-wind", "instrumental variables, augmented, with measured wind", "wind", solver="iv"),
-    Method("iv-no-current", "instrumental variables, augmented for wind alone", "no-current", solver="iv"),
-    Method("iv-no-wind", "instrumental variables, augmented for a current alone", "no-wind", solver="iv"),
-    Method("iv-current", "instrumental variables with an unknown steady current", "steady-current", solver="iv"),
-    Method("iv-air-current", "the same with measured wind", "steady-current-wind", solver="iv"),
-    Method("oe", "output error", "basic", solver="oe"),
-    Method("oe-air", "output error with measured wind", "basic-wind", solver="oe"),
-    Method("oe-current", "output error with an unknown steady current", "steady-current", solver="oe"),
-    Method("oe-air-current", "the same with measured wind", "steady-current-wind", solver="oe"),
-)
+METHODS = tuple(method for solver in ESTIMATORS for weather in PREDICTORS if (method := Method(solver, weather)).exists)
 
 
 HOLDS_STEERED = {
@@ -104,6 +98,38 @@ def method_named(name: str) -> Method:
 def steady_current_method(model: VesselModel) -> str:
     """The method whose accuracy designs and plans state where the forecast leaves a steady current unknown."""
     return "iv-air-current" if model.reads_air else "iv-current"
+
+
+def method_for(solver: str, unknown: str, *, wind: bool) -> Method | None:
+    """The method of an estimator for what is unknown of the weather; None where there is none.
+
+    Args:
+        solver: one of `ESTIMATORS`.
+        unknown: one of `UNKNOWN`.
+        wind: whether wind is measured and acts in the model; it is used unless it is what is unknown.
+    """
+    fitting = [one for one in METHODS if (one.solver, one.weather.unknown) == (solver, unknown)]
+    return max(fitting, key=lambda one: one.weather.wind == wind, default=None)
+
+
+def methods_for(names: Sequence[str], unknown: str, *, wind: bool) -> tuple[str, ...]:
+    """Methods of estimators for what is unknown of the weather; of all that there are where none is named.
+
+    Raises:
+        UnknownName: no such estimator, or nothing that may be unknown.
+        InputError: the estimator has no such method.
+    """
+    if unknown not in UNKNOWN:
+        raise UnknownName("part of the weather", unknown, known=UNKNOWN)
+    for name in names:
+        if name not in ESTIMATORS:
+            raise UnknownName("estimator", name, known=ESTIMATORS)
+    found = {name: method_for(name, unknown, wind=wind) for name in names or ESTIMATORS}
+    for name, method in found.items():
+        if names and method is None:
+            there = [one for one in UNKNOWN if method_for(name, one, wind=wind)]
+            raise InputError(f"{name} has no method for {unknown} unknown, expected one of {', '.join(there)}")
+    return tuple(method.name for method in found.values() if method is not None)
 
 
 def estimate(
@@ -139,7 +165,7 @@ def estimate(
     layout = build_layout(
         model_for(model, record),
         record,
-        predictor=chosen.predictor,
+        predictor=chosen.weather.name,
         fixed=choices.fixed,
         quadrature=choices.quadrature,
     )

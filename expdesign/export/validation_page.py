@@ -208,7 +208,7 @@ def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
             'loss of accuracy. Design for it with predictor = "'
             f'{allows}" in the scenario.'
         )
-    drawn = weather.current_std_mps > 0 and not method_named(method).estimates_steady_current
+    drawn = weather.current_std_mps > 0 and not method_named(method).weather.steady
     if drawn or weather.wind_std_mps > 0:
         yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
 

@@ -285,7 +285,7 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
         environment=rehearsal.environment,
         mean_subtraction=rehearsal.mean_subtraction,
         integrator=rehearsal.integrator,
-        unknown_current=method_named(rehearsal.method).estimates_steady_current,
+        unknown_current=method_named(rehearsal.method).weather.steady,
         excitation=rehearsal.excitation,
     )
     return np.asarray(np.sqrt(np.diag(covariance)))
@@ -293,7 +293,7 @@ def _predicted(rehearsal: Rehearsal, design: str, vessel: Vessel) -> Array:
 
 def _rehearsed_parts(rehearsal: Rehearsal, runs: Sequence[int]) -> tuple[TrialPart, ...]:
     """Every run of a trial at its heading; runs are combined in isotropic weather."""
-    if rehearsal.environment.isotropic and not method_named(rehearsal.method).estimates_steady_current:
+    if rehearsal.environment.isotropic and not method_named(rehearsal.method).weather.steady:
         return trial_parts(rehearsal.primitives, runs)
     order = [item for item, count in zip(rehearsal.primitives, runs, strict=True) for _ in range(count)]
     return tuple(

@@ -88,13 +88,19 @@ class Estimate(Request):
         Option(
             "--method",
             metavar="M ...",
-            help="One or more of: ls ls-air ls-augmented ls-wind ls-no-current ls-no-wind iv iv-air iv-augmented "
-            "iv-wind iv-no-current iv-no-wind iv-current iv-air-current oe oe-air oe-current oe-air-current. See "
-            "expdesign explain methods. "
-            "Default: ls, iv and oe, and those with wind where wind is measured and the model has terms for it. The "
-            "vessel file takes the one that predicts best what it has not seen.",
+            help="Estimators, one or more of ls, iv and oe; or methods, which say what is known of the weather, too: "
+            "expdesign explain methods. Default: ls, iv and oe, and those with wind where wind is measured and the "
+            "model has terms for it. The vessel file takes the one that predicts best what it has not seen.",
         ),
     ] = ()
+    unknown: Annotated[
+        str | None,
+        Option(
+            metavar="WHAT",
+            help="What of the weather is unknown and estimated beside the ship: nothing, current, wind, both, or "
+            "steady-current; all estimators then use the wind that is measured. Default: what --method says.",
+        ),
+    ] = None
     fixed: Fixed = ()
     tests: Annotated[
         tuple[Path, ...],

@@ -15,8 +15,11 @@ from expdesign.estimation.regression.nuisance import (
 from expdesign.estimation.regression.polynomial import Polynomial, SignalTable, lift, symbol
 from expdesign.estimation.regression.predictors import (
     CURRENT,
+    NOTHING,
     PREDICTORS,
+    UNKNOWN,
     Layout,
+    Predictor,
     Rows,
     build_layout,
     build_regression,

@@ -9,13 +9,10 @@ order in the data, so what holds for instruments, moduli and means holds for bot
 equation. Rows never reach across batches; rows with numbers missing are left out. Parameters held fixed move to the
 left side.
 
-- basic: the model's terms from measured velocities; terms of air velocities fall together with those of water.
-- basic-wind: the same with air velocities from the anemometer.
-- augmented: basic plus nuisance regressors for unknown current and wind, (5.68)-(5.70).
-- wind: basic-wind plus nuisance regressors for unknown current, (5.74)-(5.76).
-- no-current: basic plus those of an unknown wind alone, the derivatives of air terms, as (6.5)-(6.7) for still water.
-- no-wind: basic plus those of an unknown current alone, the derivatives of water terms, for still air.
-- steady-current, steady-current-wind: basic and basic-wind through water that moves steadily, see `current`.
+`PREDICTORS` are what may be known and unknown of the weather. Without wind, terms of air velocities fall together with
+those of water. What is unknown adds nuisance regressors: of current and wind (5.68)-(5.70), of a current beside
+measured wind (5.74)-(5.76), of one of them where the other is absent, the derivatives of its terms, as (6.5)-(6.7) for
+still water. A steady current is estimated itself, see `nuisance`.
 
 Fewer regressors leave more information about the ship, and a bias where the disturbance is there after all.
 
@@ -53,32 +50,52 @@ from expdesign.values import Array, closed
 from expdesign.vessel import NUMPY, VesselModel
 from expdesign.vessel.structures import MOTION_SIGNALS
 
+NOTHING, CURRENT, WIND, BOTH, STEADY = "nothing", "current", "wind", "both", "steady-current"
+UNKNOWN = (NOTHING, CURRENT, WIND, BOTH, STEADY)
+"""What may be unknown of the weather and is estimated beside the ship."""
+
 
 @dataclass(frozen=True)
 class Predictor:
     """Signals that the regressors are made from."""
 
-    name: str  # as users type it
+    name: str  # as scenarios have it
+    suffix: str  # as methods have it, after the name of their estimator
+    title: str  # for tables, after that of an estimator
     wind: bool  # whether measured wind is used
-    unknown: tuple[str, ...]  # disturbances that nuisance regressors are added for, of `CURRENT` and `WIND`
-    steady: bool = False  # whether a steady current itself is estimated with the parameters
+    unknown: str = NOTHING  # one of `UNKNOWN`
+
+    @property
+    def disturbances(self) -> tuple[str, ...]:
+        """Those that nuisance regressors are added for, of `CURRENT` and `WIND`."""
+        return {CURRENT: (CURRENT,), WIND: (WIND,), BOTH: (CURRENT, WIND)}.get(self.unknown, ())
 
     @property
     def nuisance(self) -> bool:
         """Whether there are nuisance regressors."""
-        return bool(self.unknown)
+        return bool(self.disturbances)
+
+    @property
+    def steady(self) -> bool:
+        """Whether a steady current itself is estimated with the parameters."""
+        return self.unknown == STEADY
 
 
-CURRENT, WIND = "current", "wind"
 PREDICTORS = (
-    Predictor("basic", wind=False, unknown=()),
-    Predictor("basic-wind", wind=True, unknown=()),
-    Predictor("augmented", wind=False, unknown=(CURRENT, WIND)),
-    Predictor("wind", wind=True, unknown=(CURRENT,)),
-    Predictor("no-current", wind=False, unknown=(WIND,)),
-    Predictor("no-wind", wind=False, unknown=(CURRENT,)),
-    Predictor("steady-current", wind=False, unknown=(), steady=True),
-    Predictor("steady-current-wind", wind=True, unknown=(), steady=True),
+    Predictor("basic", "", "", wind=False),
+    Predictor("basic-wind", "air", " with measured wind", wind=True),
+    Predictor("augmented", "augmented", " with unknown current and wind", wind=False, unknown=BOTH),
+    Predictor("wind", "wind", " with an unknown current and measured wind", wind=True, unknown=CURRENT),
+    Predictor("no-current", "no-current", " with unknown wind and no current", wind=False, unknown=WIND),
+    Predictor("no-wind", "no-wind", " with an unknown current and no wind", wind=False, unknown=CURRENT),
+    Predictor("steady-current", "current", " with an unknown steady current", wind=False, unknown=STEADY),
+    Predictor(
+        "steady-current-wind",
+        "air-current",
+        " with an unknown steady current and measured wind",
+        wind=True,
+        unknown=STEADY,
+    ),
 )
 
 
@@ -237,13 +254,13 @@ def build_layout(
         raise InputError("all parameters are fixed, none is left to estimate")
     nuisance: tuple[Nuisance, ...] = ()
     if chosen.nuisance:
-        disturbed = [name for name in model.names if (WIND if name in reads_air else CURRENT) in chosen.unknown]
+        disturbed = [name for name in model.names if (WIND if name in reads_air else CURRENT) in chosen.disturbances]
         nuisance = nuisance_regressors(
             model,
             disturbed,
             tables,
             wind_measured=chosen.wind,
-            turning=CURRENT in chosen.unknown and turns_current(quadrature),
+            turning=CURRENT in chosen.disturbances and turns_current(quadrature),
         )
         if not nuisance:
             raise InputError(f"predictor {predictor!r} needs terms of the velocity through the air, the model has none")

@@ -32,7 +32,7 @@ HEADER = (
 def disturbance_entries(item: Assessed) -> list[dict[str, Any]]:
     """One entry for each disturbance that a method estimates; empty where it estimates none."""
     found = item.disturbances
-    steady = item.method.estimates_steady_current
+    steady = item.method.weather.steady
     entries = [_moments_entry(own, steady=steady) for own in _moments_of(item)]
     return [*entries, *([] if found.wind is None else [_wind_entry(found.wind)])]
 

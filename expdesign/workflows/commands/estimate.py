@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign import requests
-from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled
+from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind
 from expdesign.errors import InputError
+from expdesign.estimation.methods import methods_for
 from expdesign.export import Content, estimate_json, estimated_vessel
 from expdesign.export.estimate_page import EstimateContent, estimate_document
 from expdesign.progress import Progress, silent, within
@@ -25,8 +26,12 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
             raise InputError(f"{path} is given for estimation and for testing, expected only one of them")
     progress("reading the data", 0.0)
     ship, told = equipped(request.vessel, [*request.data, *request.tests])
+    raw = measured(request.data, ship, velocity=request.velocity, told=told)
+    methods = request.methods
+    if request.unknown is not None:
+        methods = methods_for(methods, request.unknown, wind=uses_measured_wind(ship, raw))
     options = EstimateOptions(
-        methods=request.methods,
+        methods=methods,
         fixed=request.fixed,
         mean=request.mean,
         blocks=request.blocks,
@@ -39,7 +44,6 @@ def estimate(request: requests.Estimate, *, progress: Progress = silent) -> Outc
         offset_mps=request.offset_mps,
         prior=request.prior,
     )
-    raw = measured(request.data, ship, velocity=request.velocity, told=told)
     with workers(0, load=None), doubted(raw):
         now, record = settled(
             ship, raw, options, smoothed=request.velocity == "smoothed", progress=within(progress, 0.01, 0.4)

@@ -57,10 +57,9 @@ def methods_topic() -> Topic:
         "ls, least squares, suits quiet sensors and is biased by noise in the velocities. iv, instrumental variables "
         "from a simulation, stays right with noisy velocities as long as nothing inside a modulus changes its sign. "
         "oe, output error, makes the simulation error least, and is the most accurate where only sensors disturb. "
-        "'augmented' also estimates an unknown current and wind; 'no-current' leaves out the current, where there is "
-        "none, and 'no-wind' the wind; 'air' uses the measured wind; 'wind' uses it and estimates the current. "
-        "'current' takes an unknown current for steady: two parameters instead of many, several times more accurate "
-        "where it is. All use data from which stated lags and sensor faults are undone."
+        "The second word of a method says what it knows of the weather; expdesign estimate --unknown chooses it for "
+        "all estimators. A current that is taken for steady adds two parameters instead of many, and is several times "
+        "more accurate where it is. All use data from which stated lags and sensor faults are undone."
     )
     entries = tuple(Explained(name=method.name, meaning=method.title) for method in METHODS)
     return _list("methods", "Estimators of expdesign estimate and validate", entries, text)

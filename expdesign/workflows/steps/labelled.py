@@ -99,7 +99,7 @@ def _nominal(pieces: Record, model: VesselModel, parameters: Sequence[str], pred
     from expdesign.estimation.instrumental import Settings
     from expdesign.estimation.methods import METHODS
 
-    (method,) = (item.name for item in METHODS if item.predictor == predictor and item.solver == "ls")
+    (method,) = (item.name for item in METHODS if item.weather.name == predictor and item.solver == "ls")
     fixed = tuple(name for name in model.names if name not in parameters)
     quadrature = "trapezoid" if model.form == "continuous" else "euler"
     return estimate(pieces, model, method=method, settings=Settings(fixed=fixed, quadrature=quadrature)).model(model)

@@ -29,7 +29,6 @@ from expdesign.assessment.misfit import TEST, check_run
 from expdesign.errors import NoAnswer
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate, method_named
-from expdesign.estimation.regression import PREDICTORS
 from expdesign.estimation.replay import Integration
 from expdesign.estimation.solve import Weighting
 from expdesign.processes import in_order
@@ -41,7 +40,6 @@ from real_data_cases import POND, TANK, Case, vessel_of
 from shared_work import add_sharing, shared_work
 
 CONTINUOUS = Integration("rk4", SUBSTEPS)
-WINDY = tuple(item.name for item in PREDICTORS if item.wind)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +146,7 @@ def _judged(
         found = estimate(record, vessel.model, method=method, settings=settings)
     except NoAnswer:
         return np.full(len(vessel.model.outputs), -np.inf), {}
-    model, wind = found.model(vessel.model), method_named(method).predictor in WINDY
+    model, wind = found.model(vessel.model), method_named(method).weather.wind
     fits = np.array(
         [check_run(model, part, use=TEST, wind=wind, integration=CONTINUOUS).fit_percent for part in stretches]
     )
