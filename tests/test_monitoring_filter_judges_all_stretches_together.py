@@ -48,8 +48,8 @@ def test_the_likelihood_and_the_scores_are_those_of_all_stretches_together() -> 
     assert information == pytest.approx(X.T @ np.linalg.solve(R, X), rel=1e-3, abs=1e-3)
 
 
-def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
-    columns = drawn_columns(6, seed=2)
+def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does_of_an_unknown_ship() -> None:
+    columns = drawn_columns(6, seed=2, change=np.array([0.5, 0.0, -0.3, 0.0]))
     stretches = stretches_of(grams_from(columns), NOISE, np.zeros(0))
     other = Force(variance=4.0 * FORCE.variance, time_s=FORCE.time_s)
     both = Force(variance=np.stack([FORCE.variance, other.variance]), time_s=FORCE.time_s)
@@ -61,9 +61,10 @@ def test_of_two_forces_the_likelihood_prefers_as_the_dense_one_does() -> None:
     S = np.zeros((6, 20, 6, STARTS))
     S[np.arange(6), :, np.arange(6)] = starts
     S = S.reshape(120, 18)
+    X = columns[:, :, :CHANGES].reshape(-1, CHANGES)
     plain = np.eye(120) + 1e6 * S @ S.T
-    wider = plain + 4.0 * (dense - plain)
-    costs = [e @ np.linalg.solve(R, e) + np.linalg.slogdet(R)[1] for R in (dense, wider)]
+    wider, ship = plain + 4.0 * (dense - plain), X @ X.T
+    costs = [e @ np.linalg.solve(R, e) + np.linalg.slogdet(R)[1] for R in (dense + ship, wider + ship)]
     assert float(two - one) == pytest.approx(costs[1] - costs[0], abs=1e-2)
 
 

@@ -140,9 +140,9 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
             f"least {FEWEST_STRETCHES}, {FEWEST_STRETCHES * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
-    std, ramp, variance, change = _independent(grams)
+    std, ramp, variance = _independent(grams)
     stretches = stretches_of(grams, std, ramp)
-    force = _spared(_varying(stretches.less(change), variance, grams.stretch_s), grams.time_s)
+    force = _spared(_varying(stretches, variance, grams.stretch_s), grams.time_s)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
@@ -179,22 +179,21 @@ def misfit_of(quadratic: float, score: Array, information: Array, count: float) 
     return float((quadratic - score @ explained) / max(count, 1.0))
 
 
-def _independent(grams: Grams) -> tuple[Array, Array, Array, Array]:
-    """(4,) noise, (o,) and (q,) variances of ramps and the force, (m,) changes, with a force of its own in each."""
+def _independent(grams: Grams) -> tuple[Array, Array, Array]:
+    """(4,) noise, (o,) and (q,) variances of ramps and the force, with a force of its own in each stretch."""
     total = grams.counts.sum(axis=1)
     error = grams.products[:, :, -1, -1].sum(axis=1)
     std = np.where(total > 0, np.sqrt(np.maximum(error, 1e-24) / np.maximum(total, 1)), np.inf)
     m, q = grams.changes, grams.ramps + grams.forces
     own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
     variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
-    change = np.zeros(m)
     for _ in range(ITERATIONS):
-        std, variance, change = _improved(grams, total, std, variance)
-    return std, variance[: grams.ramps], variance[grams.ramps :], change
+        std, variance = _improved(grams, total, std, variance)
+    return std, variance[: grams.ramps], variance[grams.ramps :]
 
 
-def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array, Array]:
-    """The force after one step of expectation-maximisation."""
+def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[Array, Array]:
+    """Noise and variances after one step of expectation-maximisation."""
     m, c = grams.changes, grams.products.shape[-1]
     whole = np.einsum("c,cwij->wij", 1.0 / std**2, grams.products)
     nuisance, others = slice(m, c - 1), np.r_[:m, c - 1]
@@ -214,7 +213,7 @@ def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[
         + np.einsum("cwij,wij->cw", own[:, :, :-1, :-1], second)
     )
     noise = np.where(total > 0, np.sqrt(remaining.sum(axis=1) / np.maximum(total, 1)), np.inf)
-    return noise, np.maximum(np.einsum("wii->i", second)[STARTS:] / len(grams), LEAST_VARIANCE), change
+    return noise, np.maximum(np.einsum("wii->i", second)[STARTS:] / len(grams), LEAST_VARIANCE)
 
 
 def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:

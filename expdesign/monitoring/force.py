@@ -34,10 +34,11 @@ class Force:
 
     def with_load(self, count: int) -> Force:
         """The force with so many components of a load, known to be zero."""
-        shape = (*self.variance.shape[:-1], count)
+        variance, time_s = np.broadcast_arrays(self.variance, self.time_s)
+        load = np.zeros((*variance.shape[:-1], count))
         return Force(
-            variance=np.concatenate([self.variance, np.zeros(shape)], axis=-1),
-            time_s=np.concatenate([self.time_s, np.full(shape, np.inf)], axis=-1),
+            variance=np.concatenate([variance, load], axis=-1),
+            time_s=np.concatenate([time_s, load + np.inf], axis=-1),
         )
 
 
@@ -144,12 +145,21 @@ def after_stretch(known: Known, one: Judged) -> Known:
 
 
 def likelihood(stretches: Stretches, force: Force) -> Array:
-    """(...) twice the negative log-likelihood of stretches, but for a constant, under one or several forces."""
+    """(...) twice the negative log-likelihood of stretches, but for a constant, under one or several forces.
+
+    How the ship differs from her model is unknown, normal with one size of each change, and lasts throughout: fitted
+    beforehand, it takes what a slow force does, and the force seems weaker than it is.
+
+    Source: D. A. Harville, Journal of the American Statistical Association 72 (1977), 320-338.
+    """
+    changes = np.arange(stretches.changes)
+    force = force.with_load(len(changes))
     known, total = Known.nothing(force), np.zeros(force.variance.shape[:-1])
+    known.covariance[..., -len(changes) + changes, -len(changes) + changes] = 1.0
     for index, products in enumerate(stretches.products):
         if index:
             known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
-        one = judged(products, stretches.changes, known)
+        one = judged(products, len(changes), known, changes)
         total = total + one.deviance
         known = after_stretch(known, one)
     return np.asarray(total)
