@@ -1,5 +1,6 @@
 """A command is stated once: its workflow takes the same values; the line that repeats it is read back as they are."""
 
+import re
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import get_args, get_origin
@@ -9,14 +10,42 @@ from typer.main import get_command
 
 from expdesign import workflows
 from expdesign.assessment import EstimateOptions
+from expdesign.assessment.values import AUTO, MOTIONS, PRIORS
 from expdesign.cli.commands import app
 from expdesign.cli.entry import LISTS, repeat_option
 from expdesign.errors import InputError
+from expdesign.estimation.excitation import SAMPLES
+from expdesign.estimation.instrumental import STARTS
+from expdesign.estimation.regression import MEANS, UNKNOWN
+from expdesign.estimation.replay import STEERED
+from expdesign.estimation.replay.compiled import INTEGRATORS
+from expdesign.estimation.solve import BLOCKS
+from expdesign.information import MEAN_SUBTRACTIONS
 from expdesign.monitoring.tuning import TUNING
-from expdesign.requests import COMMANDS, WITHOUT_EFFECT, Command, Estimate, Monitor, Request, command_text, repeating
-from expdesign.requests.options import Argument
+from expdesign.records import VELOCITY_METHODS
+from expdesign.records.load import LABEL_SOURCES
+from expdesign.requests import (
+    COMMANDS,
+    WITHOUT_EFFECT,
+    Command,
+    Diagnose,
+    Estimate,
+    IdentifySteps,
+    Mine,
+    Monitor,
+    New,
+    Request,
+    Roll,
+    Validate,
+    command_text,
+    repeating,
+)
+from expdesign.requests.options import Argument, Asked
+from expdesign.roll.estimate import METHODS as ROLL_METHODS
 from expdesign.workflows.commands import run
+from expdesign.workflows.commands.new import KINDS
 from expdesign.workflows.outcome import workflow
+from expdesign.workflows.steps.watched_ship import VESSEL, YAW
 from short_examples import SCENARIOS
 
 EXAMPLES = {Path: Path("one.toml"), str: "word", int: 3, float: 1.5, bool: True}
@@ -31,7 +60,12 @@ def unusual(command: Command) -> dict[str, object]:
             return (EXAMPLES[get_args(kind)[0]],) * 2
         return EXAMPLES[kind if isinstance(kind, type) else get_args(kind)[0]]
 
-    return {one.name: value(one.kind) for one in command.request.asked()}
+    return {one.name: _other(one) or value(one.kind) for one in command.request.asked()}
+
+
+def _other(one: Asked) -> str:
+    """A choice that is not the usual one; "" where there are none."""
+    return next((word for word in one.choices if word != one.default), "")
 
 
 def read_back(command: Command, words: list[str]) -> dict[str, object]:
@@ -51,6 +85,37 @@ def test_usual_values_are_those_of_what_a_command_calls() -> None:
     assert len(both) == 12
     assert both == {name: asked[name] for name in both}
     assert Monitor.size == TUNING.relative_size
+
+
+def test_choices_are_those_of_what_a_command_calls_and_their_help_names_each() -> None:
+    called = {
+        (New, "kind"): KINDS,
+        (Estimate, "mean"): MEANS,
+        (Estimate, "blocks"): BLOCKS,
+        (Estimate, "start"): (AUTO, *STARTS),
+        (Estimate, "motion"): MOTIONS,
+        (Estimate, "steered"): STEERED,
+        (Estimate, "samples"): SAMPLES,
+        (Estimate, "prior"): PRIORS,
+        (Estimate, "unknown"): UNKNOWN,
+        (Estimate, "velocity"): VELOCITY_METHODS,
+        (Mine, "mean"): MEAN_SUBTRACTIONS,
+        (Mine, "labels"): LABEL_SOURCES,
+        (Mine, "velocity"): VELOCITY_METHODS,
+        (Diagnose, "velocity"): VELOCITY_METHODS,
+        (IdentifySteps, "velocity"): VELOCITY_METHODS,
+        (Monitor, "velocity"): VELOCITY_METHODS,
+        (Monitor, "model"): (VESSEL, *YAW),
+        (Roll, "method"): ROLL_METHODS,
+        (Validate, "integrator"): INTEGRATORS,
+    }
+    stated = {(one.request, asked.name): asked for one in COMMANDS for asked in one.request.asked() if asked.choices}
+    assert {*stated} == {*called}
+    for key, asked in stated.items():
+        assert {*asked.choices} == {*called[key]}, key
+        assert {*asked.choices} <= {*re.findall(r"[a-z0-9_-]+", asked.typed.help)}, key
+        with pytest.raises(InputError, match=f"^{asked.flag} is odd, expected one of {', '.join(asked.choices)}$"):
+            asked.check("odd")
 
 
 def test_every_command_is_there() -> None:

@@ -49,9 +49,9 @@ def line_of(capsys: pytest.CaptureFixture[str]) -> str:
     [
         ("--method lss", "unknown method 'lss', did you mean 'ls'?"),
         ("--fixed X_uu", "unknown parameter 'X_uu'"),
-        ("--velocity guessed", "unknown velocity method 'guessed'"),
-        ("--mean some", "unknown instrument mean 'some'"),
-        ("--start here", "unknown start 'here'"),
+        ("--velocity guessed", "--velocity is guessed, expected one of auto, measured"),
+        ("--mean some", "--mean is some, expected one of complete, batch"),
+        ("--start here", "--start is here, expected one of auto, nominal, ls"),
         ("--test RUN", "is given for estimation and for testing"),
         ("--fixed X_u X_abs_u_u X_vr X_mu Y_v Y_ur Y_mu N_r N_uv N_mu", "none is left to estimate"),
         ("--vessel missing.toml", "missing.toml"),

@@ -27,7 +27,7 @@ from expdesign.cli.summary import as_json, print_summary, unverified
 from expdesign.errors import InputError, NotDrawn
 from expdesign.interruptions import interruptions_wait
 from expdesign.requests import COMMANDS, Command
-from expdesign.requests.options import Argument, Option
+from expdesign.requests.options import Argument, Asked
 
 if TYPE_CHECKING:
     from expdesign.workflows.commands.explain import Explained, Section, Topic
@@ -179,7 +179,7 @@ def register(command: Command) -> None:
             one.name,
             kind,
             default=inspect.Parameter.empty if one.default is MISSING else one.default if one.default != () else None,
-            annotation=_typed(one.kind, one.flag, one.typed, required=one.default is MISSING),
+            annotation=_typed(one),
         )
         for one in entries
     ]
@@ -193,14 +193,15 @@ def register(command: Command) -> None:
     app.command(command.name)(run)
 
 
-def _typed(kind: Any, flag: str, typed: Option | Argument, *, required: bool) -> Any:
-    """The annotation of a parameter as typer reads it."""
+def _typed(one: Asked) -> Any:
+    """The annotation of a parameter as typer reads it; choices are checked by the request, in its words."""
+    kind, typed, required = str | None if one.choices else one.kind, one.typed, one.default is MISSING
     if get_origin(kind) is tuple:
         listed = GenericAlias(list, get_args(kind)[:1])
         kind = listed if required else listed | None
     if isinstance(typed, Argument):
         return Annotated[kind, typer.Argument(metavar=typed.metavar, help=typed.help)]
-    flags = (flag, typed.short) if typed.short else (flag,)
+    flags = (one.flag, typed.short) if typed.short else (one.flag,)
     allowed = f" Allowed: {typed.range}." if typed.range else ""
     return Annotated[kind, typer.Option(*flags, metavar=typed.metavar, help=typed.help + allowed, parser=typed.parser)]
 

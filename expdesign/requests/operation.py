@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from expdesign.requests.options import (
     Argument,
@@ -55,7 +55,7 @@ class Monitor(Request):
     ] = 0.1
     every_s: Annotated[float, Option(metavar="T", over=0.0, help="Seconds of a stream between looks at it.")] = 3600.0
     model: Annotated[
-        str,
+        Literal["vessel", "yaw-full", "yaw-simplified"],
         Option(
             metavar="WHICH",
             help="Model that is watched: vessel, the vessel file's; yaw-full or yaw-simplified, learnt from the "

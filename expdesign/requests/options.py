@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import MISSING, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Self, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Self, dataclass_transform, get_args, get_origin, get_type_hints
 
 from expdesign.errors import InputError
 
@@ -60,16 +60,23 @@ class Asked:
         """As it is typed; empty for an argument."""
         return "" if isinstance(self.typed, Argument) else self.typed.flag or f"--{self.name.replace('_', '-')}"
 
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """Words of which it is one; none where it is something else."""
+        return next((get_args(kind) for kind in (self.kind, *get_args(self.kind)) if get_origin(kind) is Literal), ())
+
     def check(self, value: Any) -> None:
         """Check a value, also where no command line has.
 
         Raises:
-            InputError: it is out of its range, or nothing is given.
+            InputError: it is out of its range, none of its choices, or nothing is given.
         """
         if value == () and self.default is MISSING:
             raise InputError(f"no {self.typed.metavar or self.flag} is given, expected one or more")
         if isinstance(self.typed, Argument) or value is None:
             return
+        if self.choices and value not in self.choices:
+            raise InputError(f"{self.flag} is {value}, expected one of {', '.join(self.choices)}")
         if self.typed.range and not self.typed.allows(value):
             raise InputError(f"{self.flag} is {value:g}, expected {self.typed.range}")
 
@@ -216,7 +223,7 @@ Fixed = Annotated[
     Option("--fixed", metavar="NAME ...", help="Parameters kept at the vessel file's values."),
 ]
 Velocity = Annotated[
-    str,
+    Literal["auto", "measured", "difference", "smoothed"],
     Option(
         metavar="HOW",
         help="Source of u, v, r: measured; difference or smoothed, both from the pose; auto: measured where there are "
@@ -224,7 +231,7 @@ Velocity = Annotated[
     ),
 ]
 Mean = Annotated[
-    str,
+    Literal["complete", "batch", "none"],
     Option(
         metavar="HOW",
         help="Mean subtracted from the instruments, against constant disturbances: complete, batch or none. Use none "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from expdesign.requests.options import (
     MOST_TRIALS,
@@ -33,7 +33,7 @@ class New(Request):
 
     folder: Annotated[Path, Argument(metavar="NAME", help="The folder to make; also the scenario's name.")]
     kind: Annotated[
-        str,
+        Literal["azimuth", "propeller-rudder", "twin-screw", "asv"],
         Option(metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv."),
     ] = "azimuth"
 

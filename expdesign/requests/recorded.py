@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from expdesign.requests.options import (
     Argument,
@@ -94,7 +94,7 @@ class Estimate(Request):
         ),
     ] = ()
     unknown: Annotated[
-        str | None,
+        Literal["nothing", "current", "wind", "both", "steady-current"] | None,
         Option(
             metavar="WHAT",
             help="What of the weather is unknown and estimated beside the ship: nothing, current, wind, both, or "
@@ -109,7 +109,7 @@ class Estimate(Request):
     velocity: Velocity = "auto"
     mean: Mean = "complete"
     blocks: Annotated[
-        str,
+        Literal["one", "batch"],
         Option(
             metavar="HOW",
             help="Instruments of all runs in one block, or batch: a block for each run, weighted by its information, "
@@ -117,7 +117,7 @@ class Estimate(Request):
         ),
     ] = "one"
     start: Annotated[
-        str,
+        Literal["auto", "nominal", "ls"],
         Option(
             metavar="HOW",
             help="Parameters that the first instruments are simulated with: nominal, the vessel file's; ls, least "
@@ -125,7 +125,7 @@ class Estimate(Request):
         ),
     ] = "auto"
     motion: Annotated[
-        str,
+        Literal["continuous", "euler"],
         Option(
             metavar="WHAT",
             help="Motion that the parameters describe: continuous, as plans use it, or euler, "
@@ -143,7 +143,7 @@ class Estimate(Request):
     ] = None
     constant: Annotated[bool, Option(help="Give every run a constant force of its own in output error.")] = False
     steered: Annotated[
-        str,
+        Literal["auto", "use", "leave-out", "planned"],
         Option(
             metavar="HOW",
             help="Samples that the data mark as steered: use; leave-out; planned, instruments from columns of planned "
@@ -151,7 +151,7 @@ class Estimate(Request):
         ),
     ] = "auto"
     samples: Annotated[
-        str,
+        Literal["all", "equation-wise"],
         Option(
             metavar="HOW",
             help="Samples of each equation: all; equation-wise, those where what stands inside its absolute values is "
@@ -168,7 +168,7 @@ class Estimate(Request):
         ),
     ] = 0.0
     prior: Annotated[
-        str,
+        Literal["none", "parameter_std"],
         Option(
             metavar="HOW",
             help="parameter_std: join estimates with what the vessel file knew before, as after a step trial or an "
@@ -291,7 +291,7 @@ class Mine(Request):
     mean: Mean = "complete"
     velocity: Velocity = "auto"
     labels: Annotated[
-        str | None,
+        Literal["column", "file"] | None,
         Option(
             metavar="WHERE",
             help="Make a dictionary of labelled manoeuvres, share out K pieces of --piece seconds among them, and "

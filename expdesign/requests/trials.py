@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from expdesign.requests.options import (
     MOST_TRIALS,
@@ -100,7 +100,7 @@ class Validate(Request):
         ),
     ] = None
     integrator: Annotated[
-        str,
+        Literal["rk4", "euler"],
         Option(
             stated=True,
             metavar="HOW",
@@ -209,7 +209,7 @@ class Roll(Request):
         Option(metavar="NAME ...", help="Signals whose mean steers. Default: rudders, else all a."),
     ] = ()
     method: Annotated[
-        str,
+        Literal["iv", "ls"],
         Option(metavar="HOW", help="iv, instruments from the rudder; ls, least squares, for comparison only."),
     ] = "iv"
     lowpass_hz: Annotated[

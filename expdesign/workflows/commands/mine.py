@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from expdesign import __version__, requests
-from expdesign.durations import MEAN_SUBTRACTIONS, Subset, best_subset
+from expdesign.durations import Subset, best_subset
 from expdesign.errors import InputError, NotInformative
 from expdesign.export.document import Table
 from expdesign.export.files import record_csv
@@ -44,8 +44,6 @@ def mine(request: requests.Mine, *, progress: Progress = silent) -> Outcome:
         InputError: arguments or files that are wrong.
         NoAnswer: the data do not inform about every parameter, or the nominal model is unstable.
     """
-    if request.mean not in MEAN_SUBTRACTIONS:
-        raise InputError(f"--mean is {request.mean}, expected one of {', '.join(MEAN_SUBTRACTIONS)}")
     progress("reading the data", 0.02)
     (ship, told), paths = equipped(request.vessel, request.data), data_files(request.data)
     if request.labels is not None:

@@ -34,7 +34,7 @@ from expdesign.records import STREAM, Taken, pieces
 from expdesign.requests import repeating
 from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
-from expdesign.workflows.steps.watched_ship import Asked, Late, Read, check_model, prepared
+from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared
 from expdesign.workflows.steps.watching import (
     HOUR,
     Learning,
@@ -193,7 +193,6 @@ def _check(request: requests.Monitor) -> None:
         raise InputError(
             f"--port-h is {request.port_h:g}, expected more than 0; inf for a ship whose load never changes"
         )
-    check_model(request.model)
 
 
 def _with_reference(now: Watch, reference: Sequence[Path], asked: Asked, progress: Progress) -> Watch:

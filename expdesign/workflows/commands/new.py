@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import Any
 
 from expdesign import requests
-from expdesign.errors import InputError, UnknownName
+from expdesign.errors import InputError
 from expdesign.export import write_files
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_scenario
@@ -54,11 +54,8 @@ def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     """A folder with scenario, vessel, dictionary and area of a kind of ship, and a page that says what is where.
 
     Raises:
-        UnknownName: no such kind.
         InputError: the folder exists.
     """
-    if request.kind not in KINDS:
-        raise UnknownName("kind of ship", request.kind, known=tuple(KINDS))
     if request.folder.exists():
         raise InputError(f"{request.folder} exists, expected the name of a folder to be made")
     name = request.folder.resolve().name

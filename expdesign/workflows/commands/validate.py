@@ -25,7 +25,6 @@ from expdesign.workflows.steps.scored import ready
 from expdesign.workflows.steps.workers import shared
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
-INTEGRATORS = ("rk4", "euler")
 
 
 @workflow
@@ -36,8 +35,6 @@ def validate_design(request: requests.Validate, *, progress: Progress = silent) 
     unknown. An interrupted call goes on where it stopped: finished chunks of trials are kept in the folder until all
     are done.
     """
-    if request.integrator not in INTEGRATORS:
-        raise InputError(f"--integrator is {request.integrator}, expected one of {', '.join(INTEGRATORS)}")
     case = load_scenario(request.scenario)
     method = _method(case, request.method)
     method_named(method)  # refused before the dictionary is scored

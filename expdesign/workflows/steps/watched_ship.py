@@ -44,16 +44,8 @@ from expdesign.workflows.steps.measured import measured
 
 VESSEL = "vessel"
 YAW = {f"yaw-{name}": YAW_MODELS[name] for name in ("full", "simplified")}
-MODELS = (VESSEL, *YAW)
-"""Values of `--model`."""
 
 Ship = ExtendedModel | YawShip
-
-
-def check_model(name: str) -> None:
-    """Raise InputError for an unknown --model."""
-    if name not in MODELS:
-        raise InputError(f"--model is {name}, expected one of {', '.join(MODELS)}")
 
 
 def unread(name: str) -> tuple[str, ...]:
@@ -67,7 +59,7 @@ def ship_and_changes(
     """The ship of a record, the changes that are watched for, and notes on a model that is learnt from it.
 
     Args:
-        name: one of `MODELS`.
+        name: "vessel" or one of `YAW`.
         vessel: of the vessel file.
         record: a piece of the data.
         known: changes of earlier pieces; none for the first, which a yaw model is learnt from.
@@ -125,7 +117,7 @@ class Asked:
     false_alarm_days: float  # average time between false alarms [d]
     port_s: float  # time in port after which the ship may carry another load [s]
     velocity: str  # where velocities come from, as in `estimate`
-    model: str = VESSEL  # one of `watched_ship.MODELS`
+    model: str = VESSEL  # "vessel" or one of `YAW`
     told: tuple[str, ...] = ()  # notes on the vessel, as of `equipped`
 
     @property
