@@ -161,6 +161,14 @@ def test_drag_is_found_within_an_hour_and_nothing_in_an_unchanged_ship(
 
 
 @pytest.mark.thorough
+def test_a_gyro_that_tells_too_little_is_found_by_the_compass_within_an_hour(
+    vessel: Vessel, known: tuple[Noise, Calibration]
+) -> None:
+    (table,) = sailed([CASES["yaw rate times 0.97"]], 2 * HOUR, seeds=[9], sea=PUSHED, since_s=HOUR)
+    assert alarms_of(vessel, known, table)[1] == ["gyro"]
+
+
+@pytest.mark.thorough
 def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
     vessel: Vessel, known: tuple[Noise, Calibration]
 ) -> None:

@@ -185,7 +185,7 @@ def gone_over(
     nuisance, until_s, cost = calibration.nuisance, float(sums.known_s[0]), 0.0
     known = Known(mean=sums.mean[0], covariance=sums.covariance[0])
     columns = np.arange(stretches.products.shape[-1])
-    pushes = columns[:0] if cause is not None else columns[-1 - grams.ramps : -1]
+    pushes = columns[:0] if cause is not None else columns[-1 - grams.pushes : -1]
     columns, among = np.r_[:m, pushes, m : len(columns)], m + len(pushes)
     sums = replace(Sums.begun(1, among, known, float(sums.since_s[0]), sums.rougher[0]), known_s=sums.known_s)
     for index, whole in enumerate(stretches.products):

@@ -48,10 +48,9 @@ STEPS = np.array([-4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
 class Calibration:
     """What a reference tells of noise, of the unmeasured force and of the ship."""
 
-    # (4,) standard deviations of the noise of u, v, r and the rate of the heading; infinite where not measured
-    std: Array
+    std: Array  # (h,) standard deviations of the noise of the channels of `Grams`; infinite where not measured
     force: Force  # the unmeasured force
-    ramp: Array  # (o,) variances of what its accelerations grow by within a stretch
+    ramp: Array  # (o,) variances of what its accelerations grow by within a stretch, and of the drift of a gyro
     baseline: Array  # (m,) differences of the ship from its model in the reference, in sizes of the changes
     # (m, m) covariance of their errors, all free at once, with a prior of one size, after inflation
     baseline_covariance: Array
@@ -70,7 +69,7 @@ class Calibration:
     def __post_init__(self) -> None:
         seal(
             self,
-            std="4",
+            std="h",
             ramp="o",
             baseline="m",
             baseline_covariance="m m",
@@ -180,13 +179,14 @@ def misfit_of(quadratic: float, score: Array, information: Array, count: float) 
 
 
 def _independent(grams: Grams) -> tuple[Array, Array, Array]:
-    """(4,) noise, (o,) and (q,) variances of ramps and the force, with a force of its own in each stretch."""
+    """(h,) noise, (o,) and (q,) variances of ramps and the force, with a force of its own in each stretch."""
     total = grams.counts.sum(axis=1)
     error = grams.products[:, :, -1, -1].sum(axis=1)
     std = np.where(total > 0, np.sqrt(np.maximum(error, 1e-24) / np.maximum(total, 1)), np.inf)
     m, q = grams.changes, grams.ramps + grams.forces
     own = np.einsum("c,cwii->i", 1.0 / std**2, grams.products)[m + STARTS : m + STARTS + q]
-    variance = np.maximum(grams.counts.sum() / np.maximum(own, 1e-300), LEAST_VARIANCE)
+    shown = grams.counts.sum() / np.maximum(own, 1e-300)
+    variance = np.where(own > 0, np.maximum(shown, LEAST_VARIANCE), LEAST_VARIANCE)
     for _ in range(ITERATIONS):
         std, variance = _improved(grams, total, std, variance)
     return std, variance[: grams.ramps], variance[grams.ramps :]

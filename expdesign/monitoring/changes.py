@@ -11,6 +11,7 @@ from expdesign.vessel import stem
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS, GYRO
 
 ANGLE_RAD = 0.03  # misalignment that matters [rad]
+GYRO_SCALE = 0.03  # scale that matters: gyros are better, and a compass tells less within hours
 # kinds of effects that a load may change, each with the standard deviation of its change in a port call, in sizes that
 # matter
 LOADS = (("inertia", 2.0), ("hull", 1.0))
@@ -79,7 +80,7 @@ def watched_changes(ship: ExtendedModel, *, size: float = TUNING.relative_size) 
         if name in stems
     ]
     changes += [
-        Change(effect=row.effects[0], size=share * row.matters, unit=(0.01, "%"), words=f"scale of {row.what}")
+        Change(effect=row.effects[0], size=share * GYRO_SCALE, unit=(0.01, "%"), words=f"scale of {row.what}")
         for row in GAINS_AND_OFFSETS
         if row.is_gain and row.shown_by == GYRO and row.is_shown(ship.derived) and "r" in model.outputs
     ]

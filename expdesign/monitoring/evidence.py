@@ -2,7 +2,8 @@
 
 A stretch has the error e = X d + S a + R g + F f + noise: of the measured velocities from a simulation of the model,
 with the changes d, the error a of the initial velocities, of which nothing is known, the unmeasured force f, a steady
-current and steady accelerations, and how much these accelerations grow within the stretch, g.
+current and steady accelerations. Noise, too, are how much these accelerations grow within the stretch and the drift of
+a gyro, g.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from expdesign.diagnosis.motion import (
     start_responses,
 )
 from expdesign.monitoring.changes import Change
+from expdesign.monitoring.compass import RATE, turned
 from expdesign.monitoring.noise import WHITE, Noise, learnt_noise, whitened
 from expdesign.signals import Batch, Record
 from expdesign.values import Array, seal
@@ -56,21 +58,24 @@ class Grams:
 
     time_s: Array  # (w,) beginning of each stretch, since the data began [s]
     duration_s: Array  # (w,) measured time in it [s]: `stretch_s`, or less where the data end or pause
-    products: Array  # (4, w, c, c) of the columns X (m), S (3), R, F and e, for u, v, r and the rate of the heading
-    counts: Array  # (4, w) measured samples
+    # (h, w, c, c) of the columns X (m), S (3), R, F and e, for u, v, r, the rate of the heading and, but for models of
+    # yaw alone, what it adds up to beyond r, see `compass`
+    products: Array
+    counts: Array  # (h, w) measured samples
     # (w, m, 3) mean size of what the term of every change adds to the accelerations [m/s2, rad/s2]; of inertia, the
     # acceleration itself; zero for changes that are no term
     budget: Array
     kind: NDArray[np.int64]  # (w,) number in `KINDS`
     stretch_s: float  # length of a whole one [s]
     ramps: int = 0  # columns R
+    pushes: int = 0  # steady accelerations, the last of the columns F
     # (w,) draught over depth, where it is measured and the model does not read it; else zero
     shoal: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if not len(self.shoal):
             object.__setattr__(self, "shoal", np.zeros(len(self.time_s)))
-        seal(self, time_s="w", duration_s="w", products="4 w c c", counts="4 w", budget="w m 3", shoal="w")
+        seal(self, time_s="w", duration_s="w", products="h w c c", counts="h w", budget="w m 3", shoal="w")
 
     @property
     def changes(self) -> int:
@@ -133,21 +138,24 @@ Simulated = tuple[LinearisedMotion, Sequence[Disturbance], Array, NDArray[np.boo
 def _grams(simulated: Simulated, changes: Sequence[Change], noise: Noise, *, stretch_s: float) -> Grams:
     linear, known, columns, seen, begins = simulated
     windows = linear.motion.windows
+    sums, summed = turned(columns, seen, noise, sample_s=windows.sample_s)
     columns = whitened(columns, seen, linear.transition, noise, step_s=windows.step_s)
-    table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))  # (4, w, c, s)
     budget = _budget(linear, known, changes)
     keep = _usable(linear, seen) & ~_still(linear, budget, changes)
+    table = np.moveaxis(columns, (3, 1, 0, 2), (0, 1, 2, 3))[:, keep]  # (4, w, c, s)
+    sums = np.moveaxis(sums, 0, 1)[keep]  # (w, c, t)
     begin_s = begins[windows.batch.astype(int)] + windows.first * windows.step_s
     return Grams(
         time_s=begin_s[keep],
         duration_s=_durations(seen, windows.sample_s)[keep],
-        products=table[:, keep] @ np.swapaxes(table[:, keep], 2, 3),
-        counts=seen.sum(axis=1).T[:, keep],
+        products=np.concatenate([table @ np.swapaxes(table, 2, 3), (sums @ np.swapaxes(sums, 1, 2))[None]]),
+        counts=np.concatenate([seen.sum(axis=1).T, summed.sum(axis=1)[None]])[:, keep],
         budget=budget[keep],
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
         shoal=_shoal(linear)[keep],
-        ramps=_ramps(linear),
+        ramps=_pushes(linear) + _drifts(linear),
+        pushes=_pushes(linear),
     )
 
 
@@ -179,7 +187,8 @@ def _noise_of(simulated: Simulated, changes: Sequence[Change], known: Noise | No
     linear, acting, columns, seen, _ = simulated
     keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
     windows, first = linear.motion.windows, len(changes) + STARTS
-    columns = np.delete(columns, np.s_[first : first + _ramps(linear)], axis=0)  # they are noise themselves
+    ramps = np.s_[first : first + _pushes(linear) + _drifts(linear)]
+    columns = np.delete(columns, ramps, axis=0)  # they are noise themselves
     return learnt_noise(
         columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
         known=known,
@@ -238,9 +247,11 @@ def _columns(linear: LinearisedMotion, known: Sequence[Disturbance], changes: Se
     """(m + 3 + o + q, w, s, 4) responses to changes of their sizes, initial velocities, ramps and the force."""
     moved = responses(linear, [*known, *_forces(linear)])
     moved[: len(changes)] *= np.array([change.size for change in changes])[:, None, None, None]
-    return np.concatenate(
-        [moved[: len(changes)], start_responses(linear.motion, linear.transition), moved[len(changes) :]]
-    )
+    first = len(changes) + _pushes(linear)
+    drift = np.zeros((_drifts(linear), *moved.shape[1:]))
+    drift[..., RATE] = 1.0
+    starts = start_responses(linear.motion, linear.transition)
+    return np.concatenate([moved[: len(changes)], starts, moved[len(changes) : first], drift, moved[first:]])
 
 
 def _compared(linear: LinearisedMotion) -> Array:
@@ -291,6 +302,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         shoal=np.concatenate([part.shoal for part in parts]),
         stretch_s=parts[0].stretch_s,
         ramps=parts[0].ramps,
+        pushes=parts[0].pushes,
     )
 
 
@@ -299,9 +311,14 @@ def stretch_length(length_m: float) -> float:
     return max(5.0, 5.0 * float(round(STRETCH_S * (length_m / LENGTH_M) ** 0.5 / 5.0)))
 
 
-def _ramps(linear: LinearisedMotion) -> int:
-    """Number of accelerations that may grow within a stretch."""
+def _pushes(linear: LinearisedMotion) -> int:
+    """Number of accelerations."""
     return sum(name in linear.motion.ship.model.outputs for name in "uvr")
+
+
+def _drifts(linear: LinearisedMotion) -> int:
+    """Number of sensors that may drift within a stretch: a gyro beside a compass tells."""
+    return int(linear.motion.windows.has_heading and not {"r"} & {*linear.motion.windows.derived})
 
 
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:
@@ -349,9 +366,9 @@ class Stretches:
 
 
 def stretches_of(grams: Grams, std: Array, ramp: Array) -> Stretches:
-    """The stretches for noise with standard deviations (4,) of the channels, infinite where there is none.
+    """The stretches for noise with standard deviations (h,) of the channels, infinite where there is none.
 
-    Ramps of the force with variances (o,) are noise, too.
+    Ramps of the force, and a drift, with variances (o,) are noise, too.
 
     Source: C. R. Rao, Linear Statistical Inference (1973), section 4a, for mixed linear models.
     """

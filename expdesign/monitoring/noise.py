@@ -13,7 +13,7 @@ Sources: L. Ljung, System Identification (1999), section 13.4, for closed loops;
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ AXES = 3
 class Noise:
     """Sources of the error within a stretch, beside what the calibration learns of all."""
 
-    std: Array  # (4,) of the sensors of u, v, r and the rate of the heading; only their ratios to the rest matter
+    std: Array  # (4,) of the sensors of u, v, r and the rate of the heading; only their ratios matter
     pushes: Array  # (3,) variance that forces on u, v and r add in a second [(m/s)^2/s, (rad/s)^2/s]
     waves: Array  # (3,) variance of u, v and r by waves
     period_s: float  # of the waves [s]
@@ -137,13 +137,22 @@ def learnt_noise(
     whole = seen[..., :AXES].all(axis=(1, 2))
     if whole.sum() < FEWEST:
         return known or WHITE
-    power = _power(_residuals(columns[:, whole], seen[whole], changes))
+    left = _residuals(columns[:, whole], seen[whole], changes)
+    power = _power(left)
     per_sample = (transition.shape[1] + 1) // seen.shape[1]
     matrix = np.linalg.matrix_power(transition[whole].mean(axis=(0, 1))[:AXES, :AXES], per_sample)
     fit = _Spectra(power=power, count=int(whole.sum()), matrix=matrix, sample_s=sample_s)
     if known is not None and fit.fitted_by(known):
         return known
-    return fit.best()
+    noise = fit.best()
+    compass = _compass_std(left, seen[whole], float(noise.std[2]))
+    return replace(noise, std=np.append(noise.std[:AXES], compass))
+
+
+def _compass_std(residuals: Array, seen: NDArray[np.bool_], gyro: float) -> float:
+    """Standard deviation of the rate of a heading, from its difference from a gyro's rate, which moves alike."""
+    apart = np.asarray(residuals[..., 3] - residuals[..., 2])[seen[..., 2:].all(axis=2)]
+    return float(np.sqrt(max(float(apart.var()) - gyro**2, 0.01 * gyro**2))) if len(apart) else gyro
 
 
 def _residuals(columns: Array, seen: NDArray[np.bool_], changes: int) -> Array:
