@@ -159,7 +159,7 @@ def test_deep_water_is_four_draughts_deep_and_beyond_the_safety_contour() -> Non
 def test_a_chart_has_three_shades_of_water_however_many_depths_are_charted(count: int) -> None:
     area = charted(*np.linspace(2.0, 40.0, count).tolist(), needed_m=2.0)
     content = case.report_content(plan=replace(case.plan(), area=area))
-    told = [entry.text for entry in chart_legend(content)]
+    told = [entry["text"] for entry in chart_legend(content)]
     assert sum("m or more" in text or "shallower" in text or " to " in text for text in told) <= 3
     assert len(set(told)) == len(told) <= 13
     assert sum("safety contour" in text for text in told) == 1

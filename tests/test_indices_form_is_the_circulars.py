@@ -107,6 +107,8 @@ def test_conditions_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
 
 def test_odd_names_are_shown_and_never_run() -> None:
     odd = document_html(replace(indices_document(content(replace(SHIP, name=ODD), notes=(ODD,))), command=ODD))
+    twice = (replace(WIDE, name=ODD), replace(WIDE, name=f"{ODD} again"))
+    odd += document_html(indices_document(content(measured=twice)))
     assert "<script" not in odd
     assert "\x07" not in odd
     assert "http" not in odd

@@ -224,13 +224,13 @@ def _missing(found: Diagnosis) -> Iterator[Block]:
     others = tuple(figure for is_clear, figure in figures if not is_clear)
     many = len(others) > 1
     yield (
-        Gallery(clear)
+        Gallery(clear, small=True)
         if clear
         else Markup("<b>Its dependence on each of {} variables is within chance.</b>").format(len(others))
     )
     if others:
         which = "The other" if clear else "These" if many else "This"
-        yield Gallery(others, folded=f"{which} {f'{len(others)} variables' if many else 'variable'}")
+        yield Gallery(others, small=True, folded=f"{which} {f'{len(others)} variables' if many else 'variable'}")
 
 
 def _stretches(found: Diagnosis) -> Iterator[Figure]:

@@ -39,6 +39,7 @@ class Table:
     texts: int = 1  # leading columns of words; numbers follow
     on: Literal["all", "page", "terminal"] = "all"  # a table that is wide or long has a shorter one for the terminal
     shaded: int | None = None  # column that is emphasised
+    marked: frozenset[int] = frozenset()  # rows that are
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,9 +54,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Small figures beside each other."""
+    """Figures beside each other, each with its caption above."""
 
     figures: tuple[Figure, ...]
+    small: bool = False
     folded: str = ""  # what they are, where the reader opens them
 
 
@@ -64,6 +66,13 @@ class Items:
     """A list of explanations."""
 
     texts: tuple[str | Markup, ...]
+    ordered: bool = False
+    folded: str = ""  # what they are, where the reader opens them
+
+
+def verdict(text: str, good: bool | None) -> Markup:
+    """A cell of a table on a page that says in a word or two whether something is as it should be."""
+    return Markup('<span class="mark {}">{}</span>').format({True: "yes", False: "no", None: "open"}[good], text)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from markupsafe import Markup
 
 from expdesign.export import words
-from expdesign.export.document import Document, Items, Section, Table, filled, notes_of, section
+from expdesign.export.document import Document, Items, Section, Table, filled, notes_of, section, verdict
 from expdesign.export.indices_form import IndicesContent, degrees, overshoots, shown, verdict_rows, verdict_word
 from expdesign.export.words import speed
 from expdesign.indices import (
@@ -46,9 +46,9 @@ KIND_NAMES = {"azimuth": "azimuth thruster", "tunnel": "tunnel thruster"}
 
 NO_RESULT = "no\N{NO-BREAK SPACE}result"
 MARKS = {
-    "met": Markup('<span class="mark yes">\N{CHECK MARK}</span>'),
-    "not met": Markup('<span class="mark no">\N{BALLOT X} exceeds</span>'),
-    "open": Markup('<span class="mark open">open</span>'),
+    "met": verdict("\N{CHECK MARK}", True),
+    "not met": verdict("\N{BALLOT X} exceeds", False),
+    "open": verdict("open", None),
     "no result": "",
 }
 """Word of `VERDICT_WORDS` -> what stands beside the result."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
 
 from expdesign import __version__
@@ -36,20 +39,28 @@ def page_template(name: str, *, package: str = __name__) -> Template:
 
 
 def _shown(value: object) -> object:
-    return xml_text(value) if type(value) is str else value
+    return type(value)(xml_text(value)) if isinstance(value, str) else value
 
 
 def document_html(document: Document, *, progress: Progress = silent) -> str:
     """One HTML page without any outside reference."""
+    return page_template("document.html").render(shown(document, partial(_drawn, progress)))
+
+
+def shown(
+    document: Document, draw: Callable[[Sequence[Figure]], Mapping[int, object]], *more: Figure
+) -> dict[str, object]:
+    """What the template of a document reads, its figures and some more drawn."""
     sections = [part for part in document.sections if not part.blocks or any(map(_on_page, part.blocks))]
     contents = [(number, section.title) for number, section in enumerate(sections, start=1) if section.level == 2]
-    return page_template("document.html").render(
-        document=document,
-        sections=sections,
-        facts=list(fact_rows(document.facts)),
-        contents=contents if len(contents) >= MANY_SECTIONS else (),
-        drawn=_drawn([figure for part in sections for block in part.blocks for figure in _figures(block)], progress),
-    )
+    figures = [figure for part in sections for block in part.blocks for figure in _figures(block)]
+    return {
+        "document": document,
+        "sections": sections,
+        "facts": list(fact_rows(document.facts)),
+        "contents": contents if len(contents) >= MANY_SECTIONS else (),
+        "drawn": draw([*more, *figures]),
+    }
 
 
 def _on_page(block: Block) -> bool:
@@ -60,7 +71,7 @@ def _figures(block: Block) -> tuple[Figure, ...]:
     return block.figures if isinstance(block, Gallery) else (block,) if isinstance(block, Figure) else ()
 
 
-def _drawn(figures: list[Figure], progress: Progress) -> dict[int, object]:
+def _drawn(progress: Progress, figures: Sequence[Figure]) -> dict[int, object]:
     """Every figure, by its identity."""
     if not figures:
         return {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -367,40 +366,36 @@ def _draw_runs(axes: Axes, plan: Plan, *, metres_per_inch: float) -> None:
         )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class LegendEntry:
+def _entry(text: str, colour: str, sign: str = "") -> dict[str, str]:
     """One entry of the legend: a sign in a colour, or an area of it where there is no sign."""
-
-    text: str
-    colour: str
-    sign: str = ""
+    return {"text": text, "colour": colour, "sign": sign}
 
 
-def chart_legend(content: ReportContent) -> list[LegendEntry]:
+def chart_legend(content: ReportContent) -> list[dict[str, str]]:
     """The signs of the chart, for the text under it: only those that it shows."""
     area, box = content.plan.area, shapely.box(*view(content))
     contour, deep = safety_contour(area), deep_from(area, content.vessel.draught_m)
     entries = [
-        LegendEntry(text="run, numbered", colour=PRIMITIVE, sign="\N{BOX DRAWINGS HEAVY HORIZONTAL}"),
-        LegendEntry(text="repositioning", colour=REPOSITION, sign="\N{BOX DRAWINGS LIGHT HORIZONTAL}"),
-        LegendEntry(text=f"the hull stays here with {100 * content.confidence:g} % probability", colour="#f8ddd0"),
-        LegendEntry(text="start", colour=GREEN, sign="\N{BLACK CIRCLE}"),
-        LegendEntry(text="goal", colour=PURPLE, sign="\N{BLACK STAR}"),
-        LegendEntry(text="least clearance", colour=BLACK, sign="\N{MULTIPLICATION X}"),
+        _entry("run, numbered", PRIMITIVE, "\N{BOX DRAWINGS HEAVY HORIZONTAL}"),
+        _entry("repositioning", REPOSITION, "\N{BOX DRAWINGS LIGHT HORIZONTAL}"),
+        _entry(f"the hull stays here with {100 * content.confidence:g} % probability", "#f8ddd0"),
+        _entry("start", GREEN, "\N{BLACK CIRCLE}"),
+        _entry("goal", PURPLE, "\N{BLACK STAR}"),
+        _entry("least clearance", BLACK, "\N{MULTIPLICATION X}"),
     ]
     if content.clearance_m > 0:
         text = f"{content.clearance_m:g} m from forbidden water"
-        entries.append(LegendEntry(text=text, colour=GREY, sign="\N{BOX DRAWINGS LIGHT TRIPLE DASH HORIZONTAL}"))
+        entries.append(_entry(text, GREY, "\N{BOX DRAWINGS LIGHT TRIPLE DASH HORIZONTAL}"))
     if contour is not None:
         text = f"safety contour, {contour:g} m"
-        entries.append(LegendEntry(text=text, colour=SAFETY, sign="\N{BOX DRAWINGS HEAVY HORIZONTAL}"))
-        entries.append(LegendEntry(text=f"shallower than {contour:g} m", colour=SHALLOW))
+        entries.append(_entry(text, SAFETY, "\N{BOX DRAWINGS HEAVY HORIZONTAL}"))
+        entries.append(_entry(f"shallower than {contour:g} m", SHALLOW))
     safe = "allowed water" if contour is None else f"{contour:g} m or more"
-    entries.append(LegendEntry(text=safe if deep is None else f"{contour:g} to {deep:g} m", colour=WATER))
+    entries.append(_entry(safe if deep is None else f"{contour:g} to {deep:g} m", WATER))
     if deep is not None:
-        entries.append(LegendEntry(text=f"{deep:g} m or more: deep for trials", colour=DEEP))
+        entries.append(_entry(f"{deep:g} m or more: deep for trials", DEEP))
     if area.land.intersects(box):
-        entries.append(LegendEntry(text="land", colour=LAND))
+        entries.append(_entry("land", LAND))
     if not shapely.union_all([area.water, area.land, *(each for _, each in area.depths)]).covers(box):
-        entries.append(LegendEntry(text="forbidden or uncharted", colour=FORBIDDEN))
+        entries.append(_entry("forbidden or uncharted", FORBIDDEN))
     return entries

@@ -195,7 +195,7 @@ def _small(length_m: float) -> str:
 
 
 def growth_rows(growth: Growth, shown: Callable[[str], str]) -> list[tuple[str, ...]]:
-    """Additions in order: step, name, description, sensitivity before, gain, efficiency, excitation condition."""
+    """Additions in order: step, name, description, excitation condition, sensitivity before, gain, efficiency."""
     return [_row(number, found, shown) for number, found in enumerate(growth.rounds, start=1)]
 
 
@@ -205,10 +205,10 @@ def _row(number: int, found: GrowRound, shown: Callable[[str], str]) -> tuple[st
         str(number),
         shown(found.name),
         words.family(found.family) + (f"; {settings}" if settings else ""),
+        "holds" if found.excitation_condition else "does not hold",
         words.number(found.sensitivity),
         f"+{words.number(found.log_det_gain, 3)}" if found.log_det_gain >= 0 else words.number(found.log_det_gain),
         words.percent(found.efficiency),
-        "holds" if found.excitation_condition else "does not hold",
     )
 
 

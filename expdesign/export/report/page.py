@@ -3,91 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from expdesign.export import words
-from expdesign.export.files import PlannedAccuracy
-from expdesign.export.pages import page_template
+from expdesign.export.document import Document, Figure, Mark
+from expdesign.export.pages import page_template, shown
 from expdesign.export.pages.figures import drawn, marked
 from expdesign.export.report import tables
 from expdesign.export.report.chart import chart, chart_legend
-from expdesign.export.report.checks import (
-    aborted_words,
-    checks,
-    conditions,
-    day_sentence,
-    left_words,
-    procedure_sentences,
-)
+from expdesign.export.report.checks import aborted_words, day_sentence, left_words
 from expdesign.export.report.content import ReportContent, primitive_runs
-from expdesign.export.report.design import (
-    certificate,
-    chain,
-    comparison,
-    criterion_sentence,
-    equal_time_sentence,
-    growth_rows,
-    growth_sentences,
-    limit_rows,
-    short_of_optimum,
-)
-from expdesign.export.report.figures import (
-    durations_figure,
-    information_figure,
-    pareto_figure,
-    primitive_figure,
-    timeline_figure,
-    uncertainty_figure,
-)
-from expdesign.export.report.parameters import (
-    accuracy_table,
-    equation_sentence,
-    known_rows,
-    known_sentences,
-    measures_velocity,
-    parameter_rows,
-    unknown_current_sentence,
-)
+from expdesign.export.report.design import equal_time_sentence, short_of_optimum
+from expdesign.export.report.sections import report_sections
 from expdesign.plan.legs import through_water
 from expdesign.plan.values import LatticeProof, Plan
 from expdesign.sea_area import UNKNOWN_DEPTH
-
-GLOSSARY: tuple[tuple[str, str], ...] = (
-    ("Manoeuvre", "a primitive of the dictionary: a short motion with stated commands from a stated initial velocity"),
-    ("Run", "one execution of a manoeuvre; numbered on the chart and in the time series"),
-    (
-        "Leg",
-        "a part of the plan, either a run or a repositioning leg; numbered from 0 as in plan.json and the CSV files",
-    ),
-    ("Repositioning", "the transit from the end of one run to the start of the next, at its initial speed and heading"),
-    (
-        "Information matrix",
-        "information of the data about all parameters; its inverse is the covariance of the estimates, up to the noise "
-        "variance",
-    ),
-    ("Log det", "logarithm of the determinant of the information matrix; larger means a smaller confidence region"),
-    (
-        "D-efficiency",
-        "ratio of two information determinants, to the power 1/p for p parameters; at 50 % the same accuracy takes "
-        "twice the time",
-    ),
-    (
-        "Sensitivity",
-        "derivative of the log det with respect to the time of a manoeuvre; at the optimum equal for all used ones",
-    ),
-    (
-        "Excitation condition",
-        "no velocity inside an absolute value changes sign or comes close to zero; then noise does not bias "
-        "instrumental-variable estimates",
-    ),
-    ("Clearance", "distance from the rectangular hull to the nearest forbidden water or land"),
-    ("u, v, r", "surge speed ahead, sway speed to starboard, and yaw rate to starboard"),
-)
-
 
 SUBTRACTION = {
     "none": "no mean is subtracted from the instruments",
@@ -97,7 +31,6 @@ SUBTRACTION = {
 }
 
 
-NOT_DRAWN = "Not drawn in a draft, as no run of it is planned."
 MORE_THAN_OPTIMAL = " It is more than 100 % because the legs between the runs inform, too."
 
 
@@ -110,76 +43,56 @@ class Fact:
     remark: str
 
 
-def report_html(content: ReportContent) -> str:
-    """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
-    after = content.accuracy
-    page = page_template("report.html")
-    return page.render(
-        content=content,
-        plan=content.plan,
-        design=content.design,
-        verified=content.plan.verified,
-        runs=primitive_runs(content.plan),
-        summary=summary(content),
-        booking=[booking(content.plan)],
-        risks=risks(content),
-        facts=facts(content),
-        certificate=certificate(content),
-        criterion=criterion_sentence(content),
-        equal_time=equal_time_sentence(content.design),
-        comparison=comparison(content),
-        limits=limit_rows(content),
-        assumptions=assumptions(content),
-        legend=chart_legend(content),
-        agenda=tables.agenda(content),
-        primitives=tables.primitive_rows(content),
-        parameters=parameter_rows(content, after),
-        known_rows=known_rows(content.known),
-        known_sentences=known_sentences(content.known, content.plan.area.frame),
-        noise=measures_velocity(content),
-        chain=chain(content, short_of_optimum=short_of_optimum(content)),
-        conditions=conditions(content),
-        checks=checks(content),
-        procedure=procedure_sentences(content.plan),
-        day_rows=[] if content.day is None else tables.day_rows(content, content.day),
-        day_sentences=[] if content.day is None else tables.day_sentences(content.day),
-        told=((), []) if content.day is None else accuracy_table(content.day),
-        growth=[] if content.growth is None else growth_rows(content.growth, content.shown),
-        grown=("", "") if content.growth is None else growth_sentences(content.growth),
-        glossary=GLOSSARY,
-        figures=_figures(content, after),
-        origin=_origin(content),
-        percent=words.percent,
-        equation=equation_sentence(content),
-        unknown_current=unknown_current_sentence(content),
-        less=bool(((after.before > 0) & (after.before < after.track)).any()),
-        excitation=tables.excitation_sentence(content),
+def _document(content: ReportContent) -> Document:
+    """The trial for people, without the chart and what stands beside it."""
+    plan, area = content.plan, content.plan.area
+    return Document(
+        kind="DRAFT, not to be sailed: manoeuvring trial" if plan.draft else "Manoeuvring trial",
+        title=f"{content.scenario}{' (DRAFT)' if plan.draft else ''}",
+        name=f"{'DRAFT: ' if plan.draft else ''}Manoeuvring trial {content.scenario}",
+        about=f"{words.ship(content.vessel)} in {area.name}",
+        sections=report_sections(content, summary(content), assumptions(content)),
+        command=content.command,
     )
 
 
-def _figures(content: ReportContent, after: PlannedAccuracy) -> dict[str, object]:
-    figures: dict[str, Callable[[], str]] = {
-        "chart": partial(chart, content),
-        "durations": partial(durations_figure, content),
-        "information": partial(information_figure, content),
-        "timeline": partial(timeline_figure, content.plan),
-    }
-    if content.day is not None:
-        figures["pareto"] = partial(pareto_figure, content.day)
-    if measures_velocity(content):
-        figures["uncertainty"] = partial(uncertainty_figure, content, after)
-    primitives: dict[int, Callable[[], str]] = {
-        number: partial(primitive_figure, item.primitive, content.vessel.hull_b, number=number)
-        for number, item in enumerate(content.information)
-        if content.design.repeats[number] or not content.plan.draft
-    }
-    results: list[str] = drawn([*figures.values(), *primitives.values()])
-    if content.plan.draft:
-        results = [marked(figure, "DRAFT") for figure in results]
-    named = dict(zip(figures, results, strict=False))
-    of_runs = dict(zip(primitives, results[len(figures) :], strict=True))
-    gallery = [of_runs.get(number, NOT_DRAWN) for number in range(len(content.information))]
-    return {"uncertainty": "", "pareto": "", **named, "primitives": gallery}
+def report_html(content: ReportContent) -> str:
+    """One HTML page without any outside reference: figures inside as SVG, readable on a phone and on paper."""
+    plan = content.plan
+    first = Figure(
+        draw=partial(chart, content),
+        caption="Runs are numbered in the order in which they are sailed. Hulls show the heading, not their size. The "
+        "shaded area around a run is where the hull stays with the stated probability, for random ship, current and "
+        f"wind. WGS84; metres in the files count from {_origin(content)}. Not for navigation.",
+        legend=chart_legend(content),
+    )
+    return page_template("report.html").render(
+        shown(_document(content), partial(_drawn, draft=plan.draft), first),
+        chart=first,
+        marks=_marks(plan),
+        booking=booking(plan),
+        risks=risks(content),
+        key_facts=facts(content),
+    )
+
+
+def _drawn(figures: Sequence[Figure], *, draft: bool) -> dict[int, object]:
+    """Every figure, by its identity; they share nothing."""
+    results: list[object] = drawn([figure.draw for figure in figures])
+    if draft:
+        results = [marked(str(result), "DRAFT") for result in results]
+    return dict(zip(map(id, figures), results, strict=True))
+
+
+def _marks(plan: Plan) -> tuple[Mark, ...]:
+    """Whether it may be sailed, and whether depths were checked."""
+    if plan.verified:
+        first = Mark(text="\N{CHECK MARK} verified", good=True)
+    elif plan.verification.passed:
+        first = Mark(text=f"{plan.verdict[0].upper()}{plan.verdict[1:]}", good=False)
+    else:
+        first = Mark(text="\N{BALLOT X} not verified: do not sail", good=False)
+    return (first,) if plan.area.depths else (first, Mark(text="depths not checked"))
 
 
 def _origin(content: ReportContent) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -97,38 +96,20 @@ def measures_velocity(content: ReportContent) -> bool:
 # The section of the report on a trial in progress: what is known, and what the rest of the trial adds.
 
 
-@dataclass(frozen=True, kw_only=True)
-class KnownRow:
-    """One parameter: its value and standard deviation before the trial, now, and after the rest."""
-
-    name: str
-    new: bool
-    before: str
-    now: str
-    stated: str
-    so_far: str
-    after: str
-    bought: str
-    without: str
-
-
-def known_rows(known: Known | None) -> list[KnownRow]:
-    """Parameters in order; none for a new trial."""
-    if known is None:
-        return []
+def known_rows(known: Known) -> list[tuple[str, ...]]:
+    """By parameter: name, what told most, value before the trial and now, standard deviations before, now, after."""
     columns = (known.before, known.now, known.stated, known.so_far, known.after)
     rows = zip(known.parameters, *(column.tolist() for column in columns), known.purchases, strict=True)
     return [
-        KnownRow(
-            name=name,
-            new=name in known.new,
-            before="not in the model" if math.isnan(before) else words.significant(before),
-            now=words.significant(now, 4),
-            stated=words.significant(stated, 2) if stated > 0 else "not stated",
-            so_far=_std_progress(so_far),
-            after=_std_progress(after),
-            bought=f"{item.runs} \N{MULTIPLICATION SIGN} {item.primitive}" if item.primitive else "no single manoeuvre",
-            without=_without(item),
+        (
+            f"{name} (new)" if name in known.new else name,
+            f"{item.runs} \N{MULTIPLICATION SIGN} {item.primitive}" if item.primitive else "no single manoeuvre",
+            "not in the model" if math.isnan(before) else words.significant(before),
+            words.significant(now, 4),
+            words.significant(stated, 2) if stated > 0 else "not stated",
+            _std_progress(so_far),
+            _std_progress(after),
+            _without(item),
         )
         for name, before, now, stated, so_far, after, item in rows
     ]
@@ -144,10 +125,8 @@ def _without(item: Purchase) -> str:
     return "not estimable" if math.isinf(item.without) else f"{words.significant(item.without, 2)} times larger"
 
 
-def known_sentences(known: Known | None, frame: LocalFrame) -> list[str]:
-    """The state of the trial; none for a new trial."""
-    if known is None:
-        return []
+def known_sentences(known: Known, frame: LocalFrame) -> list[str]:
+    """The state of the trial."""
     lat, lon = frame.to_degrees(known.pose[:2]).tolist()
     files = ", ".join(known.data)
     left = _time_left(known)

@@ -67,25 +67,8 @@ def _from_to(before: float, after: float) -> str:
     return f"{words.number(before, 1)} \N{RIGHTWARDS ARROW} {words.number(after, 1)}"
 
 
-@dataclass(frozen=True, kw_only=True)
-class PrimitiveRow:
-    """One primitive: description, information, number of runs."""
-
-    name: str
-    family: str
-    settings: str
-    lasts: str
-    entry: str
-    log_det: str
-    excites: str
-    share: str
-    optimal: str
-    runs: int
-    sensitivity: str
-
-
-def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
-    """The dictionary in the order of the design."""
+def primitive_rows(content: ReportContent) -> list[tuple[str, ...]]:
+    """The dictionary in the order of the design: name, initial motion, excitation, information, time, runs."""
     design = content.design
     columns = zip(
         content.information,
@@ -97,18 +80,16 @@ def primitive_rows(content: ReportContent) -> list[PrimitiveRow]:
         strict=True,
     )
     return [
-        PrimitiveRow(
-            name=content.shown(item.primitive.name),
-            family=words.family(item.primitive.family),
-            settings=settings_sentence(item),
-            lasts=words.duration(item.primitive.duration_s),
-            entry=motion(item.primitive.entry_velocity),
-            log_det="singular" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
-            excites=excitation_words(item),
-            share=words.percent(float(fraction)),
-            optimal=words.duration(float(seconds)),
-            runs=runs,
-            sensitivity=words.number(float(sensitivity), 3) if included else "excluded",
+        (
+            content.shown(item.primitive.name),
+            motion(item.primitive.entry_velocity),
+            excitation_words(item),
+            "singular" if item.log_det_alone is None else words.number(item.log_det_alone, 1),
+            words.number(float(sensitivity), 3) if included else "excluded",
+            words.percent(float(fraction)),
+            words.duration(float(seconds)),
+            words.duration(item.primitive.duration_s),
+            str(runs),
         )
         for item, fraction, seconds, runs, sensitivity, included in columns
     ]
@@ -196,14 +177,14 @@ def excitation_sentence(content: ReportContent) -> str:
 
 
 def day_rows(content: ReportContent, day: ShortestDay) -> list[tuple[str, ...]]:
-    """The days planned in search of the shortest, in order."""
+    """The days planned in search of the shortest, in order: number, runs, length, time in runs, information."""
     return [
         (
             str(number),
+            ", ".join(f"{count} {content.shown(name)}" for name, count in item.runs.items()) or "none",
             words.duration(item.day_s),
             words.duration(item.informative_s),
             words.percent(item.information),
-            ", ".join(f"{count} {content.shown(name)}" for name, count in item.runs.items()) or "none",
         )
         for number, item in enumerate(day.tried, start=1)
     ]
