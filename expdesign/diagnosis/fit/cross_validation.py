@@ -43,6 +43,9 @@ from expdesign.values import Array
 
 PARTS = 5  # of every run, in the cross-validation of short stretches
 
+_Fitted = Callable[[Windows, NDArray[np.bool_]], ExtendedModel | None]
+"""A model fitted to some of the windows, by a mask (w,)."""
+
 
 def validation_units(windows: Windows) -> Array:
     """(w,) number of the unit that every window belongs to."""
@@ -59,7 +62,7 @@ class CrossValidation:
 
     def short_windows(self, ship: ExtendedModel) -> Windows:
         """The data in stretches of `Tuning.ahead_s`."""
-        return _stretches(self._windows, validation_units(self._windows), ship, self._record)[0]
+        return _stretches(self._windows, validation_units(self._windows), ship, self._record)
 
     def of(self, found: Fit, progress: Progress = silent) -> HeldOut:
         """Of a model whose effects are fitted."""
@@ -75,8 +78,7 @@ class CrossValidation:
         """The same, measured only as those of another are: of whole units or of short stretches."""
         if not other.in_stretches:
             return self.without(found, found.ship)
-        folds = _stretch_folds(_Effects.of(found), found.ship, self._windows, self._record)
-        return replace(_of_folds(folds), in_stretches=True)
+        return _in_stretches(found.ship, found.free_keys, self._windows, self._record)
 
 
 def cross_validate(
@@ -102,62 +104,47 @@ def cross_validate(
         ),
         progress,
     )
-    effects = None if found is None else _Effects.of(found)
+    free = None if found is None else found.free_keys
 
     def ahead() -> HeldOut:
-        found_ahead = _of_folds(_stretch_folds(effects, ship, windows, record))
-        return replace(found_ahead, in_stretches=True, models=whole.models)
+        return replace(_in_stretches(ship, free, windows, record), models=whole.models)
 
     return replace(whole, ahead=cache(ahead))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Effects:
-    """What stretches take from a fit, without all that it holds."""
+def _in_stretches(
+    ship: ExtendedModel, free: tuple[str, ...] | None, windows: Windows, record: Record | None
+) -> HeldOut:
+    """Errors in short stretches, one part of every run held out at a time.
 
-    ship: ExtendedModel  # fitted
-    free_keys: tuple[str, ...]  # effects without a prior
-    sizes: Array  # (free, w) greatest sensitivity to each of them in every window
-
-    @staticmethod
-    def of(found: Fit) -> _Effects:
-        values = found.sensitivities.values[: found.free_count]
-        sizes = np.abs(values).max(axis=(2, 3), initial=0.0)
-        return _Effects(ship=found.ship, free_keys=found.free_keys, sizes=sizes)
-
-    def seen(self, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
-        """The model without effects that do nothing in these windows, and the free ones that are left.
-
-        Nothing is known there of a change of the ship that comes later, for example.
-        """
-        sizes = self.sizes[:, train].max(axis=1, initial=0.0)
-        unseen = {key for key, size in zip(self.free_keys, sizes.tolist(), strict=True) if not size > 0.0}
-        return self.ship.without_effects(unseen), tuple(key for key in self.free_keys if key not in unseen)
-
-
-def _stretch_folds(effects: _Effects | None, ship: ExtendedModel, windows: Windows, record: Record | None) -> _Folds:
-    """Short stretches, one part of every run held out at a time."""
-    unit = validation_units(windows)
-    short, of_short = _stretches(windows, unit, ship, record)
-    return _Folds(
-        ship=ship,
-        windows=short,
-        unit=_parts_of_runs(short),
-        part=_in_time(short),
-        fitted=None if effects is None else partial(_fitted_ahead, unit, of_short, effects),
-        in_stretches=True,
-    )
+    Args:
+        ship: the model.
+        free: effects without a prior that are fitted; None for a model that is not fitted.
+        windows, record: all data.
+    """
+    short = _stretches(windows, validation_units(windows), ship, record)
+    try:
+        found = None if free is None else fit_output_error(ship, short, free)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return _of_stretches(ship, short, _not_fitted)
+    return _of_stretches(ship, short) if found is None else cross_validate_ahead(found)
 
 
 def cross_validate_ahead(found: Fit) -> HeldOut:
     """Errors of a model fitted by output error in short stretches, without one part of every run at a time."""
-    short = found.linear.motion.windows
+    return _of_stretches(found.ship, found.linear.motion.windows, partial(_fitted, found), found.linear)
+
+
+def _of_stretches(
+    ship: ExtendedModel, short: Windows, fitted: _Fitted | None = None, near: LinearisedMotion | None = None
+) -> HeldOut:
     folds = _Folds(
-        ship=found.ship,
+        ship=ship,
         windows=short,
         unit=_parts_of_runs(short),
         part=_in_time(short),
-        fitted=partial(_refitted_ahead, _Effects.of(found)),
+        fitted=fitted,
+        near=near,
         in_stretches=True,
     )
     return replace(_of_folds(folds), in_stretches=True, models=())
@@ -171,10 +158,8 @@ class _Folds:
     windows: Windows  # that it is simulated in
     unit: Array  # (w,) of each of them
     part: Array  # (w,) what errors are summed over: units, or stretches of them
-    # the model fitted to some of the windows, by a mask (w,); None for a model that is not fitted
-    fitted: Callable[[Windows, NDArray[np.bool_]], ExtendedModel | None] | None
-    # motion of the fit in these windows, which speeds up the simulation; None where they are stretches
-    near: LinearisedMotion | None = None
+    fitted: _Fitted | None  # None for a model that is not fitted
+    near: LinearisedMotion | None = None  # motion of the fit in these windows, which speeds up the simulation
     in_stretches: bool = False  # windows are stretches of units
 
 
@@ -231,14 +216,11 @@ def error_of_constants(measured: Array, batch: Array) -> Array:
     return np.asarray(seen.sum(axis=1) * total / np.maximum(seen.sum(axis=(0, 1)), 1))
 
 
-def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Record | None) -> tuple[Windows, Array]:
-    """The data in short stretches, and the unit that each is a part of."""
+def _stretches(windows: Windows, unit: Array, ship: ExtendedModel, record: Record | None) -> Windows:
+    """The data in short stretches."""
     if record is not None and unit is windows.batch:
-        short = cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
-        return short, short.batch
-    short = windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
-    within = (windows.batch == short.batch[:, None]) & (windows.first <= short.first[:, None])
-    return short, unit[np.where(within, windows.first, -1.0).argmax(axis=1)]
+        return cut_windows(ship.model, record, longest_s=TUNING.ahead_s)
+    return windows.cut_shorter(max(2, round(TUNING.ahead_s / windows.sample_s)))
 
 
 def _in_time(short: Windows) -> Array:
@@ -261,7 +243,7 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
 
     The effects stay if no step from the fit to all windows reduces the cost on these.
     """
-    ship, free = _Effects.of(found).seen(train)
+    ship, free = _seen(found, train)
     options = FitOptions(
         noise=found.noise,
         ar_order=found.noise.order,
@@ -275,22 +257,17 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
         return None
 
 
-def _fitted_ahead(
-    unit: Array, of_short: Array, effects: _Effects, short: Windows, train: NDArray[np.bool_]
-) -> ExtendedModel | None:
-    """The same by output error in short stretches, with the units of the windows of the fit and of the stretches."""
-    return _fitted_to_stretches(*effects.seen(np.isin(unit, of_short[train])), short, train)
+def _seen(found: Fit, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
+    """The model without effects that do nothing in some windows, and the free ones that are left.
+
+    Nothing is known there of a change of the ship that comes later, for example.
+    """
+    values = found.sensitivities.values[: found.free_count, train]
+    sizes = np.abs(values).max(axis=(1, 2, 3), initial=0.0)
+    unseen = {key for key, size in zip(found.free_keys, sizes.tolist(), strict=True) if not size > 0.0}
+    return found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
 
 
-def _refitted_ahead(effects: _Effects, short: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
-    """The same of effects that were fitted to stretches."""
-    return _fitted_to_stretches(*effects.seen(train), short, train)
-
-
-def _fitted_to_stretches(
-    ship: ExtendedModel, free: tuple[str, ...], short: Windows, train: NDArray[np.bool_]
-) -> ExtendedModel | None:
-    try:
-        return fit_output_error(ship, short.selected(train), free).ship
-    except (FloatingPointError, np.linalg.LinAlgError):
-        return None
+def _not_fitted(windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:
+    """No model where none can be fitted."""
+    return None

@@ -26,7 +26,6 @@ from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, profile
 from expdesign.diagnosis.select.score_tests import ScoreTest
 from expdesign.diagnosis.select.selection import Selection, Step, redundant_step, without_step
 from expdesign.diagnosis.select.selection_round import (
-    FURTHER,
     NEARLY_AS_MUCH,
     Work,
     best_step,
@@ -57,12 +56,12 @@ def select_forward(
 ) -> Selection:
     """Add causes until nothing significant is left, and take out those that later ones make redundant.
 
-    A cause that approximated another one becomes redundant once that one is found. The selection then returns to the
-    step where it was added and continues without it, so that no later finding depends on it. Where no work is left for
-    that, later causes stay, fitted without it. Many parameters at once explain nearly any data. So before such a block
-    is added, causes with fewer effects are tried one after the other. Many numbers may also make a right cause
-    redundant that simulates held-out data better; then they are taken out themselves. At the end, causes are compared
-    once more with their best replacement, where another one beside them improves the simulation of held-out data too.
+    A cause that approximated another one becomes redundant once that one is found. The selection then continues without
+    it, with later causes fitted without it, of which others may become redundant. Many parameters at once explain
+    nearly any data. So before such a block is added, causes with fewer effects are tried one after the other. Many
+    numbers may also make a right cause redundant that simulates held-out data better; then they are taken out
+    themselves. At the end, causes are compared once more with their best replacement, where another one beside them
+    improves the simulation of held-out data too, and a test leaves room for it.
     The search ends where a cause after the first improves nothing on held-out data: no model of a real ship is exact,
     and tests always find more.
     """
@@ -83,7 +82,8 @@ def select_forward(
             and (len(steps) < 2 or work.allows("exchanges of causes"))
         ):
             exchanges += 1
-            exchanged = _exchange(_up_to_last_gain(steps, gains), search)
+            useful = _up_to_last_gain(steps, gains)
+            exchanged = _exchange(useful, steps[len(useful)].tests if idle else tests, search)
             if exchanged is not None:
                 steps, base = exchanged, exchanged[-1].chosen.fit
                 continue
@@ -94,11 +94,9 @@ def select_forward(
         steps += _smaller_causes(step, search) if step.chosen.is_block else [step]
         del steps[MOST_FINDINGS:]
         base = steps[-1].chosen.fit
-        redundant = _to_reject(steps, search) if len(rejected) < MOST_REJECTED else None
-        if redundant is not None:
+        while steps and len(rejected) < MOST_REJECTED and (redundant := _to_reject(steps, search)) is not None:
             rejected.append(steps[redundant].chosen.candidate)
-            without = None if work.allows(FURTHER) else without_step(steps, redundant, windows)
-            before = steps[redundant].before
+            without, before = without_step(steps, redundant, windows), steps[redundant].before
             steps = steps[:redundant] if without is None else without
             base = steps[-1].chosen.fit if steps else before
 
@@ -228,9 +226,15 @@ def _smaller_causes(block: Step, search: _Search) -> list[Step]:
     return path if log_likelihood_gain(block.chosen.fit, base) - TUNING.price * (count - size) > 0 else [block]
 
 
-def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
-    """The steps with one of them exchanged for a cause that gains more beside the others; None where there is none."""
+def _exchange(steps: list[Step], tests: Sequence[ScoreTest], search: _Search) -> list[Step] | None:
+    """The steps with one of them exchanged for a cause that gains more beside the others; None where there is none.
+
+    Args:
+        tests: of what is left beside all of them.
+    """
     for index, old in enumerate(steps[:-1]):
+        if not _could_gain_more(tests, old.chosen):
+            continue
         others = without_step(steps, index, search.windows)
         if others is None:
             continue
@@ -239,6 +243,18 @@ def _exchange(steps: list[Step], search: _Search) -> list[Step] | None:
         if new is not None and _gains_more(new.chosen, old.chosen, steps[-1].chosen.fit):
             return [*others, new]
     return None
+
+
+def _could_gain_more(tests: Sequence[ScoreTest], old: FittedCandidate) -> bool:
+    """Whether a candidate may gain more in place of another one: by no more than it does beside that, which tests tell.
+
+    One with fewer numbers may gain less and take its place.
+    """
+    return any(
+        test.candidate.size < len(old.keys)
+        or test.is_beyond_noise(TUNING.price * (test.candidate.size - len(old.keys)))
+        for test in tests
+    )
 
 
 def _gains_more(new: FittedCandidate, old: FittedCandidate, whole: Fit) -> bool:

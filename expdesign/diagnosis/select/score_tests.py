@@ -144,8 +144,14 @@ class ScoreTest:
 
         Source: J. Fan and J. Lv, Journal of the Royal Statistical Society B 70 (2008), 849-911: a screen must keep.
         """
-        by_noise = _p_value(self.statistic, self.candidate.size, positive=self.candidate.positive)
-        return bool(by_noise * self.multiplicity <= 1.0)
+        return bool(self._by_noise(self.statistic) * self.multiplicity <= 1.0)
+
+    def is_beyond_noise(self, price: float) -> bool:
+        """Whether a statistic less by a price is larger than the largest of a round that noise alone gives."""
+        return of_several(self._by_noise(self.statistic - price), self.multiplicity) <= TUNING.level
+
+    def _by_noise(self, statistic: float) -> float:
+        return float(_p_value(max(statistic, 0.0), self.candidate.size, positive=self.candidate.positive))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ from expdesign.diagnosis.select.score_tests import ScoreTest, score_tests
 from expdesign.diagnosis.select.starting_point import (
     StartingPoint,
     fit_short_windows,
+    of_one_fit,
     start_in_short_windows,
     starting_point,
 )
@@ -44,7 +45,8 @@ def starting_points(
     short_fit, beside = known[SHORT]
     short_tests = None if short_fit is None else score_tests(short_fit, [item.candidate for item in tests])
     if short_fit is None or short_tests is None or _explained_share(short_tests, short_fit) < LARGE_SHARE:
-        return [starting_point(base, test) for test in shortlist], False
+        points = {of_one_fit(point): point for point in (starting_point(base, test) for test in reversed(shortlist))}
+        return [*reversed(points.values())], False
     best, of_short = _never_left_out(shortlist), _shortlist(short_tests)
     certain = [*best, *_hidden_by_random_current(base, tests, best, beside=of_short)]
     listed = {id(item.candidate) for item in certain}

@@ -137,19 +137,32 @@ def start_in_short_windows(
     fits = [known[key][1] for key in keys]
     noise = likeliest([short_fit, *(found for found in fits if found is not None)]).noise
     without = profile_cost(short_fit, noise)
+    never_left_out = {of_one_fit(point) for point in points[:certain]}
     gains = [-np.inf if found is None else without - profile_cost(found, noise) for found in fits]
+    best: dict[Hashable, int] = {}
+    for number, (point, gain) in enumerate(zip(points, gains, strict=True)):
+        other = best.setdefault(of_one_fit(point), number)
+        best[of_one_fit(point)] = number if gain > gains[other] else other
     return [
         point
         if found is None
         else replace(point, effects=point.effects | {key: found.value(key) for key in found.keys})
         for number, (point, found, gain) in enumerate(zip(points, fits, gains, strict=True))
-        if number < certain or gain > LEAST_GAIN_SHARE * max(gains)
+        if best[of_one_fit(point)] == number
+        and (of_one_fit(point) in never_left_out or gain > LEAST_GAIN_SHARE * max(gains))
     ]
 
 
 def _same(candidate: Candidate) -> Hashable:
     """What candidates that are fitted alike share."""
     return candidate.cause, tuple(candidate.free.items()), tuple(candidate.fixed.items())
+
+
+def of_one_fit(point: StartingPoint) -> Hashable:
+    """What candidates share that differ in their first guesses alone, so that the best fit is the answer of all."""
+    candidate = point.test.candidate
+    held = ((key, value) for key, value in candidate.fixed.items() if key not in point.keys)
+    return candidate.cause, frozenset(candidate.free), frozenset(held)
 
 
 def _fit_in_short_windows(short_fit: Fit, point: StartingPoint) -> Fit | None:
