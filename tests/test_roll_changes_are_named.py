@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from expdesign.errors import NotInformative
-from expdesign.export.diagnosis_results import RollVerdict, roll_sentences, with_roll
+from expdesign.export.roll_changes import RollVerdict, roll_sentences, with_roll
 from expdesign.roll.record import RollJudgement, judge_roll
 from expdesign.scenario import load_vessel
 from expdesign.vessel import NOMINAL, Load, RollPendulum

@@ -28,13 +28,12 @@ from expdesign.export.diagnosis_figures import (
 )
 from expdesign.export.diagnosis_results import (
     CAUSE_HEADER,
-    RollVerdict,
     accuracy_entry,
     cause_rows,
     finding_entry,
-    roll_sentences,
 )
 from expdesign.export.document import Block, Document, Figure, Gallery, Section, Table, filled, section
+from expdesign.export.roll_changes import RollVerdict, roll_sentences
 from expdesign.vessel.quantities import GAINS_AND_OFFSETS
 
 DRAWN_STRETCHES = 4  # stretches of data drawn in a diagnosis

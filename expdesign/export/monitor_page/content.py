@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from expdesign.export.files import finite, strict_json
-from expdesign.export.monitor_page.rolled import roll_entry, roll_sentences
+from expdesign.export.roll_changes import watch_entry, watch_sentences
 from expdesign.export.words import HOUR, counted, hours, percent, times, told_apart, when
 from expdesign.monitoring import (
     AS_LIKELY,
@@ -89,7 +89,7 @@ def size_in_words(content: MonitorContent, alarm: Alarm) -> str:
 
 def sentences(content: MonitorContent) -> tuple[str, ...]:
     """The verdict."""
-    return (*_sentences(content), *roll_sentences(content.roll, false_alarm_days=content.false_alarm_days))
+    return (*_sentences(content), *watch_sentences(content.roll, false_alarm_days=content.false_alarm_days))
 
 
 def _sentences(content: MonitorContent) -> Iterator[str]:
@@ -357,7 +357,7 @@ def monitor_json(content: MonitorContent, budget: list[dict[str, object]]) -> st
             },
             "history": [{"time_s": m.time_s, "statistic": m.statistic} for m in content.moments],
             "notes": content.notes,
-            **roll_entry(content.roll, false_alarm_days=content.false_alarm_days),
+            **watch_entry(content.roll, false_alarm_days=content.false_alarm_days),
         }
     )
 

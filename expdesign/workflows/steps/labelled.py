@@ -15,7 +15,7 @@ from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
 from expdesign.export import durations_json
 from expdesign.export.document import Table
-from expdesign.export.files import record_csv, recorded_dictionary_json, subsets_json
+from expdesign.export.files import finite, record_csv, recorded_dictionary_json, subsets_json
 from expdesign.information.recorded import BatchInformation, by_label, recorded_information
 from expdesign.progress import Progress, silent, within
 from expdesign.records import row_labels
@@ -190,15 +190,11 @@ def labelled_summary(found: Labelled) -> Mapping[str, object]:
         "labels": {item.name: found.labels.count(item.name) for item in found.dictionary},
         "pieces_of_design": {name: n for name, n in zip(design.problem.names, design.repeats, strict=True) if n},
         "log_det": design.log_det,
-        "log_det_guaranteed": _finite(design.certificate.guaranteed),
+        "log_det_guaranteed": finite(design.certificate.guaranteed),
         "efficiency_of_whole_pieces": design.efficiency_repeats,
-        "median_simulation_error": {item.design: _finite(float(np.median(item.norm))) for item in found.drawn},
+        "median_simulation_error": {item.design: finite(float(np.median(item.norm))) for item in found.drawn},
         "degenerate_models": {item.design: float(item.degenerate.mean()) for item in found.drawn},
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[Table, ...]:
