@@ -29,6 +29,8 @@ from expdesign.vessel import NUMPY, Vessel, VesselModel
 
 AHEAD_S = 30.0
 OFFSET_RAD, BIAS_RAD, GAIN, DELAY_S, CURRENT_MPS = np.radians(2.0), np.radians(3.0), 0.9, 1.0, 0.07
+LEAD_S = 1.5
+"""By which orders are made early to find a dead time below zero."""
 SCALE, ARM_M, LATE_S, RATE_RADPS = 0.95, 0.7, 0.7, 0.07
 CERTAIN = 5.0
 """Parameters that are so many standard deviations from zero may be taken out."""
@@ -78,7 +80,12 @@ def _rudder(change: Callable[[Array], Array]) -> Callable[[Batch, np.random.Gene
 
 def _early(batch: Batch, _rng: np.random.Generator) -> Batch:
     """Inputs as commands that actuators follow after the delay: recorded that much earlier than they act."""
-    count = round(DELAY_S / batch.sample_time_s)
+    return _ahead(batch, DELAY_S)
+
+
+def _ahead(batch: Batch, lead_s: float) -> Batch:
+    """Inputs recorded that much earlier than they act."""
+    count = round(lead_s / batch.sample_time_s)
     ahead = np.concatenate([batch.inputs[count:], np.repeat(batch.inputs[-1:], count, axis=0)])
     return replace(batch, inputs=ahead)
 
@@ -164,7 +171,7 @@ def _taken_out(vessel: Vessel, record: Record) -> tuple[Vessel, str, float] | No
     name = min((name for name, cost in costs.items() if cost >= LEAST_COST), key=costs.__getitem__, default=None)
     if name is None:
         return None
-    size = float(model.parameters[model.names.index(name)])
+    size = of_term(vessel, record, name)
     return replace(vessel, model=_without(model, name)), f"term:{known[name]}", size
 
 
@@ -244,7 +251,8 @@ def of_instruments(record: Record) -> dict[str, float]:
     way, pose, bow, moving = (np.concatenate(parts) for parts in zip(*map(_changes, record.batches), strict=True))
     columns = np.stack([pose[:, 0], bow, moving], axis=-1)
     scale, arm, late = np.linalg.lstsq(columns, way[:, 0], rcond=None)[0].real
-    gyro = float((pose[:, 1].real @ way[:, 1].real) / (pose[:, 1].real @ pose[:, 1].real))
+    turns = np.column_stack([pose[:, 1].real, np.ones(len(pose))])  # beside the zero of the gyro
+    gyro = float(np.linalg.lstsq(turns, way[:, 1].real, rcond=None)[0][0])
     return {"gyro": gyro - 1.0, "log": float(scale) - 1.0, "lever:forward": float(-arm), "late:u": float(-late)}
 
 
@@ -252,12 +260,26 @@ def of_model(vessel: Vessel, record: Record, effects: Iterable[str]) -> dict[str
     """What of these a model lacks on untouched records already, each by the likelihood alone.
 
     A ship needs some angle to sail straight, another one on another day. Least squares make a dead time: their
-    differences from sample to sample are those of a ship a little later than she is.
+    differences from sample to sample are those of a ship a little later than she is, or sooner. Less than no dead time
+    is no effect, so that it is found beside orders that are made early by `LEAD_S`, which no fault is.
     """
-    ship = extended_model(vessel, record)
-    windows = stable_windows(ship, record)
-    starts = fitted_start(ship, windows)
-    return {key: float(fit(ship, windows, (key,), starts=starts).value(key)) for key in effects}
+    found = {}
+    for key in effects:
+        sample_s = record.batches[0].sample_time_s
+        lead_s = round(LEAD_S / sample_s) * sample_s if key.startswith("delay:") else 0.0
+        data = replace(record, batches=tuple(_ahead(batch, lead_s) for batch in record.batches))
+        ship = extended_model(vessel, data).with_effects({key: lead_s} if lead_s else {})
+        windows = stable_windows(ship, data)
+        found[key] = float(fit(ship, windows, (key,), starts=fitted_start(ship, windows)).value(key)) - lead_s
+    return found
+
+
+def of_term(vessel: Vessel, record: Record, name: str) -> float:
+    """Size of one of the model's terms in these runs, by the likelihood alone, all else as it is in the model."""
+    ship = extended_model(vessel, record).with_known_parameters()
+    windows, key = stable_windows(ship, record), f"theta:{name}"
+    own = float(fit(ship, windows, (key,), starts=fitted_start(ship, windows)).value(key))
+    return own + dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))[name]
 
 
 def _changes(batch: Batch) -> tuple[Array, Array, Array, Array]:
