@@ -27,7 +27,7 @@ def test_averages_keep_means_and_are_cut_to_whole_samples() -> None:
 
 @pytest.mark.parametrize("late", [0, 1, 2])
 def test_the_truth_of_a_dead_time_may_be_below_zero(late: int) -> None:
-    """Orders recorded some samples after they act: the model responds later than the ship does, which no bound hides."""
+    """Orders recorded some samples after they act: the model responds later than the ship, which no bound hides."""
     record = hidden_record("barge", seed=5, batches=3, samples=200, step_s=0.5)
     batches = [
         replace(batch, inputs=np.concatenate([np.repeat(batch.inputs[:1], late, axis=0), batch.inputs])[: len(batch)])

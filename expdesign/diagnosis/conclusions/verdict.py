@@ -181,10 +181,11 @@ MORE_DATA = "Keep the vessel file; sail more runs, and measure wind and current,
 def _is_unfit(before: Accuracy, findings: Sequence[Finding], unexplained: Unexplained | None) -> bool:
     """Whether the model in use simulates some output worse than a constant, and what is found is no single cause of it.
 
-    It leaves much unexplained, or is that several parameters are wrong.
+    With what is found it does so still, or that is that several parameters are wrong.
     """
     several = any(item.cause == "parameters" and len(item.keys) > 1 for item in findings)
-    return bool((before.fit < 0.0).any()) and (several or unexplained is not None)
+    still = unexplained is not None and bool((unexplained.fit < 0.0).any())
+    return bool((before.fit < 0.0).any()) and (several or still)
 
 
 def _of_findings(findings: Sequence[Finding], unit: str, unexplained: Unexplained | None) -> list[str]:
