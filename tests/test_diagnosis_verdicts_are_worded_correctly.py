@@ -65,7 +65,7 @@ def test_a_headline_gives_the_few_numbers_of_a_cause_and_what_the_file_says():
 
 
 def test_an_unfit_model_is_said_to_be_unfit_before_causes_are_named():
-    """A cause beside which some output is still worse than a constant, or several wrong parameters; not a large fault."""
+    """A cause beside which an output is still worse than a constant, or several wrong parameters; no large fault."""
     bad = replace(BEFORE, fit=np.array([30.0, -20.0, -5.0]))
     rest = Unexplained(outputs=OUTPUTS, fit=np.array([40.0, 10.0, 20.0]), force_share=np.zeros(3), leads=())
     lost = replace(rest, fit=np.array([40.0, -10.0, 20.0]))
@@ -73,7 +73,8 @@ def test_an_unfit_model_is_said_to_be_unfit_before_causes_are_named():
     unfit = "The model is unfit for these runs, the fit is 30 % in surge, -20 % in sway and -5 % in yaw: "
     for found, before, left, first in (
         (finding("wind"), bad, lost, True), (several, bad, rest, True), (several, bad, None, True),
-        (finding("wind"), bad, rest, False), (finding("wind"), bad, None, False), (finding("wind"), BEFORE, rest, False),
+        (finding("wind"), bad, rest, False), (finding("wind"), bad, None, False),
+        (finding("wind"), BEFORE, rest, False),
     ):  # fmt: skip
         assert verdict([found], before, unexplained=left).startswith(unfit) is first
     told = verdict([finding("wind")], bad, unexplained=lost)
