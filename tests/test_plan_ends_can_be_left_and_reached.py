@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegWater
 from expdesign.plan.legs.water import check_ends, escapes
 from expdesign.plan.local_planner import local_planner
+from expdesign.plan.local_planner.arcs import ways_on
 from expdesign.simulation import CALM
 from helm_case import catamaran
 from plan_case import area, ship
@@ -79,3 +81,29 @@ def test_the_message_names_the_end_and_its_place_and_agile_ships_are_not_asked()
     local_planner(replace(narrow, ship=agile)).check_ends(into, out, narrow)
     with pytest.raises(NoPlan):
         local_planner(narrow).check_ends(into, out, narrow)
+
+
+def on_the_grid(sea: LegWater, pose: np.ndarray, *, backwards: bool = False) -> np.ndarray:
+    """(n,) whether a search for places sees a way on from poses (n, 3)."""
+    margin_m = CLEARANCE + VESSEL.beam_m / 2 + sea.field.cell_m
+    return ways_on(SimpleNamespace(ship=SHIP, field=sea.field, leg_margin_m=margin_m), pose, backwards=backwards)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_search_for_places_sees_a_way_on_nearly_wherever_there_is_one_and_nowhere_else(backwards):
+    rng = np.random.default_rng(5)
+    islands = [shapely.Point(*place).buffer(1.5 * RADIUS) for place in 8 * RADIUS * rng.uniform(-1, 1, (9, 2))]
+    sea = water(shapely.box(*(8 * RADIUS * np.array([-1, -1, 1, 1]))).difference(shapely.union_all(islands)))
+    pose = rng.uniform(-1, 1, (400, 3)) * (8 * RADIUS, 8 * RADIUS, np.pi)
+    pose = pose[[sea.holds(each[None]) for each in pose]]
+    exact = np.array([escapes(each, sea, backwards=backwards) for each in pose])
+    seen = on_the_grid(sea, pose, backwards=backwards)
+    assert 0.05 < np.mean(~exact) < 0.5
+    assert np.mean(exact[seen]) > 0.99
+    assert np.mean(seen[exact]) > 0.95
+
+
+def test_the_search_for_places_knows_where_a_slip_opens():
+    inside = np.array([[-2 * RADIUS, 0.0, heading] for heading in (0.0, np.pi)])
+    assert on_the_grid(slip(0.6 * RADIUS), inside).tolist() == [True, False]
+    assert on_the_grid(slip(0.6 * RADIUS), inside, backwards=True).tolist() == [False, True]

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from expdesign.plan import PlanSettings
+from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.control import APPROACH_HULLS
-from expdesign.plan.legs import LegTask
+from expdesign.plan.control.ships import capability
+from expdesign.plan.legs import LegTask, LegWater
 from expdesign.plan.legs.helm import _shortest_first, displaced, recover
+from expdesign.plan.values import WorkBudget
+from expdesign.scenario import load_area, load_vessel
 from expdesign.signals import Commands
-from expdesign.simulation import simulate, steady_ahead
+from expdesign.simulation import CALM, simulate, steady_ahead
 from helm_case import catamaran, coaster, open_water
 from plan_case import find_leg
 
@@ -161,3 +167,31 @@ def test_a_ship_that_goes_straight_needs_no_check(ship):
     ahead = steady_ahead(water.vessel, 0.8 * water.ship.transit_speed_mps)
     check = recover(np.r_[0.0, 0.0, 1.0, ahead.velocity], ahead.inputs[None], water, water.ship)
     assert len(check.commands) == 0
+
+
+BAY = Path(__file__).parents[2] / "shared" / "data" / "field" / "bay"
+
+
+@pytest.mark.thorough
+def test_a_leg_past_an_islet_is_found_though_the_fastest_one_in_its_corridor_cuts_across(tmp_path):
+    if not BAY.exists():
+        pytest.skip("the data beside the project are not here")
+    for name in ("bay.toml", "bay1.geojson"):
+        text = (BAY / name).read_text(encoding="utf-8").replace("bay0", "bay1")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    vessel, settings = load_vessel(BAY / "osv.toml"), PlanSettings()
+    sea = load_area(tmp_path / "bay.toml", draught_m=vessel.draught_m)
+    water = LegWater(
+        vessel=vessel,
+        environment=CALM,
+        ship=capability(vessel, settings),
+        area=sea,
+        clearance_m=settings.clearance_m,
+        field=clearance_field(sea, resolution_m=vessel.length_m / 8),
+    )
+    rest = np.zeros(len(vessel.limits))
+    start, end = np.array([-521.0, 366.0, 0.63, 0.0, 0.0, 0.0]), np.array([-67.0, -113.0, -2.43, 0.0, 0.0, 0.0])
+    task = LegTask(start=start, end=end, start_inputs=rest, end_inputs=rest, seed=1, budget=WorkBudget(most_s=40.0))
+    values = find_leg(task, water)
+    assert values is not None
+    assert water.holds(water.states(start, values)[:, :3])

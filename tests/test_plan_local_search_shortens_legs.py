@@ -38,19 +38,26 @@ def space():
 
 def test_legs_take_less_time_and_runs_and_paths_stay_in_the_water(space):
     ends = Departure(pose=START)
-    found, taken_s = polished(space, ends, [0, 0, 0], POSES)
-    assert taken_s == measured_s(space, [0, 0, 0], found, ends) < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
-    assert runs_clear(space, np.zeros(3, dtype=int), found).all()
-    assert polished(space, ends, [0, 0, 0], found)[1] == pytest.approx(taken_s, abs=0.5)
+    found = polished(space, ends, [0, 0, 0], POSES)
+    assert (
+        found.seconds
+        == measured_s(space, [0, 0, 0], found.poses, ends)
+        < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
+    )
+    assert runs_clear(space, np.zeros(3, dtype=int), found.poses).all()
+    assert polished(space, ends, [0, 0, 0], found.poses).seconds == pytest.approx(found.seconds, abs=0.5)
 
 
 def test_no_plan_takes_less_than_its_path_at_full_speed(space):
     ends = Departure(pose=START)
-    found, taken_s = polished(space, ends, [0, 0, 0], POSES)
-    froms, tos = np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found)]), np.vstack([found, space.goal])
+    found = polished(space, ends, [0, 0, 0], POSES)
+    froms, tos = (
+        np.vstack([START, run_ends(space, np.zeros(3, dtype=int), found.poses)]),
+        np.vstack([found.poses, space.goal]),
+    )
     ways = [space.goal_distance.graph.shortest(a[:2], b[:2]) for a, b in zip(froms, tos, strict=True)]
     way_m = sum(polyline_length(way) for way in ways)
-    assert taken_s >= way_m / space.planner.times.speed_mps
+    assert found.seconds >= way_m / space.planner.times.speed_mps
 
 
 def test_the_work_of_a_sweep_does_not_grow_with_the_cube_of_the_runs():
@@ -65,9 +72,9 @@ def test_the_work_of_a_sweep_does_not_grow_with_the_cube_of_the_runs():
 def test_short_blocks_alone_shorten_legs_of_many_runs(space, monkeypatch):
     ends = Departure(pose=START)
     monkeypatch.setattr(local_search, "MOST_POSES", 3)
-    found, taken_s = polished(space, ends, [0, 0, 0], POSES)
-    assert runs_clear(space, np.zeros(3, dtype=int), found).all()
-    assert taken_s < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
+    found = polished(space, ends, [0, 0, 0], POSES)
+    assert runs_clear(space, np.zeros(3, dtype=int), found.poses).all()
+    assert found.seconds < measured_s(space, [0, 0, 0], POSES, ends) - 5.0
 
 
 def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
@@ -79,7 +86,7 @@ def test_a_mirrored_plan_in_mirrored_water_takes_as_long():
     for water, sign in zip(waters, (np.ones(3), MIRROR), strict=True):
         space = placed_in(water, np.array([0.0, 400.0, 0.0]) * sign)
         ends = Departure(pose=START * sign)
-        totals.append(polished(space, ends, [0, 0, 0], POSES * sign)[1])
+        totals.append(polished(space, ends, [0, 0, 0], POSES * sign).seconds)
     assert totals[0] == pytest.approx(totals[1], rel=0.01)
 
 

@@ -15,7 +15,7 @@ from expdesign.plan.legs import LegTask
 from expdesign.plan.local_planner import TransitionTrials
 from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.problem import PlanProblem
-from expdesign.plan.solve import plan_trial
+from expdesign.plan.solve import draft_trial, plan_trial
 from expdesign.plan.values import WorkBudget
 from expdesign.simulation import CALM
 from plan_case import acceleration, area, at_rest, find_leg, leg_water, primitive, ship, space_of
@@ -84,3 +84,33 @@ def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_by_a_cloc
     )
     with pytest.raises(NoPlan, match=f"time_budget_s = 20, {tries} places were tried: no leg leads to 'go' near 60"):
         plan_trial(problem)
+
+
+@pytest.mark.thorough
+def test_a_run_from_which_no_leg_leads_on_is_placed_elsewhere(monkeypatch):
+    found, begins, trapped = AgilePlanner.leg, [], []
+
+    def with_a_trap(planner, asked: LegTask, water):
+        """Legs, but none from where the run first placed ends."""
+        if begins and not trapped and np.any(asked.start != begins[0]):
+            trapped.append(asked.start[:2])
+        begins.append(asked.start)
+        from_trap = trapped and np.hypot(*(asked.start[:2] - trapped[0])) < 1.0
+        return None if from_trap else found(planner, asked, water)
+
+    monkeypatch.setattr(AgilePlanner, "leg", with_a_trap)
+    vessel = ship()
+    go = acceleration(vessel)
+    problem = PlanProblem(
+        vessel=vessel,
+        area=area(shapely.box(-300, -300, 300, 300)),
+        environment=CALM,
+        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0),
+        primitives=(go,),
+        design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(3,)),
+        start=np.zeros(3),
+        goal=np.array([200.0, 0.0, 0.0]),
+    )
+    sailed = draft_trial(problem).sailed
+    assert trapped
+    assert [leg.name for leg in sailed.legs if leg.kind == "primitive"] == [go.name] * 3

@@ -54,8 +54,8 @@ TURNS_DEG: tuple[float, ...] = tuple(15.0 * count for count in range(1, 13))
 CLEARANCE_SHARES = (1.0, 0.75, 0.5, 0.0)  # of the largest clearance with which every run has a place, tried as remedies
 SAILED_SHARES = (0.5, 0.0)  # of the clearance asked for, tried as remedies where legs fail
 MOST_PLANS = 2  # plans made to check remedies
-# counted work of looking for remedies where legs or drawn trials fail, in that of the refused plan; half of planning is
-# not counted, and is remembered
+# counted work of looking for remedies where legs or drawn trials fail, in that of the refused plan: with that plan no
+# more than the three plans that a trial may take
 REMEDY_WORK = 1.75
 # tried as remedies of a refusal, the highest first
 LOWER_CONFIDENCES = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)

@@ -30,7 +30,7 @@ from expdesign.plan.values import SailedTrial, WorkBudget
 from expdesign.progress import silent
 
 MOST_SEARCHES = 8  # narrow searches for places, each with a quarter of the partial plans, to check remedies
-REMEDY_BUDGET = 0.1  # share of the time budget that such a plan may spend on failures
+REMEDY_BUDGET = 0.3  # share of the time budget that such a plan may spend on failures
 MOST_LEFT_OUT = 8  # designs tried as remedies, each without the runs that had no place in the one before
 
 

@@ -99,6 +99,7 @@ class Timeline:
         return SailedTrial(commands=commands, trajectory=track, legs=legs, standing=self.begin_inputs)
 
 
+TRIES_FROM_A_RUN = 2  # runs tried after one before it is placed elsewhere itself
 FAILURE_S = 2.0  # least cost of a failed placement [s]
 CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is stuck ends, whatever its counted work
 
@@ -187,7 +188,7 @@ def sail_all(
     Args:
         room: that legs and runs are planned in.
         stated: the water that runs keep to, with the clearance asked for.
-        budget: counts what legs cost.
+        budget: counts what places and legs cost.
         known: takes the legs that are found, for `sail_placed`.
 
     Raises:
@@ -240,25 +241,28 @@ def _sailed(voyage: _Voyage, space: SearchSpace, progress: Progress) -> SailedTr
     problem, budget = voyage.problem, voyage.budget
     left, stuck, proof = problem.repeats, "", None
     phases, stretches = phases_of(problem, space.planner, progress), sum(left.values()) + 1
-    failures = _Failures(problem.settings.time_budget_s)
+    failures, tried_here = _Failures(problem.settings.time_budget_s), 0
     while True:
         phases.placing(*failures.placing())
         told = silent if failures.tries else phases.placing  # how long another try takes is not known
         placed = _placed(problem.settings, space, left, voyage.line, stuck, told)
+        budget.spent_s += placed.work_s
         proof, spent_s = proof or placed.lattice, budget.spent_s
         legs = voyage.legs_ahead(placed.runs)
         for placement in placed.runs:
             phases.sailing(f"sailing {placement.primitive}", 1.0 - (sum(left.values()) + 1) / stretches)
             spent_s = budget.spent_s
             if stuck := voyage.sail_run(placement, next(legs)):
-                space, failed = space.refusing(voyage.line.last, placement), placement
+                space, failed, tried_here = space.refusing(voyage.line.last, placement), placement, tried_here + 1
                 break
-            left[placement.primitive] -= 1
+            left[placement.primitive], tried_here = left[placement.primitive] - 1, 0
         else:
             phases.sailing("sailing to the goal", 1.0 - 1 / stretches)
             if voyage.sail_home(next(legs)):
                 return replace(voyage.sailed, lattice=proof and replace(proof, refused=failures.tries))
-            failed, stuck = voyage.undo_run(), "no leg leads from the last run to the goal"
+            stuck, failed = "no leg leads from the last run to the goal", None
+        if failed is None or (tried_here == TRIES_FROM_A_RUN and voyage.placed):  # the run before leaves no way on
+            failed, tried_here = voyage.undo_run(), 0
             space = space.refusing(voyage.line.last, failed)
             left[failed.primitive] += 1
         failures.count(placed.work_s + budget.spent_s - spent_s, stuck, failed)

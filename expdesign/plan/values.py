@@ -16,6 +16,8 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array, seal
 
 ITERATION_S = 2e-4  # one iteration of the optimiser for each sample of a leg, on a machine of 2020 [s]
+SEARCH_S = 1.0  # one search for a path round obstacles, which mostly ends without one
+SUCCESSOR_S, MOVE_S = 1e-6, 1e-3  # one placement looked at, and one block of runs that is moved to better places
 SAMPLE_S = 2.5e-3  # one sample of some hundred drawn ships there [s]
 
 
@@ -39,6 +41,14 @@ class WorkBudget:
     def optimised(self, iterations: int, samples: int) -> None:
         """Count iterations of the optimiser on a leg of some samples."""
         self.spent_s += ITERATION_S * iterations * samples
+
+    def searched(self) -> None:
+        """Count a search for a path round obstacles."""
+        self.spent_s += SEARCH_S
+
+    def placed(self, successors: int, moves: int = 0) -> None:
+        """Count placements of runs looked at, and blocks of runs that were moved."""
+        self.spent_s += SUCCESSOR_S * successors + MOVE_S * moves
 
     def sailed(self, samples: int) -> None:
         """Count samples of drawn trials."""

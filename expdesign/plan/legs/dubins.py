@@ -45,6 +45,7 @@ def find_path(task: LegTask, water: LegWater) -> LegPath | None:
     if not all(water.holds(end) for end in (direct[:1], direct[-1:])):  # then no path does
         return None
     for attempt, reach in enumerate(SEARCH_BOXES):
+        task.budget.searched()
         box = reach * (radius + water.vessel.length_m)
         path = search_dubins(
             task.start[:3],

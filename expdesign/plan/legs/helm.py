@@ -47,6 +47,9 @@ STRAIGHTS = (
     (0.5, 0.5, 0.4),
     (0.0, 0.0, 0.1),
 )
+# shares of the room beside a path that legs may use, the next where a leg leaves the water: nodes slip along a path, to
+# where there is less room
+ROOM_SHARES = (1.0, 0.25)
 HELM_NODE = 0.25  # time between nodes of helm-steered legs, in that of a hull length at transit speed
 EASED_HULLS = 1.0  # hull lengths over which their first guess eases into turns
 STRAIGHT_OFF_HULLS = 1.0  # straight before the first turn, as the helm takes that long to act
@@ -189,26 +192,30 @@ def helm_leg(task: LegTask, water: LegWater, ship: HelmShip) -> FoundLeg | None:
         path = _path(before_run, water, straights)
         if path is None:
             continue
-        values = _along(path.points, before_run, water, ship, check)
-        if values is None:
-            continue
-        whole = np.concatenate([values, tail + (values[-1] - task.end_inputs)])
         turned = whole_turns(path.points[-1, 2] - task.end[2])
         end = np.r_[task.end[:2], task.end[2] + turned, task.end[3:]]
-        if acceptable(task.start, end, water, whole, task.past):
-            return FoundLeg(commands=whole, source=path.source)
+        for share in ROOM_SHARES:
+            values = _along(path.points, before_run, water, ship, check, share)
+            if values is None:
+                break
+            whole = np.concatenate([values, tail + (values[-1] - task.end_inputs)])
+            if acceptable(task.start, end, water, whole, task.past):
+                return FoundLeg(commands=whole, source=path.source)
     return None
 
 
-def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: Recovery) -> Array | None:
-    """Commands (k, m) along a path (j, 3): optimised, but for a long straight, on which they are constant."""
+def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, share: float) -> Array | None:
+    """Commands (k, m) along a path (j, 3): optimised, but for a long straight, on which they are constant.
+
+    None where none are found in a share of the room beside the path.
+    """
     braking_m = ship.stopping_m if _stops(task, water) else 0.0
     transit = steady_transit(path, braking_m, water, ship)
     if transit is None:
-        return solve_leg(_problem(task, water, ship, check, path))
+        return solve_leg(_problem(task, water, ship, check, path, share))
     steady = transit.commands[0]
     before = solve_leg(
-        _problem(replace(task, end=transit.states[0], end_inputs=steady), water, ship, check, transit.to)
+        _problem(replace(task, end=transit.states[0], end_inputs=steady), water, ship, check, transit.to, share)
     )
     if before is None:
         return None
@@ -216,7 +223,7 @@ def _along(path: Array, task: LegTask, water: LegWater, ship: HelmShip, check: R
     past = water.remembered(np.concatenate([task.past, before, held]))
     rest = replace(task, start=transit.states[-1], start_inputs=past[-1], before=past)
     at_once = Recovery(states=rest.start[None], commands=np.empty((0, len(steady))))
-    after = solve_leg(_problem(rest, water, ship, at_once, transit.on))
+    after = solve_leg(_problem(rest, water, ship, at_once, transit.on, share))
     return None if after is None else np.concatenate([before, held, after])
 
 
@@ -322,11 +329,12 @@ def _straight(pose: Array, length_m: float, hull_m: float) -> Array:
     return np.stack([_moved(pose, float(ahead)) for ahead in along])
 
 
-def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, path: Array) -> LegProblem:
+def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, path: Array, share: float) -> LegProblem:
+    """The leg along a path (j, 3) in a share of the room beside it."""
     states, inputs, places, duration_s = _guess(task, water, ship, check, path)
     turned = whole_turns(states[-1, 2] - task.end[2])
     inputs[0], inputs[-1] = task.start_inputs, nearest_turns(water.vessel, task.end_inputs, inputs[-1])
-    return leg_problem(
+    wide = leg_problem(
         task,
         water,
         end=np.r_[task.end[:2], task.end[2] + turned, task.end[3:]],
@@ -337,6 +345,7 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
         turning_rate_radps=ship.yaw_rate_radps,
         node_s=HELM_NODE * water.vessel.length_m / ship.transit_speed_mps,
     )
+    return replace(wide, room_port_m=share * wide.room_port_m, room_starboard_m=share * wide.room_starboard_m)
 
 
 def _guess(

@@ -95,6 +95,10 @@ class AgilePlanner:
             found.append(self._on_path(space, plans, able, q, points))
         return found
 
+    def ways_on(self, space: SearchSpace, primitive: np.ndarray, start: Array, end: Array) -> np.ndarray:
+        """(n,) always: such ships turn on the spot."""
+        return np.ones(len(start), dtype=bool)
+
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs straight on, or along the path with bends [s]."""
         rule, more_s = self.times, space.more_s(ends.before, ends.after)

@@ -18,7 +18,15 @@ from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import polyline_length
 from expdesign.plan.control import DubinsShip
 from expdesign.plan.legs import FoundLeg, LegTask, LegWater, curved_leg, dubins_curve
-from expdesign.plan.local_planner.arcs import Departures, arc_successors, between, moved, path_points, path_successors
+from expdesign.plan.local_planner.arcs import (
+    Departures,
+    arc_successors,
+    between,
+    moved,
+    path_points,
+    path_successors,
+    ways_on,
+)
 from expdesign.plan.local_planner.protocol import LegEnds, Pair, PartialPlans, SearchSpace, Successors, TransitionTrials
 from expdesign.values import Array
 
@@ -91,6 +99,12 @@ class DubinsPlanner:
             departures = Departures(pose=plans.pose, wait_s=change_s)
             found.append(arc_successors(space, departures, able, q, run_up_m))
             found.append(path_successors(space, departures, able, q, points, turning_radius_m=radius_m))
+        return found
+
+    def ways_on(self, space: SearchSpace, primitive: np.ndarray, start: Array, end: Array) -> np.ndarray:
+        """(n,) whether arcs lead to the run-ups of runs, and on from their ends."""
+        found = ways_on(space, moved(start, np.array([[-space.hull_m, 0.0, 0.0]])), backwards=True)
+        found[found] = ways_on(space, end[found])
         return found
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:

@@ -35,6 +35,7 @@ from expdesign.plan.local_planner.arcs import (
     moved,
     path_points,
     path_successors,
+    ways_on,
 )
 from expdesign.plan.local_planner.dubins import PATH_STRETCHES, dubins_m
 from expdesign.plan.local_planner.protocol import (
@@ -106,7 +107,7 @@ class HelmTimes:
             exit_mps, entry_mps: speeds at the ends.
             current_to: of the water, with which a leg drifts.
         """
-        straight_m = self._straight_m(entry_mps)
+        straight_m = self.straight_m(entry_mps)
         begins, ends = moved(froms, recovery[None, :3]), moved(tos, np.array([[-straight_m, 0.0, 0.0]]))
         along_m = float(np.hypot(*recovery[:2])) + straight_m
         # legs are first guessed over ground: no turn all round
@@ -119,7 +120,7 @@ class HelmTimes:
             leg_s = self.seconds(length_m + along_m, exit_mps, entry_mps)
         return leg_s
 
-    def _straight_m(self, entry_mps: float) -> float:
+    def straight_m(self, entry_mps: float) -> float:
         """Straight before a run, with room to settle, or before a stop."""
         return self.run_up_m if entry_mps > STOPPED_SHARE * self.speed_mps else self.steady_m / 2
 
@@ -242,6 +243,13 @@ class HelmPlanner:
             on_path_s = self.times.seconds(paths_m[where], exit_mps, entry_mps)
             leg_s[where] = np.maximum(open_s, np.where(np.isnan(found.turn[where]), on_path_s, 0.0))
         return replace(found, leg_s=leg_s)
+
+    def ways_on(self, space: SearchSpace, primitive: np.ndarray, start: Array, end: Array) -> np.ndarray:
+        """(n,) whether arcs lead to the run-ups of runs, and on from where the ship has recovered from them."""
+        back_m = np.array([-self.times.straight_m(run.entry_mps) for run in space.footprints])[primitive]
+        found = ways_on(space, moved(start, back_m[:, None] * (1.0, 0.0, 0.0)), backwards=True)
+        found[found] = ways_on(space, moved(end[found], self.recoveries[primitive[found], :3]))
+        return found
 
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs in open water, or along the path with bends where that takes longer [s]."""

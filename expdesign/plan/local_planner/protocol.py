@@ -272,6 +272,9 @@ class LocalPlanner(Protocol):
     def successors(self, space: SearchSpace, plans: PartialPlans) -> list[Successors]:
         """Placements of every run that is left after each partial plan, each set with one run."""
 
+    def ways_on(self, space: SearchSpace, primitive: np.ndarray, start: Array, end: Array) -> np.ndarray:
+        """(n,) whether the water has a way to runs (n,) from poses (n, 3) to poses (n, 3), and a way on after them."""
+
     def leg_s(self, space: SearchSpace, ends: LegEnds, froms: Array, tos: Array, bends: Array) -> Array:
         """(n,) time of legs between poses (n or 1, 3) along a path with bends (b, 2) [s]."""
 

@@ -18,7 +18,7 @@ from expdesign.errors import NoRoom
 from expdesign.plan.bounds import cheapest_orders, place_values
 from expdesign.plan.local_planner import Departure, PartialPlans, SearchSpace, Successors
 from expdesign.plan.search.local_search import EQUAL, clear_successors, polished
-from expdesign.plan.values import Placement
+from expdesign.plan.values import Placement, WorkBudget
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.values import Array
@@ -72,6 +72,7 @@ def place_runs(
     *,
     width: int = BEAM_WIDTH,
     orders: int = POLISHED_ORDERS,
+    budget: WorkBudget | None = None,
     progress: Progress = silent,
 ) -> tuple[Placement, ...]:
     """Start poses of all runs in the order in which they are to be done.
@@ -82,6 +83,7 @@ def place_runs(
         departure: where the search begins.
         width: partial plans kept.
         orders: of runs, of which the best plan is polished; 0 for none.
+        budget: counts the work.
         progress: told each run that is placed, and each order that is polished.
 
     Raises:
@@ -95,11 +97,12 @@ def place_runs(
         cost_s=np.zeros(1),
         history=((),),
     )
+    budget = budget or WorkBudget()
     ahead = orders_ahead(space, repeats, made_good=path_exceeds_displacement(space, repeats, departure.pose))
     count = int(np.sum(repeats))
     for number in range(count):
         progress(f"placing run {number + 1} of {count}", PLACING_SHARE * number / count)
-        beam = _advance(space, beam, width, ahead)
+        beam = _advance(space, beam, width, ahead, budget)
     final_s = np.round(beam.cost_s + space.planner.to_goal_s(space, beam), EQUAL)
     best = int(np.argmin(final_s))
     if not np.isfinite(final_s[best]):
@@ -113,8 +116,9 @@ def place_runs(
             progress(
                 "moving runs closer to each other", 1.0 - (1.0 - PLACING_SHARE) * (1.0 - len(better) / len(chains))
             )
-        best = int(np.argmin([round(seconds, EQUAL) for _, seconds in better]))
-        runs, poses = chains[best][0], better[best][0]
+        budget.placed(0, sum(found.moves for found in better))
+        best = int(np.argmin([round(found.seconds, EQUAL) for found in better]))
+        runs, poses = chains[best][0], better[best].poses
     names = [item.name for item in space.footprints]
     return tuple(Placement(primitive=names[q], pose=pose) for q, pose in zip(runs, poses, strict=True))
 
@@ -137,9 +141,12 @@ def _chain(beam: PartialPlans, index: int) -> tuple[list[int], Array]:
     return [q for q, _ in history], np.array([pose for _, pose in history]).reshape(-1, 3)
 
 
-def _advance(space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAhead) -> PartialPlans:
+def _advance(
+    space: SearchSpace, beam: PartialPlans, width: int, ahead: OrdersAhead, budget: WorkBudget
+) -> PartialPlans:
     """The best partial plans with one more run each."""
     found = space.planner.successors(space, beam)
+    budget.placed(sum(map(len, found)))
     left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
     chosen = _select(space, found, left, _totals_s(space, beam, found, left, ahead), width)
     if not len(chosen):

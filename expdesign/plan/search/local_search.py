@@ -17,7 +17,7 @@ import shapely
 from expdesign.conventions import wrap_angle
 from expdesign.plan.chart import sight_lines
 from expdesign.plan.local_planner import Departure, LegEnds, Pair, RunSpace, SearchSpace, Successors, arc_end, run_ends
-from expdesign.values import Array
+from expdesign.values import Array, seal
 
 MANY_RUNS, SPARSE_DISCS = 50, 8  # of more runs than this, every so manieth disc is looked at before all of them
 SHIFT_HULLS = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)  # steps of the local search, and with each a turn
@@ -34,7 +34,7 @@ LEAST_GAIN_S = 0.05  # for which a block is moved
 
 
 def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
-    """(n,) whether legs, runs and their ends keep their margins on the grid."""
+    """(n,) whether legs, runs and their ends keep their margins on the grid, with a way to each run and on after it."""
     start, turn = found.start, found.turn
     clear: np.ndarray = _ends_clear(space, start, found.end) & ~space.is_refused(start)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
@@ -44,6 +44,7 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     left = np.flatnonzero(clear)
     left = left[~_surely_clear(space, found.primitive[left], start[left])]
     clear[left] = _hulls_clear(space, found.primitive[left], start[left])
+    clear[clear] = space.planner.ways_on(space, found.primitive[clear], start[clear], found.end[clear])
     return clear
 
 
@@ -132,8 +133,20 @@ class Chain:
         return tuple(part.tobytes() for part in near)
 
 
-def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array) -> tuple[Array, float]:
-    """(n, 3) better poses for the same runs in the same order, and the time of all legs by the rule [s].
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Polished:
+    """Better poses for the same runs in the same order."""
+
+    poses: Array  # (n, 3) where runs begin
+    seconds: float  # time of all legs by the rule
+    moves: int  # blocks of runs for which better places were sought
+
+    def __post_init__(self) -> None:
+        seal(self, poses="n 3")
+
+
+def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], poses: Array) -> Polished:
+    """Runs moved and turned while that makes legs shorter.
 
     Args:
         space: the primitives and the water; with a rule for the time of legs.
@@ -146,19 +159,20 @@ def polished(space: SearchSpace, departure: Departure, runs: Sequence[int], pose
     most = _longest_block(len(runs))
     blocks = [(i, j) for i in range(len(runs)) for j in range(i, min(i + most, len(runs)))]
     in_vain: dict[tuple[int, int], tuple[bytes, ...]] = {}
+    moves = 0
     for _ in range(SWEEPS):
         before = chain
         for i, j in blocks:
             if in_vain.get((i, j)) == (around := chain.around(i, j)):
                 continue
-            moved = legs.moved(chain, i, j)
+            moved, moves = legs.moved(chain, i, j), moves + 1
             if moved is chain:
                 in_vain[i, j] = around
             chain = moved
         if chain is before:
             break
         chain = legs.measured(chain.runs, chain.poses)
-    return chain.poses, measured_s(space, runs, chain.poses, departure)
+    return Polished(poses=chain.poses, seconds=measured_s(space, runs, chain.poses, departure), moves=moves)
 
 
 def _longest_block(runs: int) -> int:
@@ -254,7 +268,7 @@ class _Legs:
         return self.space.pair(chain[k], chain[k + 1])
 
     def _clear(self, runs: np.ndarray, blocks: Array, before: Array, after: Array) -> np.ndarray:
-        """(n,) whether runs (m,) at blocks (n, m, 3) have room, and water is between them and two places (2,)."""
+        """(n,) whether runs (m,) at blocks (n, m, 3) have room and ways on, and water between them and two places."""
         primitive, poses = np.tile(runs, len(blocks)), blocks.reshape(-1, 3)
         clear = np.asarray(runs_clear(self.space, primitive, poses).reshape(len(blocks), -1).all(axis=1))
         some = blocks[clear]
@@ -266,6 +280,10 @@ class _Legs:
         )
         seen = shapely.covers(self.space.goal_distance.graph.water, lines)
         clear[clear] = seen.reshape(len(some), len(runs) + 1).all(axis=1)
+        some = blocks[clear].reshape(-1, 3)
+        primitive = primitive[: len(some)]
+        on = self.space.planner.ways_on(self.space, primitive, some, run_ends(self.space, primitive, some))
+        clear[clear] = on.reshape(-1, len(runs)).all(axis=1)
         return clear
 
     def _blocks(self, chain: Chain, i: int, j: int) -> Array:

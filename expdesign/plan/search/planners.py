@@ -11,7 +11,7 @@ from expdesign.plan.local_planner import Departure, SearchSpace
 from expdesign.plan.search.beam import place_runs
 from expdesign.plan.search.lattice import search_lattice
 from expdesign.plan.search.lattice_moves import Lattice, build_lattice
-from expdesign.plan.values import LatticeProof, Placement, Placements, PlanSettings
+from expdesign.plan.values import LatticeProof, Placement, Placements, PlanSettings, WorkBudget
 from expdesign.progress import Progress, silent
 
 LATTICE_RADII = 1.1  # default distance between cells of the lattice, in turning radii
@@ -37,7 +37,9 @@ def placed_runs(
         NoPlan: some run does not fit anywhere the search can reach, or no path leads to the goal.
     """
     if settings.planner == "beam":
-        return Placements(runs=place_runs(space, repeats, departure, progress=progress))
+        budget = WorkBudget()
+        runs = place_runs(space, repeats, departure, budget=budget, progress=progress)
+        return Placements(runs=runs, work_s=budget.spent_s)
     return placed_on_lattice(space, repeats, departure, spacing_m=settings.lattice_spacing_m, progress=progress)
 
 
