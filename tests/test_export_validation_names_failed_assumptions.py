@@ -3,12 +3,14 @@
 import re
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from design_case import example_dictionary, vessel
 from expdesign.estimation.methods import METHODS
+from expdesign.export import estimate_page
 from expdesign.export.validation_page import ValidationContent, biased, judgements, off_theory, surely_biased
 from expdesign.rehearsal.validation import Rehearsal, Validated, validate
 from expdesign.simulation import CALM, Environment
@@ -108,6 +110,13 @@ def test_methods_that_are_advised_are_methods(method: str, environment: Environm
     assert set(advised) <= {item.name for item in METHODS}
     assert "; --method  " not in said
     assert ";  also" not in said
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_runs_are_said_to_be_simulated_in_the_measured_wind_where_a_method_uses_it(method, monkeypatch):
+    monkeypatch.setattr(estimate_page, "fit_table", lambda found: (("Run",), []))
+    found = SimpleNamespace(methods=(SimpleNamespace(method=method),))
+    assert ("in the measured wind" in estimate_page._fit(found).blocks[0]) is method.weather.wind
 
 
 def test_moduli_are_named_with_their_primitives():

@@ -25,7 +25,6 @@ from expdesign.vessel import VesselModel
 
 # Estimates with their diagnostics.
 
-INSTRUMENTAL = "iv"
 """How the names of methods with instruments begin."""
 
 
@@ -61,7 +60,7 @@ class Assessed:
     @property
     def uses_instruments(self) -> bool:
         """Whether the method is one of instrumental variables."""
-        return self.method.name.startswith(INSTRUMENTAL)
+        return self.method.solver == "iv"
 
     @property
     def stable(self) -> bool:

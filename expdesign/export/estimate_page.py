@@ -235,7 +235,7 @@ def _choice(content: EstimateContent) -> Iterator[Section]:
 
 
 def _fit(found: Assessment) -> Section:
-    winds = found.best.method.name.endswith(("wind", "air"))
+    winds = any(item.method.weather.wind for item in found.methods)
     still = "in still water" + ", and, for methods with wind, in the measured wind" * winds
     return section(
         "Fit of the simulated output",

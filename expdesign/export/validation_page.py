@@ -161,7 +161,7 @@ def _assumptions(content: ValidationContent) -> Iterator[str]:
 
 def _of_motion(content: ValidationContent) -> Iterator[str]:
     rehearsal = content.rehearsal
-    if rehearsal.method.startswith("ls"):
+    if method_named(rehearsal.method).solver == "ls":
         yield (
             "the regressors have no noise. Sensor noise biases least squares. The prediction is for instrumental "
             "variables."
@@ -181,34 +181,32 @@ def _of_motion(content: ValidationContent) -> Iterator[str]:
 
 
 def _of_weather(rehearsal: Rehearsal) -> Iterator[str]:
-    weather, method = rehearsal.environment, rehearsal.method
+    weather, method = rehearsal.environment, method_named(rehearsal.method)
     current = weather.current_to.any() or weather.current_std_mps > 0
     wind = weather.wind_to.any() or weather.wind_std_mps > 0
-    solver, _, allows = method.partition("-")
+    solver, allows = method.solver, method.weather.suffix
     if (current or wind) and not allows:
         steady = f", {solver}-current for a steady current" if current and _there(solver, "current") else ""
         yield (
-            f"no current and wind. Method {method} removes only a constant; "
+            f"no current and wind. Method {method.name} removes only a constant; "
             f"--method {_there(solver, 'air', 'wind', 'augmented')} accounts for weather{steady}."
         )
     if current and allows == "air":
         also = _there(solver, "wind", "air-current")
-        yield f"no current. Method {method} accounts for measured wind only; {also} also for current."
+        yield f"no current. Method {method.name} accounts for measured wind only; {also} also for current."
     if wind and allows == "current":
         also = _there(solver, "air-current")
-        yield f"no wind. Method {method} accounts for a steady current only; {also} also for measured wind."
+        yield f"no wind. Method {method.name} accounts for a steady current only; {also} also for measured wind."
     if (current and allows == "no-current") or (wind and allows == "no-wind"):
-        yield f"{allows.replace('-', ' ')}. Method {method} leaves it out; {solver}-augmented accounts for both."
+        yield f"{allows.replace('-', ' ')}. Method {method.name} leaves it out; {solver}-augmented accounts for both."
     known = {"wind": "the current", "no-wind": "the current", "no-current": "the wind", "augmented": "current and wind"}
     if allows in known:
         what = known[allows]
         yield (
-            f"{what} known. Method {method} estimates additional parameters for it; the prediction does not include "
-            "the "
-            'loss of accuracy. Design for it with predictor = "'
-            f'{allows}" in the scenario.'
+            f"{what} known. Method {method.name} estimates additional parameters for it; the prediction does not "
+            f'include the loss of accuracy. Design for it with predictor = "{method.weather.name}" in the scenario.'
         )
-    drawn = weather.current_std_mps > 0 and not method_named(method).weather.steady
+    drawn = weather.current_std_mps > 0 and not method.weather.steady
     if drawn or weather.wind_std_mps > 0:
         yield "every trial has the mean weather of the forecast. Here the weather of each trial is random."
 
