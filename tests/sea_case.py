@@ -38,6 +38,42 @@ class Ship:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Wind:
+    """A wind that nobody measures, over a ship of 50 m: in a beam wind of 10 m/s she carries 5 degrees of rudder."""
+
+    mean_mps: float = 0.0
+    gust_mps: float = 0.0  # standard deviation of gusts, which last `gust_s`
+    gust_s: float = 60.0
+    later_mps: float = 0.0  # by which the mean rises in `over_s` from `since_s` of a voyage on
+    turn_rad: float = 0.0  # by which it turns meanwhile
+    over_s: float = HOUR
+    squall_mps: float = 0.0  # by which it rises at once then, for ten minutes
+
+    def drawn(self, seconds: int, rng: np.random.Generator, hz: int, since_s: int) -> np.ndarray:
+        """(s, 2) towards north and east [m/s], from a direction of chance."""
+        after_s = np.arange(seconds * hz) / hz - since_s
+        share = np.clip(after_s / self.over_s, 0.0, 1.0)
+        speed = self.mean_mps + self.later_mps * share + self.squall_mps * ((after_s >= 0) & (after_s < 600))
+        gusts = self.gust_mps * np.stack([_slow(seconds * hz, rng, hz, self.gust_s) for _ in range(2)], axis=-1)
+        angle = rng.uniform(-np.pi, np.pi) + self.turn_rad * share
+        return np.asarray(speed[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1) + gusts)
+
+
+WIND_FORCES = np.array([1e-4, 4.5e-4, 7e-6])
+"""Accelerations of surge, sway and yaw by the square of a wind on the bow, and from abeam [1/m, 1/m, rad/m2]."""
+FRESH = Wind(mean_mps=4.0, gust_mps=0.7)
+WINDS = {
+    "as in the reference": FRESH,
+    "twice as strong": Wind(mean_mps=8.0, gust_mps=1.4),
+    "rising by 5 m/s in an hour": Wind(mean_mps=4.0, gust_mps=0.7, later_mps=5.0),
+    "turning by 120 degrees in 20 min": Wind(mean_mps=4.0, gust_mps=0.7, turn_rad=2.1, over_s=1200),
+    "a squall of 8 m/s more": Wind(mean_mps=4.0, gust_mps=0.7, squall_mps=8.0),
+    "gusts three times as strong": Wind(mean_mps=4.0, gust_mps=2.1),
+}
+"""Of voyages whose reference was sailed in `FRESH`."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Sea:
     """Waves, slow forces and noise, as standard deviations."""
 
@@ -52,6 +88,7 @@ class Sea:
     together: bool = False  # one wave moves surge, sway and yaw, a quarter of a period apart, as a quartering sea does
     helm: tuple[float, float] = (0.8, 5.0)  # rudder per heading error, and per yaw rate [s]
     hz: int = 1  # samples in a second
+    wind: Wind = Wind()
 
 
 OTHER_SEAS = {
@@ -87,6 +124,10 @@ def sailed(
     """
     drawn = [_drawn(seconds, np.random.default_rng(seed), sea) for seed in seeds]
     wanted, speed, waves, slow, noise = (np.stack(part, axis=-1) for part in zip(*drawn, strict=True))
+    air = np.zeros((seconds * sea.hz, 2, len(seeds)))
+    if sea.wind != Wind():
+        for place, seed in enumerate(seeds):
+            air[..., place] = sea.wind.drawn(seconds, np.random.default_rng([seed, 1]), sea.hz, since_s)
     later = {name: np.array([getattr(ship, name) for ship in ships]) for name in vars(ships[0])}
     before = {name: np.full(len(ships), value) for name, value in vars(Ship()).items()}
     v, step_s, samples = len(ships), 1.0 / sea.hz, seconds * sea.hz
@@ -111,7 +152,8 @@ def sailed(
         table[sample] = np.stack([np.full(v, sample * step_s), *told, n, (begun + rudder) / 2])
         for part in range(INSIDE):
             angle = begun + (rudder - begun) * (part + 0.5) / INSIDE + ship["rudder_rad"]
-            state = _stepped(state, angle, n, slow[sample], ship, step_s / INSIDE)
+            push = slow[sample] + _blown(state, air[sample])
+            state = _stepped(state, angle, n, push, ship, step_s / INSIDE)
     return np.moveaxis(table, 2, 0)
 
 
@@ -166,6 +208,16 @@ def _slow(samples: int, rng: np.random.Generator, hz: int, time_s: float = 600.0
     for sample, fresh in enumerate(np.sqrt(1 - keep**2) * rng.standard_normal(samples)):
         values[sample] = value = keep * value + fresh
     return values
+
+
+def _blown(state: np.ndarray, air: np.ndarray) -> np.ndarray:
+    """(3, v) accelerations by a wind (2, v)."""
+    if not air.any():
+        return np.zeros((3, state.shape[1]))
+    c, s = np.cos(state[5]), np.sin(state[5])
+    ahead, beside = c * air[0] + s * air[1] - state[0], -s * air[0] + c * air[1] - state[1]
+    size = np.hypot(ahead, beside)
+    return WIND_FORCES[:, None] * np.stack([size * ahead, size * beside, size * beside])
 
 
 def _stepped(

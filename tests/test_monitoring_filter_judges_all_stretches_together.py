@@ -77,3 +77,16 @@ def test_what_a_force_surprises_by_is_one_on_average_per_component() -> None:
         found.append(surprise(products, CHANGES, known))
         known = after_stretch(known, one)
     assert np.abs(np.mean(found, axis=0) - 1.0).max() < 3.0 * np.std(found) / np.sqrt(len(found))
+
+
+def test_a_wind_that_keeps_its_direction_is_known_by_the_cosine_of_a_turn() -> None:
+    """Over all directions of the wind, its push along an axis of the ship before and after a turn."""
+    turning = Force(variance=np.ones(3), time_s=np.full(3, 600.0), turning=np.array([1.0, 0.0, 1.0]))
+    directions = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+    for turn in (0.3, 1.2):
+        before, after = np.cos(directions), np.cos(directions - turn)
+        expected = float(before @ after / (before @ before)) * np.exp(-60.0 / 600.0)
+        assert turning.memory(60.0, turn)[[0, 2]] == pytest.approx(expected)
+        assert turning.memory(60.0, turn)[1] == pytest.approx(np.exp(-0.1))
+    assert turning.memory(60.0, 2.0)[0] == 0.0
+    assert turning.memory(60.0, np.nan) == pytest.approx(np.exp(-0.1))

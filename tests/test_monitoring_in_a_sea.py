@@ -40,7 +40,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from expdesign.workflows.commands.diagnose import with_alarms
-from sea_case import CALM, CASES, HOUR, OTHER_SEAS, Sea, Ship, sailed, vessel_file, written
+from sea_case import CALM, CASES, FRESH, HOUR, OTHER_SEAS, Sea, Ship, sailed, vessel_file, written
 
 PUSHED = Sea(pushed_s=5.0)
 STEPS = 14
@@ -166,6 +166,11 @@ def test_a_gyro_that_tells_too_little_is_found_by_the_compass_within_an_hour(
 ) -> None:
     (table,) = sailed([CASES["yaw rate times 0.97"]], 2 * HOUR, seeds=[9], sea=PUSHED, since_s=HOUR)
     assert alarms_of(vessel, known, table)[1] == ["gyro"]
+
+
+@pytest.mark.thorough
+def test_a_wind_as_in_the_reference_that_she_turns_in_is_no_change_of_hers(vessel: Vessel) -> None:
+    assert false_in(vessel, Sea(wind=FRESH), [73000, 73030], hours=1) == []
 
 
 @pytest.mark.thorough

@@ -183,11 +183,13 @@ def gone_over(
     grams = grams.part(slice(first, last))
     stretches = stretches_of(grams, calibration.std, calibration.ramp).less(calibration.baseline)
     nuisance, until_s, cost = calibration.nuisance, float(sums.known_s[0]), 0.0
+    heading = float(sums.known_heading[0])
     known = Known(mean=sums.mean[0], covariance=sums.covariance[0])
     columns = np.arange(stretches.products.shape[-1])
     pushes = columns[:0] if cause is not None else columns[-1 - grams.pushes : -1]
     columns, among = np.r_[:m, pushes, m : len(columns)], m + len(pushes)
-    sums = replace(Sums.begun(1, among, known, float(sums.since_s[0]), sums.rougher[0]), known_s=sums.known_s)
+    begun = Sums.begun(1, among, known, float(sums.since_s[0]), sums.rougher[0])
+    sums = replace(begun, known_s=sums.known_s, known_heading=sums.known_heading)
     for index, whole in enumerate(stretches.products):
         products = whole[np.ix_(columns, columns)]
         if grams.shoal[index] > calibration.shoal_limit:
@@ -195,18 +197,19 @@ def gone_over(
         begin_s, end_s = float(grams.time_s[index]), float(grams.time_s[index] + grams.duration_s[index])
         if begin_s - until_s >= rules.port_s:
             known = calibration.called(known)
-        faded, keep = after_gap(known, nuisance, end_s - until_s), nuisance.memory(end_s - until_s)
+        gap = (end_s - until_s, float(grams.heading[index]) - heading)
+        faded, keep = after_gap(known, nuisance, *gap), nuisance.memory(*gap)
         one = judged(products, among, faded, loads=calibration.loads)
         count = float(stretches.counts[index])
         if not fits(one, count, calibration, changed=True):
             cost += calibration.misfit_limit * count  # whatever the cause
             continue
-        sums, known, until_s = sums.later(keep).added(one)[0], after_stretch(faded, one), end_s
+        sums, known = sums.later(keep).added(one)[0], after_stretch(faded, one)
+        until_s, heading = end_s, float(grams.heading[index])
         cost += float(one.quadratic)
-    keep = nuisance.memory(state.until_s - until_s)
-    return Told(
-        shift=shift, sums=sums.later(keep), known=after_gap(known, nuisance, state.until_s - until_s), cost=cost
-    )
+    gap = (state.until_s - until_s, state.heading - heading)
+    keep = nuisance.memory(*gap)
+    return Told(shift=shift, sums=sums.later(keep), known=after_gap(known, nuisance, *gap), cost=cost)
 
 
 def fits(one: Judged, count: float, calibration: Calibration, *, changed: bool) -> bool:

@@ -221,6 +221,7 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
     part = replace(
         stretches,
         time_s=stretches.time_s[:SEARCHED_STRETCHES],
+        heading=stretches.heading[:SEARCHED_STRETCHES],
         products=stretches.products[:SEARCHED_STRETCHES],
         counts=stretches.counts[:SEARCHED_STRETCHES],
     )
@@ -267,7 +268,10 @@ def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
     values = np.exp2(logarithms)
     variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
     quick = np.clip(values[..., 2 * q :], stretch_s / 2, SLOW_S / 4)
-    return Force(variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1))
+    return Force(
+        variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1),
+        turning=np.tile(1.0 * (np.arange(q) >= q - PUSHES), 2),
+    )  # fmt: skip
 
 
 def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
@@ -277,8 +281,8 @@ def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     scores, known_of = np.empty((len(stretches), m)), np.empty((len(stretches), m, m))
     for index, products in enumerate(stretches.products):
         if index:
-            gap_s = float(stretches.time_s[index] - stretches.time_s[index - 1])
-            known, taken = after_gap(known, force, gap_s), force.memory(gap_s)[:, None] * taken
+            gap = stretches.since(index)
+            known, taken = after_gap(known, force, *gap), force.memory(*gap)[:, None] * taken
         one = judged(products, m, known)
         scores[index] = one.score - taken.T @ one.force_score
         cross = one.by_force @ taken
@@ -293,7 +297,7 @@ def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     surprises = np.empty((len(stretches), len(force.variance) // 2))
     for index, products in enumerate(stretches.products):
         if index:
-            known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
+            known = after_gap(known, force, *stretches.since(index))
         one = judged(products, stretches.changes, known)
         found[index] = misfit_of(float(one.quadratic), one.score, one.information, float(stretches.counts[index]))
         surprises[index] = surprise(products, stretches.changes, known)
@@ -318,7 +322,7 @@ def _seas(force: Force, stretches: Stretches) -> Force:
             place = np.concatenate([group & (not lasts), group & lasts & (axes >= first)])
             variances.append(np.where(place, factor**2 * np.tile(quick, 2), force.variance))
             times.append(np.where(place & (np.arange(2 * q) >= q), LASTING_S, force.time_s))
-    return Force(variance=np.array(variances), time_s=np.array(times))
+    return replace(force, variance=np.array(variances), time_s=np.array(times))
 
 
 def _weights(stretches: Stretches) -> Array:

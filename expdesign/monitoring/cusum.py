@@ -14,6 +14,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from expdesign.monitoring.alarms import REFINED, Again, beside_baseline, fits, raised, settling
@@ -29,6 +30,7 @@ WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond w
 # is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
 WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
+SURELY = 0.95  # of how much scores scatter by chance
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
 LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its load is taken for the ship's, and again
 
@@ -124,7 +126,7 @@ def watch(
         duration_s = float(grams.duration_s[index])
         if begin_s - state.until_s >= rules.port_s:
             state = called(state, calibration, begin_s)
-        state = _waited(state, calibration, begin_s + duration_s)
+        state = _waited(state, calibration, begin_s + duration_s, float(stretches.heading[index]))
         if (shoal := float(grams.shoal[index])) > calibration.shoal_limit:
             shoalest, shoal_s = max(state.shoalest, shoal), state.shoal_s + duration_s
             state = replace(state, left_out_s=state.left_out_s + duration_s, shoal_s=shoal_s, shoalest=shoalest)
@@ -203,9 +205,11 @@ def _noticed(
         if explained[one] or doubtful[one]:
             continue
         alike = calibration.weights @ calibration.weights[one] > ALIKE * (calibration.weights[one] ** 2).sum()
-        rougher = _rougher_by(state, place, calibration)
+        rougher, scattered = _rougher_by(state, place, calibration), _scattered(state, place, calibration)
         few, many = TOLD_APART
-        if rougher > 0.0 and state.sums.stretches[place] >= many:
+        if state.ratios[place] <= rules.limit * scattered:
+            doubtful |= alike
+        elif rougher > 0.0 and state.sums.stretches[place] >= many:
             explained |= alike
         elif rougher > -WEATHER_ODDS or state.sums.stretches[place] < few:
             doubtful |= alike
@@ -240,6 +244,20 @@ def _rougher_by(state: State, place: int, calibration: Calibration) -> float:
     return float((state.rougher - sums.rougher[place])[others].max()) - gain
 
 
+def _scattered(state: State, place: int, calibration: Calibration) -> float:
+    """How much more than they say the scores of a sum scatter about a steady change, surely; one at least.
+
+    A change that lasts moves all scores alike; gusts beyond the reference move them up and down.
+    """
+    change, sums = place % len(state.shift), state.sums
+    free = float(sums.stretches[place]) - 1.0
+    if free < 1.0:
+        return 1.0
+    known = max(float(sums.information[place, change, change]), 1e-300)
+    rest = float(sums.squares[place, change]) - float(sums.score[place, change]) ** 2 / known
+    return max(1.0, rest / float(calibration.inflation[change]) / float(scipy.stats.chi2.ppf(SURELY, free)))
+
+
 def _less(products: Array, change: Array) -> Array:
     """Products with the error of a ship that differs by a change."""
     after = np.eye(len(products))
@@ -247,15 +265,16 @@ def _less(products: Array, change: Array) -> Array:
     return np.asarray(after.T @ products @ after)
 
 
-def _waited(state: State, calibration: Calibration, until_s: float) -> State:
+def _waited(state: State, calibration: Calibration, until_s: float, heading: float) -> State:
     """The state at the beginning of the stretch that ends then, with the force's memory faded over the gap."""
-    gap_s, nuisance = until_s - state.until_s, calibration.nuisance
-    keep = nuisance.memory(gap_s)
+    nuisance, gap = calibration.nuisance, (until_s - state.until_s, heading - state.heading)
+    keep = nuisance.memory(*gap)
     return replace(
         state,
         until_s=until_s,
-        known=after_gap(state.known, nuisance, gap_s),
-        rough=after_gap(state.rough, calibration.others, gap_s),
+        heading=heading,
+        known=after_gap(state.known, nuisance, *gap),
+        rough=after_gap(state.rough, calibration.others, *gap),
         sums=state.sums.later(keep),
         whole=state.whole.later(keep),
         pending=None if state.pending is None else state.pending.later(keep),

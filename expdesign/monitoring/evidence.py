@@ -71,11 +71,13 @@ class Grams:
     pushes: int = 0  # steady accelerations, the last of the columns F
     # (w,) draught over depth, where it is measured and the model does not read it; else zero
     shoal: Array = field(default_factory=lambda: np.zeros(0))
+    heading: Array = field(default_factory=lambda: np.zeros(0))  # (w,) mean in each [rad], nan where it is not known
 
     def __post_init__(self) -> None:
-        if not len(self.shoal):
-            object.__setattr__(self, "shoal", np.zeros(len(self.time_s)))
-        seal(self, time_s="w", duration_s="w", products="h w c c", counts="h w", budget="w m 3", shoal="w")
+        for name, value in (("shoal", 0.0), ("heading", math.nan)):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(len(self.time_s), value))
+        seal(self, time_s="w", duration_s="w", products="h w c c", counts="h w", budget="w m 3", shoal="w", heading="w")
 
     @property
     def changes(self) -> int:
@@ -96,6 +98,7 @@ class Grams:
             budget=self.budget[stretches],
             kind=self.kind[stretches],
             shoal=self.shoal[stretches],
+            heading=self.heading[stretches],
         )
 
     @property
@@ -154,9 +157,17 @@ def _grams(simulated: Simulated, changes: Sequence[Change], noise: Noise, *, str
         kind=stretch_kinds(linear.motion.states[..., 0], linear.motion.states[..., 2], windows.step_s)[keep],
         stretch_s=stretch_s,
         shoal=_shoal(linear)[keep],
+        heading=_headings(linear)[keep],
         ramps=_pushes(linear) + _drifts(linear),
         pushes=_pushes(linear),
     )
+
+
+def _headings(linear: LinearisedMotion) -> Array:
+    """(w,) of `Grams`, within half a turn of north."""
+    heading = linear.motion.windows.heading[:, :-1].mean(axis=1)  # the last step is towards the stretch that follows
+    heading = np.remainder(heading + np.pi, 2 * np.pi) - np.pi
+    return heading if linear.motion.windows.has_heading else np.full(len(heading), math.nan)
 
 
 def _shoal(linear: LinearisedMotion) -> Array:
@@ -300,6 +311,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         budget=np.concatenate([part.budget for part in parts]),
         kind=np.concatenate([part.kind for part in parts]),
         shoal=np.concatenate([part.shoal for part in parts]),
+        heading=np.concatenate([part.heading for part in parts]),
         stretch_s=parts[0].stretch_s,
         ramps=parts[0].ramps,
         pushes=parts[0].pushes,
@@ -351,12 +363,18 @@ class Stretches:
     products: Array  # (w, c, c) inner products of the columns X (m), F (q) and e, in standard deviations of the noise
     counts: Array  # (w,) measured numbers
     changes: int  # m
+    heading: Array  # (w,) as in `Grams`
 
     def __post_init__(self) -> None:
-        seal(self, time_s="w", products="w c c", counts="w")
+        seal(self, time_s="w", products="w c c", counts="w", heading="w")
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def since(self, index: int) -> tuple[float, float]:
+        """Time [s] and turn [rad] from the stretch before to one with a number."""
+        time_s, turn_rad = (np.diff(values[index - 1 : index + 1]) for values in (self.time_s, self.heading))
+        return float(time_s[0]), float(turn_rad[0])
 
     def less(self, change: Array) -> Stretches:
         """The stretches with the error of a ship that differs by a change (m,), in sizes."""
@@ -378,4 +396,6 @@ def stretches_of(grams: Grams, std: Array, ramp: Array) -> Stretches:
     inner = whole[:, m:first, m:first] + np.diag(np.concatenate([np.full(STARTS, 1e-9), 1.0 / ramp]))
     across = whole[:, m:first][:, :, kept]
     left = whole[:, kept][:, :, kept] - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across)
-    return Stretches(time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m)
+    return Stretches(
+        time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m, heading=grams.heading
+    )

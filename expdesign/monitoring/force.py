@@ -1,7 +1,9 @@
 """The unmeasured force and the load from stretch to stretch, by a Kalman filter.
 
 Every component of the force, of the current or of an acceleration, is the sum of two Gauss-Markov processes: one that
-varies within minutes and one that varies within hours. The load is what a ship carries: changes of inertia and hull
+varies within minutes and one that varies within hours. Accelerations are those of wind and waves, which keep their
+direction when the ship turns: over all directions they are correlated by the cosine of the turn, and beyond a quarter
+not at all. The load is what a ship carries: changes of inertia and hull
 that last from port to port. A change of the ship is taken for such a force or load in part.
 
 Source: R. E. Kalman, Journal of Basic Engineering 82 (1960), 35-45; A. S. Willsky and H. L. Jones, IEEE Transactions on
@@ -10,7 +12,8 @@ Automatic Control 21 (1976), 108-112, for the sensitivity of a filter to a jump.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +30,12 @@ class Force:
 
     variance: Array  # (..., 2 q) of the quick processes, then of the slow ones; then (..., l) zeros for the load
     time_s: Array  # (..., 2 q + l) their correlation times [s]; infinite for the load
+    turning: Array = field(default_factory=lambda: np.zeros(1))  # (2 q + l,) one for those that a turn changes
 
-    def memory(self, gap_s: float) -> Array:
-        """(..., 2 q + l) autocorrelation over a time."""
-        return np.asarray(np.exp(-gap_s / self.time_s))
+    def memory(self, gap_s: float, turn_rad: float = 0.0) -> Array:
+        """(..., 2 q + l) autocorrelation over a time and a turn; one that is not known (nan) is none."""
+        kept = max(math.cos(turn_rad), 0.0) if math.isfinite(turn_rad) else 1.0
+        return np.asarray(np.exp(-gap_s / self.time_s) * np.where(self.turning, kept, 1.0))
 
     def with_load(self, count: int) -> Force:
         """The force with so many components of a load, known to be zero."""
@@ -39,6 +44,7 @@ class Force:
         return Force(
             variance=np.concatenate([variance, load], axis=-1),
             time_s=np.concatenate([time_s, load + np.inf], axis=-1),
+            turning=np.append(np.broadcast_to(self.turning, variance.shape[-1:]), np.zeros(count)),
         )
 
 
@@ -131,9 +137,9 @@ def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int6
     return np.asarray(missed**2 / np.maximum(variance, 1e-300))
 
 
-def after_gap(known: Known, force: Force, gap_s: float) -> Known:
-    """Later, without data."""
-    keep = force.memory(gap_s)
+def after_gap(known: Known, force: Force, gap_s: float, turn_rad: float = 0.0) -> Known:
+    """Later and after a turn, without data."""
+    keep = force.memory(gap_s, turn_rad)
     fresh = force.variance * (1.0 - keep**2)
     covariance = keep[..., :, None] * known.covariance * keep[..., None, :]
     return Known(mean=keep * known.mean, covariance=covariance + fresh[..., :, None] * np.eye(fresh.shape[-1]))
@@ -158,7 +164,7 @@ def likelihood(stretches: Stretches, force: Force) -> Array:
     known.covariance[..., -len(changes) + changes, -len(changes) + changes] = 1.0
     for index, products in enumerate(stretches.products):
         if index:
-            known = after_gap(known, force, float(stretches.time_s[index] - stretches.time_s[index - 1]))
+            known = after_gap(known, force, *stretches.since(index))
         one = judged(products, len(changes), known, changes)
         total = total + one.deviance
         known = after_stretch(known, one)

@@ -41,6 +41,7 @@ def restored_state(table: dict[str, Any]) -> State:
     alarm, pending = table["alarm"], table["pending"]
     return State(
         until_s=table["until_s"],
+        heading=float(table["heading"]),
         known=Known(**_arrays(table["known"])),
         ratios=_array(table["ratios"]),
         sums=Sums(**_arrays(table["sums"])),

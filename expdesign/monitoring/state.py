@@ -43,11 +43,13 @@ class Sums:
     # score, information: (n, m) and (n, m, m)
     score: Array
     information: Array
+    squares: Array  # (n, m) sum of each score's square over its information
     stretches: Array  # (n,) that were added
     rougher: Array  # (n, a) `State.rougher` before the first of them
     # known_s: (n,) when what was known of the force and the load before the first was known [s], infinite where it
     # was of another ship; mean, covariance: (n, f) and (n, f, f), as in `Known`
     known_s: Array
+    known_heading: Array  # (n,) heading then [rad], nan where it is not known
     mean: Array
     covariance: Array
 
@@ -57,16 +59,20 @@ class Sums:
         return int(self.stretches[0])
 
     @classmethod
-    def begun(cls, count: int, changes: int, known: Known, time_s: float, rougher: Array) -> Sums:
+    def begun(
+        cls, count: int, changes: int, known: Known, time_s: float, rougher: Array, heading: float = math.nan
+    ) -> Sums:
         """Nothing yet."""
         return cls(
             since_s=np.full(count, time_s),
             taken=np.zeros((count, len(known.mean), changes)),
             score=np.zeros((count, changes)),
             information=np.zeros((count, changes, changes)),
+            squares=np.zeros((count, changes)),
             stretches=np.zeros(count),
             rougher=np.tile(rougher, (count, 1)),
             known_s=np.full(count, time_s),
+            known_heading=np.full(count, heading),
             mean=np.tile(known.mean, (count, 1)),
             covariance=np.tile(known.covariance, (count, 1, 1)),
         )
@@ -78,7 +84,8 @@ class Sums:
     def again(self, places: np.ndarray, state: State) -> Sums:
         """The sums with some (n,) begun anew at a state."""
         count, changes = self.score.shape
-        return self._where(places, Sums.begun(count, changes, state.known, state.until_s, state.rougher))
+        begun = Sums.begun(count, changes, state.known, state.until_s, state.rougher, state.heading)
+        return self._where(places, begun)
 
     def first(self, places: np.ndarray, one: Judged, time_s: float, before: State) -> Sums:
         """The sums with some (n,) begun with a stretch at a time, before which the state was another."""
@@ -87,9 +94,11 @@ class Sums:
             taken=(one.gain @ one.seen[0])[None],
             score=one.score[None],
             information=one.information[None],
+            squares=_squares(one.score[None], one.information[None]),
             stretches=np.ones(1),
             rougher=before.rougher[None],
             known_s=np.array([before.until_s]),
+            known_heading=np.array([before.heading]),
             mean=before.known.mean[None],
             covariance=before.known.covariance[None],
         )
@@ -124,9 +133,16 @@ class Sums:
             taken=self.taken + one.gain @ (one.seen[0] - one.seen[1] @ self.taken),
             score=self.score + score,
             information=self.information + information,
+            squares=self.squares + _squares(score, information),
             stretches=self.stretches + 1.0,
         )
         return after, score, information
+
+
+def _squares(score: Array, information: Array) -> Array:
+    """(n, m) of `Sums`, of one stretch."""
+    known = np.einsum("nmm->nm", information)
+    return np.asarray(np.where(known > 0, score**2 / np.maximum(known, 1e-300), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,6 +213,7 @@ class State:
     rougher: Array  # (a,) log-likelihood of the data so far in these, beyond that in the reference's
     weather: Array  # (m,) of late, the `surprise` of stretches for every change, in that of the reference
     beyond_of_s: Array
+    heading: float = math.nan  # of the last stretch that was looked at [rad], nan where it is not known
     calls: tuple[Call, ...] = ()
     alarm: Alarm | None = None  # the alarm that is not yet settled, or None; pending: sums since its change
     pending: Sums | None = None

@@ -55,13 +55,19 @@ def mean_errors(parts: Sequence[Array]) -> tuple[MeanError, ...]:
     own = [float(one @ one) / max(len(one) * (1.0 - gone), 1e-9) for one, gone in zip(means, hidden, strict=True)]
     weight = [len(one) for one in means]
     common = float(np.average(own, weights=weight))
+    wider = _wider(sum(1.0 / gone - 1.0 for gone in hidden))
     found = []
     for one, gone, size in zip(means, hidden, own, strict=True):
         independent = 1.0 / gone - 1.0
         variance = (SHARED * common + independent * size) / (SHARED + independent)
-        std = math.sqrt(variance * gone) if len(one) > 1 else math.inf
+        std = wider * math.sqrt(variance * gone) if len(one) > 1 else math.inf
         found.append(MeanError(std=std, density=variance * per * float(shape[0] + 2.0 * shape[1:].sum())))
     return tuple(found)
+
+
+def _wider(independent: float) -> float:
+    """Factor by which 1.96 deviations that so many values tell are widened to hold 95 %, by Student's distribution."""
+    return float(scipy.stats.t.ppf(0.975, max(independent, 1.0)) / scipy.stats.norm.ppf(0.975))
 
 
 def _apart(part: Array, per: int) -> Array:

@@ -3,7 +3,8 @@
 ``python tests/benchmarks/monitoring_sea.py [--trials N]``: a ship sails N voyages in each of several cases, on
 autopilot in a slight sea, beside a plain average of her steady speeds. ``--calm`` the same without waves; ``--seas``
 and ``--cases`` those alone, of more seas than these; ``--white`` with no model of the noise within stretches;
-``--seed`` with other numbers than those that constants were chosen on.
+``--seed`` with other numbers than those that constants were chosen on; ``--winds`` an unchanged ship in winds that
+nobody measures, after a reference in a fresh one.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from monitoring import DAY, HOUR, gone_on
-from sea_case import CALM, CASES, NAMES, OTHER_SEAS, Sea, Ship, sailed, vessel_file
+from sea_case import CALM, CASES, FRESH, NAMES, OTHER_SEAS, WINDS, Sea, Ship, sailed, vessel_file
 
 SEAS: tuple[tuple[str, Sea], ...] = (
     ("waves that sensors feel", Sea()),
@@ -90,7 +91,6 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
     """Statements about an unchanged ship, and delays and names of changes, after 4 hours of reference."""
     with tempfile.TemporaryDirectory() as folder:
         vessel = load_vessel(vessel_file(Path(folder) / "vessel.toml"))
-    stretch_s = stretch_length(vessel.length_m)
     print(
         "| sea | case | voyages | alarms before | said of the reference | found | in an hour | median delay |"
         " named | or as likely | sizes in 95 % | bias, in std | left out | plain average beyond 4 std |"
@@ -99,18 +99,7 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
     for sea_name, sea in seas:
         seeds = range(trials)
         references = sailed([Ship()] * trials, 4 * HOUR, seeds=[10 * k + first for k in seeds], sea=sea)
-        known = []
-        for table in references:
-            record = as_record(vessel, table)
-            ship = extended_model(vessel, record)
-            changes = watched_changes(ship)
-            words = {"begins_s": [0.0], "stretch_s": stretch_s}
-            if white:
-                grams, noise = grams_of(ship, record, changes, **words), WHITE
-            else:
-                grams, noise = grams_and_noise(ship, record, changes, **words)
-            load = np.array([change.load for change in changes])
-            known.append((changes, noise, calibrate(grams, load=load)))
+        known = [learnt(vessel, table, white=white) for table in references]
         for number, (case, changed) in enumerate(CASES.items()):
             if case not in cases:
                 continue
@@ -130,6 +119,34 @@ def sea_study(trials: int, seas: Sequence[tuple[str, Sea]], cases: Sequence[str]
                 f"{counts[2]} | {inside} | {bias} | {left:.0f} % | {sum(row['plain'] for row in rows)} |",
                 flush=True,
             )
+
+
+def learnt(vessel: Vessel, table: np.ndarray, *, white: bool = False) -> tuple[Any, ...]:
+    """Changes that are watched for, the noise and the calibration of a reference."""
+    record = as_record(vessel, table)
+    ship = extended_model(vessel, record)
+    changes, words = watched_changes(ship), {"begins_s": [0.0], "stretch_s": stretch_length(vessel.length_m)}
+    if white:
+        grams, noise = grams_of(ship, record, changes, **words), WHITE
+    else:
+        grams, noise = grams_and_noise(ship, record, changes, **words)
+    return changes, noise, calibrate(grams, load=np.array([change.load for change in changes]))
+
+
+def wind_study(trials: int, *, first: int) -> None:
+    """Alarms in 3 hours of an unchanged ship, after 4 hours of reference in a fresh wind."""
+    with tempfile.TemporaryDirectory() as folder:
+        vessel = load_vessel(vessel_file(Path(folder) / "vessel.toml"))
+    seeds, ships = [10 * k + first for k in range(trials)], [Ship()] * trials
+    known = [learnt(vessel, table) for table in sailed(ships, 4 * HOUR, seeds=seeds, sea=Sea(wind=FRESH))]
+    print("| wind | voyages | with an alarm | of which a push is named, too | left out |\n|---|---|---|---|---|")
+    for number, (name, wind) in enumerate(WINDS.items()):
+        own = [seed + 1 + number for seed in seeds]
+        tables = sailed(ships, 3 * HOUR, seeds=own, sea=Sea(wind=wind), since_s=HOUR)
+        rows = [sea_trial(vessel, table, table, one, "unchanged") for table, one in zip(tables, known, strict=True)]
+        alarms, pushes = (sum(row[key] for row in rows) for key in ("any", "push"))
+        left = 100 * np.mean([row["left"] for row in rows])
+        print(f"| {name} | {trials} | {alarms} | {pushes} | {left:.0f} % |", flush=True)
 
 
 def sea_trial(
@@ -153,6 +170,8 @@ def sea_trial(
     spread = before.std(ddof=1) * np.sqrt(1 / len(before) + 1 / max(len(after), 1))
     plain = bool(len(after)) and abs(after.mean() - before.mean()) > 4 * spread
     return {
+        "any": bool(alarms),
+        "push": any(alarm.pushes for alarm in alarms),
         "early": any(alarm.time_s < HOUR for alarm in alarms),
         "said": bool(said_of_reference(calibration).any()),
         "delay": last.time_s - HOUR if last else None,
@@ -199,6 +218,10 @@ if __name__ == "__main__":
     parser.add_argument("--seas", nargs="+", choices=every)
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seed", type=int, default=5000, help="the first")
+    parser.add_argument("--winds", action="store_true", help="an unchanged ship in winds")
     asked = parser.parse_args()
+    if asked.winds:
+        wind_study(asked.trials, first=asked.seed)
+        sys.exit()
     names = asked.seas or (["calm"] if asked.calm else [name for name, _ in SEAS])
     sea_study(asked.trials, [(name, every[name]) for name in names], asked.cases, first=asked.seed, white=asked.white)
