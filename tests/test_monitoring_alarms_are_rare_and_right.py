@@ -300,7 +300,7 @@ def test_no_statistic_above_the_threshold_stands_beside_no_alarm(calibration: Ca
     assert passed
 
 
-CHANGED = re.compile("(ship|weather) has changed|no longer the ship")
+CHANGED = re.compile("(ship|weather|sensor) has changed|no longer the ship")
 AS_BEFORE = re.compile("the ship is the one of the reference")
 ROLLED = RollEvent(
     since_s=0.0, time_s=9.0, after_call=False, settled=True, p_value=0.0, causes=(), sizes=(), stds=(), load=None,

@@ -269,6 +269,21 @@ def test_shallower_water_than_the_references_is_told_and_not_judged(tmp_path: Pa
     assert not any("the ship is the one of the reference" in sentence for sentence in told["verdict"])
 
 
+@pytest.mark.thorough
+def test_a_gyro_is_named_as_a_sensor_and_not_as_the_ship(tmp_path: Path) -> None:
+    path = vessel_file(tmp_path / "vessel.toml")
+    words = {"reference": (Ship(), 4 * HOUR, 0, 81000), "voyage": (CASES["yaw rate times 0.97"], 2 * HOUR, HOUR, 81001)}
+    known, voyage = (
+        written(tmp_path / f"{name}.csv", sailed([ship], seconds, seeds=[seed], since_s=since_s)[0])
+        for name, (ship, seconds, since_s, seed) in words.items()
+    )
+    asked = ["monitor", str(voyage), "--reference", str(known), "--vessel", str(path), "--out", str(tmp_path), "-q"]
+    assert main(asked) == 0
+    verdict = json.loads((tmp_path / "monitor.json").read_text())["verdict"]
+    assert any("a sensor has changed: scale of yaw rate by" in sentence for sentence in verdict)
+    assert not any("the ship has changed" in sentence for sentence in verdict)
+
+
 def test_a_diagnosis_takes_over_what_the_alarm_named(vessel: Vessel, tmp_path: Path) -> None:
     alarm = {"effect": "theta:X_uu", "value": -0.0006, "std": 0.0008, "in_words": "parameter X_uu by +15 ± 20 %"}
     (tmp_path / "monitor.json").write_text(json.dumps({"alarms": [alarm]}))

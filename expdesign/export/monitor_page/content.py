@@ -23,6 +23,7 @@ from expdesign.monitoring import (
     calls_of,
 )
 from expdesign.values import Array
+from expdesign.vessel.quantities import GYRO
 
 ALIKE = 0.95
 """Correlation of scores from which two changes count as not distinguishable."""
@@ -212,13 +213,14 @@ def _call(content: MonitorContent, call: Call) -> str:
 def _alarm(content: MonitorContent, alarm: Alarm) -> str:
     change = content.changes[alarm.change]
     statistic, limit = told_apart(alarm.statistic, content.limit)
-    own, who = f"{change.words} by {size_in_words(content, alarm)}", "the ship has changed"
+    whose = "a sensor" if change.effect == GYRO else "the ship"
+    own, who = f"{change.words} by {size_in_words(content, alarm)}", f"{whose} has changed"
     if alarm.pushes:
         push = f"a steady push in {' or '.join(pushed(content, alarm))} by wind or current"
         if pushed(content, alarm, beyond=AS_LIKELY):
-            own, who = f"{push}, or, explaining the data less well, {own}", "the weather or the ship has changed"
+            own, who = f"{push}, or, explaining the data less well, {own}", f"the weather or {whose} has changed"
         else:
-            own, who = f"{own}, or {push}, which explains the data as well", "the ship or the weather has changed"
+            own, who = f"{own}, or {push}, which explains the data as well", f"{whose} or the weather has changed"
     text = (
         f"Since {when(alarm.since_s)} {who}: {own}. The alarm came at {when(alarm.time_s)}, with the statistic "
         f"{statistic} above the threshold {limit}."

@@ -158,13 +158,17 @@ def estimate_figure(content: MonitorContent) -> str:
     axes = figure.subplots()
     begin_s, label = _axis(content)
     time = _hours([moment.time_s for moment in content.moments], begin_s)
+    reach = 1.0  # of the later half: intervals of the first moments are wide
     for number, colour in zip(_shown(content), LINES, strict=False):
         sign = np.sign(content.changes[number].unit[0])  # of a negative parameter, more is less in its unit
         value = sign * np.array([moment.value[number] for moment in content.moments])
         half = 1.96 * np.array([moment.std[number] for moment in content.moments])
         axes.plot(time, value, color=colour, label=plain(content.changes[number].words))
         axes.fill_between(time, value - half, value + half, color=colour, alpha=0.15, linewidth=0)
+        late = (np.abs(value) + half)[len(time) // 2 :]
+        reach = max(reach, float(late[np.isfinite(late)].max(initial=0.0)))
     axes.axhline(0.0, color="black", linewidth=0.8)
+    axes.set_ylim(-1.5 * reach, 1.5 * reach)
     axes.set_xlabel(label)
     axes.set_ylabel("change, in sizes watched for")
     axes.legend(loc="upper left", fontsize=8, ncols=2)
