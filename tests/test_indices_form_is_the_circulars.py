@@ -47,14 +47,14 @@ def test_every_index_stands_under_its_side_beside_its_criterion() -> None:
         "Distance to 10° of heading at 10° of helm", "Track reach, full astern",
     ]  # fmt: skip
     port = next(circle for circle in found.circles if circle.side == "port")
-    assert rows[0][2].startswith(f"{port.advance_m:.4g} m {port.advance_m / 180:.2f} L ")
+    assert rows[0][2].startswith(f"{port.advance_m:.4g} m = {port.advance_m / 180:.2f} L ")
     assert rows[0][4] == "4.5 L = 810 m"
     ten = next(zigzag for zigzag in found.zigzags if zigzag.side == "starboard" and zigzag.helm_rad < 0.2)
     assert rows[3][3].startswith(f"{math.degrees(ten.overshoots_rad[1]):.1f} deg ")
     assert rows[3][4] == f"{math.degrees(limits['second_overshoot_10_10_rad']):.1f} deg at L/V = 25.7 s"
     reach = found.stops[0].track_reach_m
     verdict = "\N{CHECK MARK}" if reach <= limits["track_reach_m"] else "\N{BALLOT X} exceeds"
-    assert rows[6][2:4] == [f"{reach:.4g} m {reach / 180:.2f} L {verdict} no side", ""]
+    assert rows[6][2:4] == [f"{reach:.4g} m = {reach / 180:.2f} L {verdict} no side", ""]
 
 
 def test_each_run_to_a_side_has_a_line_that_names_it() -> None:
@@ -71,8 +71,8 @@ def test_each_run_to_a_side_has_a_line_that_names_it() -> None:
 def test_what_exceeds_its_limit_is_marked_and_what_was_not_run_is_not_shown() -> None:
     page = html.fromstring(document_html(indices_document(content(simulated=None, measured=(WIDE,)))))
     rows = {" ".join(" ".join(row.itertext()).split()) for row in page.iter("tr")}
-    assert any(row.startswith("Turning circle Advance 811 m 4.51 L \N{BALLOT X} exceeds no result") for row in rows)
-    assert any(row.startswith("Tactical diameter 899 m 4.99 L \N{CHECK MARK} no result") for row in rows)
+    assert any(row.startswith("Turning circle Advance 811 m = 4.51 L \N{BALLOT X} exceeds no result") for row in rows)
+    assert any(row.startswith("Tactical diameter 899 m = 4.99 L \N{CHECK MARK} no result") for row in rows)
 
 
 def test_ship_data_are_the_vessels_and_data_without_a_file_stay_open() -> None:

@@ -183,10 +183,10 @@ def form_rows(content: IndicesContent, source: str) -> list[tuple[str, ...]]:
 def _cell(content: IndicesContent, verdict: Verdict, *, of: int) -> str:
     """A result, the same by length, and its verdict; where others stand beside it, its run in a second line."""
     limit, value = verdict.criterion, verdict.value
-    length = f"{value / content.vessel.length_m:.2f} L " if limit.key.endswith("_m") and value is not None else ""
+    length = f" = {value / content.vessel.length_m:.2f} L" if limit.key.endswith("_m") and value is not None else ""
     below = verdict.run if of > 1 else "" if verdict.side else "no side"
-    text = f"{shown(limit.key, value, verdict.tolerance)} {length}".replace(" ", words.NB)
-    return Markup("{}{}\n{}").format(text.replace(f"{words.NB}±", " ±"), MARKS[verdict_word(verdict)], below).strip()
+    text = f"{shown(limit.key, value, verdict.tolerance)}{length}".replace(" ", words.NB)
+    return Markup("{} {}\n{}").format(text.replace(f"{words.NB}±", " ±"), MARKS[verdict_word(verdict)], below).strip()
 
 
 RULES = {
