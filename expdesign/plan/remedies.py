@@ -59,6 +59,7 @@ MOST_PLANS = 2  # plans made to check remedies
 REMEDY_WORK = 1.75
 # tried as remedies of a refusal, the highest first
 LOWER_CONFIDENCES = (0.9999, 0.9995, 0.999, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8)
+TOLERANCES = (2.0, 4.0)  # `plan.start_tolerance` tried as remedies
 TIGHTER = (0.9, 0.8, 0.7, 0.6, 0.5)  # turning radii tried as remedies, in that of legs
 FASTER = (1.05, 1.2, 1.5)  # repositioning speeds tried as remedies, in the mean current
 
@@ -259,12 +260,12 @@ def _limit(plan_s: float) -> tuple[WorkBudget, Callable[[], bool]]:
 
 
 def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
-    """A better forecast, a lower confidence, or a design without the worst run, that drawn trials accept.
+    """Wider tolerances, a better forecast, a lower confidence, or a design without the worst run, if trials accept it.
 
     Each is planned anew before it is named, as it changes the room of runs; that is as much work as the refused plan.
-    What that plan tells comes first: a forecast in which few drawn trials of it fail as well is not planned in, nor is
-    a design without the worst run where too many failed elsewhere. All is counted, and no more is begun than a trial
-    that is planned takes.
+    What that plan tells comes first: tolerances or a forecast with which few drawn trials of it fail as well are not
+    planned with, nor is a design without the worst run where too many failed elsewhere. Tolerances are tried where too
+    many trials were aborted. All is counted, and no more is begun than a trial that is planned takes.
     """
     first: Refused | None = refused.plan
     budget, affords = _limit(0.0 if first is None else first.spent_s)
@@ -274,11 +275,12 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
         return made is not None and accepted(other, *made, budget=budget)
 
     def hopeful(change: Change) -> Change:
-        """The change, without a problem where few drawn trials refuse the refused plan in its forecast, too."""
+        """The change, without a problem where with it few drawn trials refuse the refused plan, too."""
         if first is None or change.problem is None or not affords():
             return change
         tell(change.words)
-        water = replace(first.water, environment=change.problem.environment)
+        tolerance = change.problem.settings.start_tolerance
+        water = replace(first.water, environment=change.problem.environment, start_tolerance=tolerance)
         likely = promising(change.problem, water, first.sailed, budget=budget)
         return change if likely else replace(change, problem=None)
 
@@ -294,11 +296,18 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
 
     names = {refused.which} - {"", "goal"}
     more = "the planner has tried more room" if len(refused.tried) > 1 else ""
-    forecasts = map(hopeful, _forecasts(problem))
+    aborted = first is not None and first.risk.aborted > problem.settings.aborted_most
+    likely = map(hopeful, chain(_tolerances(problem) if aborted else (), _forecasts(problem)))
     lower = () if refused.confidence is None else (of_setting(problem, "confidence", refused.confidence),)
-    tries = chain(islice(forecasts, 1), lower, without(names) if names else (), forecasts)
+    tries = chain(islice(likely, 1), lower, without(names) if names else (), likely)
     most = max(1, REPLANS + 1 - max(1, len(refused.tried)))
     yield from first_that_passes(tries, passes, ACCEPTED, more, tell=tell, most=most, affords=affords)
+
+
+def _tolerances(problem: PlanProblem) -> Iterator[Change]:
+    """Wider tolerances within which runs begin."""
+    wider = (value for value in TOLERANCES if value > problem.settings.start_tolerance)
+    return (of_setting(problem, "start_tolerance", value) for value in wider)
 
 
 def _forecasts(problem: PlanProblem) -> Iterator[Change]:
