@@ -250,12 +250,18 @@ def test_what_is_named_where_trials_are_aborted_is_what_they_accept(monkeypatch,
     assert text == "too risky; no remedy could be checked"
 
 
-def too_risky(case: PlanProblem, plans: int, *, elsewhere: bool = True) -> NoPlan:
+def too_risky(case: PlanProblem, plans: int, *, elsewhere: bool = True, aborted: float = 0.0) -> NoPlan:
     """A refusal after so many plans, of which the first would have met a lower confidence."""
     error = NoPlan("too risky", what="risk", which="deceleration")
     error.confidence, error.tried = 0.8, ("a plan",) * plans
     water = leg_water(case, ship_on_legs(case))
-    error.plan = SimpleNamespace(sailed="", water=water, spent_s=PLAN_S, promises=lambda name, confidence: elsewhere)
+    error.plan = SimpleNamespace(
+        sailed="",
+        water=water,
+        spent_s=PLAN_S,
+        promises=lambda name, confidence: elsewhere,
+        risk=SimpleNamespace(aborted=aborted),
+    )
     return error
 
 
@@ -301,6 +307,20 @@ def test_no_plan_is_made_in_a_forecast_in_which_the_refused_one_fails_too(monkey
     assert judged == [(0.7, True)]
     assert [other.environment.current_std_mps for other in made] == [1.4] * len(made)
     assert "environment.current_to.std_mps = 0.7 (a better forecast)" in text
+
+
+@pytest.mark.parametrize(("aborted", "tried"), [(0.2, True), (0.05, False)])
+def test_wider_tolerances_are_tried_first_where_too_many_trials_are_aborted(monkeypatch, story, made, aborted, tried):
+    case = in_current(story, 1.4)
+
+    def likely(other, water, sailed, budget):
+        return other.settings.start_tolerance == water.start_tolerance == 4.0
+
+    monkeypatch.setattr(remedies, "promising", likely)
+    monkeypatch.setattr(remedies, "accepted", lambda other, *_, budget: other.settings.start_tolerance == 4.0)
+    text = str(advised(case, too_risky(case, 1, aborted=aborted)))
+    assert ("with plan.start_tolerance = 4 drawn trials accept the plan" in text) == tried
+    assert [other.settings.start_tolerance for other in made][:1] == [4.0 if tried else case.settings.start_tolerance]
 
 
 @pytest.mark.parametrize("plans", [1, 2, 3])

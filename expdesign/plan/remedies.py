@@ -297,9 +297,9 @@ def for_risk(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]
     names = {refused.which} - {"", "goal"}
     more = "the planner has tried more room" if len(refused.tried) > 1 else ""
     aborted = first is not None and first.risk.aborted > problem.settings.aborted_most
-    likely = map(hopeful, chain(_tolerances(problem) if aborted else (), _forecasts(problem)))
+    tolerances, forecasts = map(hopeful, _tolerances(problem) if aborted else ()), map(hopeful, _forecasts(problem))
     lower = () if refused.confidence is None else (of_setting(problem, "confidence", refused.confidence),)
-    tries = chain(islice(likely, 1), lower, without(names) if names else (), likely)
+    tries = chain(tolerances, islice(forecasts, 1), lower, without(names) if names else (), forecasts)
     most = max(1, REPLANS + 1 - max(1, len(refused.tried)))
     yield from first_that_passes(tries, passes, ACCEPTED, more, tell=tell, most=most, affords=affords)
 
