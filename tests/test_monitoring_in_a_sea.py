@@ -211,7 +211,7 @@ def test_wind_that_turns_her_is_named_beside_the_change_that_it_looks_like(
 
 @pytest.mark.slow
 def test_what_slow_forces_hide_within_stretches_inflates_no_score(vessel: Vessel) -> None:
-    """A force that lasts ten minutes grows within a stretch: without that, scores scatter twice as much as they say."""
+    """A force that lasts ten minutes grows within a stretch: without that, scores scatter by half as much again."""
     ratios = dict[bool, list[float]]({True: [], False: []})
     for table in sailed([Ship()] * 2, 3 * HOUR, seeds=[5000, 5010], sea=PUSHED):
         changes, _, grams = stretches(vessel, table)
@@ -221,7 +221,8 @@ def test_what_slow_forces_hide_within_stretches_inflates_no_score(vessel: Vessel
         steady = replace(grams, products=grams.products[:, :, kept][..., kept], ramps=0)
         for ramps, own in ((True, grams), (False, steady)):
             ratios[ramps].append(float(calibrate(own).inflation[place]))
-    assert np.mean(ratios[True]) < 1.6 < np.mean(ratios[False])
+    each = np.divide(ratios[True], ratios[False])
+    assert each.max() < 0.8, ratios  # of the same stretches, so that chance is common to both
 
 
 def false_in(vessel: Vessel, sea: Sea, seeds: Sequence[int], *, hours: int = 2) -> list[str]:
