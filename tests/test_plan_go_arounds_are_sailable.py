@@ -13,7 +13,7 @@ from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve
 from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Guidance
-from expdesign.plan.monte_carlo.procedure import tolerances
+from expdesign.plan.monte_carlo.procedure import slowing, tolerances
 from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers
 from expdesign.plan.runs import Fleet, Truths
 from expdesign.simulation import CALM
@@ -136,3 +136,29 @@ def test_go_arounds_keep_off_the_shore_where_there_is_room(room, turns_north):
     path = guidance._followers._path[0]
     assert (path[:, 0].max() > radius) == turns_north
     assert path[:, 0].min() >= shore + water.leg_margin_m + GO_AROUND_ROOM * radius - 1.0
+
+
+def test_a_ship_that_comes_near_enough_to_a_standing_start_stops_there_instead_of_circling_round_it():
+    vessel, water, count = coaster(), open_water(coaster()), 24
+    ship, rng, length = water.ship, np.random.default_rng(5), vessel.length_m
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=ship)
+    desired = np.zeros(6)
+    leg = np.vstack([slowing(helm, desired, 600), desired])
+    within = tolerances(water, spare_m=4.0 * length)
+    drawn = vessel.model.parameters * (1.0 + 0.1 * rng.uniform(-1, 1, (count, len(vessel.model.parameters))))
+    current = rng.normal(0.0, 0.1, (count, 2))
+    truths = Truths(parameters=drawn, current_to=current, wind_to=np.zeros((count, 2)))
+    fleet = Fleet(vessel, CALM, truths, state=leg[0], standing=ship.approach.inputs, rng=rng)
+    guidance = Guidance(
+        helm,
+        water,
+        leg,
+        within=within,
+        sailing=np.ones(count, bool),
+        inputs=np.zeros(len(vessel.limits)),
+        last=False,
+    )
+    found = guidance.sail(fleet, np.zeros((count, 3)))
+    assert found.begun.all()
+    assert not found.go_arounds.any()
+    assert np.abs(found.poses[..., 2]).max() < 1.0

@@ -170,7 +170,7 @@ class Guidance:
 
     def _passed(self, ships: np.ndarray, states: Array, on: np.ndarray) -> np.ndarray:
         """(k,) whether ships on a reference are as near to the start as this time; those in tolerance begin."""
-        early = 1.0 if self._moves and not self._last else 0.0
+        early = 0.0 if self._last else 1.0 if self._moves else np.inf if self._steadies else 0.0
         passed = on & (self._at[ships] >= self._end[ships] - early)
         if passed.any():
             some = ships[passed]
@@ -193,8 +193,8 @@ class Guidance:
         if self._last:
             there = self._at_goal(states)
             return there | waited | (not self._helm.ship.keeps_station), there
-        if not self._moves:
-            return (used <= STANDSTILL_SHARE) | ((used <= 1.0) & waited), used <= 1.0
+        if not self._moves:  # a ship that keeps no station begins while she may: at rest she cannot turn to the heading
+            return (used <= (1.0 if self._steadies else STANDSTILL_SHARE)) | ((used <= 1.0) & waited), used <= 1.0
         gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
         return (used <= 1.0) | gone_by, used <= 1.0
 
@@ -365,17 +365,25 @@ class Guidance:
         now[:, :2] += shift
         now[:, 3:] = self._reference.velocity_at(soon)  # velocities respond with a lag: they are demanded ahead of time
         if self._steadies:
-            now[:, :2] = np.where(self._steadying(ships)[:, None], states[:, :2], now[:, :2])
+            now[:, :2] = np.where(self._steadying(ships, beside)[:, None], states[:, :2], now[:, :2])
         return now
 
     @property
     def _steadies(self) -> bool:
         """Whether ships keep their heading near the start and drift with an unknown current there."""
-        return self._moves and not self._last and not self._helm.ship.keeps_station
+        return not self._last and not self._helm.ship.keeps_station
 
-    def _steadying(self, ships: np.ndarray) -> np.ndarray:
-        """(k,) whether ships (k,) are so near that they begin on the planned heading."""
+    def _steadying(self, ships: np.ndarray, states: Array) -> np.ndarray:
+        """(k,) whether ships (k,) at states (k, 6) are so near that they begin on the planned heading.
+
+        Where a run begins at a standstill they stop there: a ship that cannot turn on the spot would circle round a
+        place that she has missed by a little.
+        """
         helm = self._helm
+        if not self._moves:
+            place = self._reference.at(self._at[ships])[:, :2]
+            near = lengths(place - self._desired[:2]) <= STEADY_HULLS * helm.vessel.length_m
+            return np.asarray(near & (lengths(states[:, :2] - place) <= self._within.position_m))
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
         least_m, most_m = STEADY_HULLS * helm.vessel.length_m, STEADY_ROOM * self._within.position_m
         near = np.clip(most_m, least_m, self._water.start_tolerance * least_m) / sample_m
