@@ -333,8 +333,8 @@ def _parameter(content: RollContent, name: str) -> dict[str, object]:
 EQUATION = Markup(
     "A<sub>1</sub> &phi;'' = &minus;(k + g S) &phi; &minus; d &phi;' + (K<sub>vd</sub> + S) a<sub>y</sub> + "
     "K<sub>r</sub> r + K<sub>&delta;</sub> &delta;, with roll &phi;, positive to starboard, side acceleration "
-    "a<sub>y</sub>, yaw rate r and rudder &delta;. S is the first moment of all masses about the rotation axis, "
-    "negative for masses above it."
+    "a<sub>y</sub>, yaw rate r and rudder &delta;. A<sub>1</sub> is the inertia of A<sub>x</sub> and all masses about "
+    "the rotation axis, S their first moment, negative for masses above it."
 )
 FROUDE = (
     "By Froude\u2019s law, in the same water: in sea water, 2.5 % heavier than fresh, mass, moments and inertia of the "
