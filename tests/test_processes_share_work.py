@@ -242,6 +242,22 @@ except KeyboardInterrupt:
     assert not living(tmp_path)
 
 
+def test_what_killed_processes_leave_is_removed_without_a_word():
+    """Semaphores of a program that ends in the middle of them, which the system keeps until they are removed."""
+    code = """
+import operator, os
+from expdesign.processes import in_order, local_processes
+from joblib.externals.loky.backend.synchronize import Lock
+with local_processes(2):
+    list(in_order(operator.neg, (), [(1,), (2,)]))
+lock = Lock()
+os._exit(3)
+"""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    ended = subprocess.run([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE, text=True)
+    assert (ended.returncode, ended.stderr) == (3, "")
+
+
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 def test_an_interruption_ends_the_processes_where_waiting_tasks_were_called_off(tmp_path):
     def interrupted():

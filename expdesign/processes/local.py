@@ -6,6 +6,7 @@ unpickled before someone reads it.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -20,6 +21,7 @@ from typing import Any
 
 import cloudpickle
 from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.backend.resource_tracker import ensure_running
 from joblib.externals.loky.backend.utils import kill_process_tree
 
 from expdesign.errors import InputError
@@ -82,6 +84,7 @@ class Processes:
                 # what a process died of is told to who waits for it; other work goes on with others
                 with suppress(BrokenProcessPool):
                     return self._executor.submit(outcome_of, both, task)
+            _track_quietly()
             self._executor = ProcessPoolExecutor(max_workers=self.count, timeout=IDLE_S)
             return self._executor.submit(outcome_of, both, task)
 
@@ -110,6 +113,19 @@ class Processes:
                     with suppress(ProcessLookupError):
                         kill_process_tree(process)
             self._executor.shutdown()
+
+
+def _track_quietly() -> None:
+    """Start the process that removes semaphores which killed processes leave; it does so without warning of it."""
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker")))
+    try:
+        ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 @contextmanager
