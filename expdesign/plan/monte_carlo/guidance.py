@@ -170,8 +170,11 @@ class Guidance:
 
     def _passed(self, ships: np.ndarray, states: Array, on: np.ndarray) -> np.ndarray:
         """(k,) whether ships on a reference are as near to the start as this time; those in tolerance begin."""
-        early = 0.0 if self._last else 1.0 if self._moves else np.inf if self._steadies else 0.0
-        passed = on & (self._at[ships] >= self._end[ships] - early)
+        if self._steadies and not self._moves:
+            passed = on & self._stopping(ships)
+        else:
+            early = 1.0 if self._moves and not self._last else 0.0
+            passed = on & (self._at[ships] >= self._end[ships] - early)
         if passed.any():
             some = ships[passed]
             shares = self._within.used(states[passed], self._desired)
@@ -381,13 +384,17 @@ class Guidance:
         """
         helm = self._helm
         if not self._moves:
-            place = self._reference.at(self._at[ships])[:, :2]
-            near = lengths(place - self._desired[:2]) <= STEADY_HULLS * helm.vessel.length_m
-            return np.asarray(near & (lengths(states[:, :2] - place) <= self._within.position_m))
+            off_m = lengths(states[:, :2] - self._reference.at(self._at[ships])[:, :2])
+            return np.asarray(self._stopping(ships) & (off_m <= self._within.position_m))
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
         least_m, most_m = STEADY_HULLS * helm.vessel.length_m, STEADY_ROOM * self._within.position_m
         near = np.clip(most_m, least_m, self._water.start_tolerance * least_m) / sample_m
         return np.asarray(self._end[ships] - self._at[ships] <= near)
+
+    def _stopping(self, ships: np.ndarray) -> np.ndarray:
+        """(k,) whether ships (k,) are about to stop at the start, by their reference."""
+        left_m = lengths(self._reference.at(self._at[ships])[:, :2] - self._desired[:2])
+        return np.asarray(left_m <= STEADY_HULLS * self._helm.vessel.length_m)
 
     @property
     def _least_step_m(self) -> float:
