@@ -62,6 +62,22 @@ def test_transitions_are_left_to_the_rule_when_there_is_nothing_left_to_spend(wa
     assert found.tried == space.tried
 
 
+def accelerations(count: int, planner: str = "beam") -> PlanProblem:
+    """So many runs in open water, on the way to a goal 200 m to the north."""
+    vessel = ship()
+    go = acceleration(vessel)
+    return PlanProblem(
+        vessel=vessel,
+        area=area(shapely.box(-300, -300, 300, 300)),
+        environment=CALM,
+        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0, planner=planner),
+        primitives=(go,),
+        design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(count,)),
+        start=np.zeros(3),
+        goal=np.array([200.0, 0.0, 0.0]),
+    )
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("planner", ["beam", "lattice"])
 @pytest.mark.parametrize(("leg_s", "tries"), [(0.0, 11), (8.0, 3)])  # 2 s each at least: 11 x 2, or 3 x 8, pass 20
@@ -70,20 +86,8 @@ def test_a_search_that_is_stuck_ends_when_its_budget_is_worked_off_not_by_a_cloc
         asked.budget.spent_s += leg_s
 
     monkeypatch.setattr(AgilePlanner, "leg", nowhere)
-    vessel = ship()
-    go = acceleration(vessel)
-    problem = PlanProblem(
-        vessel=vessel,
-        area=area(shapely.box(-300, -300, 300, 300)),
-        environment=CALM,
-        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0, planner=planner),
-        primitives=(go,),
-        design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(1,)),
-        start=np.zeros(3),
-        goal=np.array([200.0, 0.0, 0.0]),
-    )
     with pytest.raises(NoPlan, match=f"time_budget_s = 20, {tries} places were tried: no leg leads to 'go' near 60"):
-        plan_trial(problem)
+        plan_trial(accelerations(1, planner))
 
 
 @pytest.mark.thorough
@@ -99,18 +103,6 @@ def test_a_run_from_which_no_leg_leads_on_is_placed_elsewhere(monkeypatch):
         return None if from_trap else found(planner, asked, water)
 
     monkeypatch.setattr(AgilePlanner, "leg", with_a_trap)
-    vessel = ship()
-    go = acceleration(vessel)
-    problem = PlanProblem(
-        vessel=vessel,
-        area=area(shapely.box(-300, -300, 300, 300)),
-        environment=CALM,
-        settings=PlanSettings(clearance_m=1.0, time_budget_s=20.0),
-        primitives=(go,),
-        design=SimpleNamespace(problem=SimpleNamespace(names=(go.name,)), repeats=(3,)),
-        start=np.zeros(3),
-        goal=np.array([200.0, 0.0, 0.0]),
-    )
-    sailed = draft_trial(problem).sailed
+    sailed = draft_trial(accelerations(3)).sailed
     assert trapped
-    assert [leg.name for leg in sailed.legs if leg.kind == "primitive"] == [go.name] * 3
+    assert [leg.name for leg in sailed.legs if leg.kind == "primitive"] == ["go"] * 3
