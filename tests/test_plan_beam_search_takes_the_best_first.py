@@ -10,9 +10,11 @@ import shapely
 
 from expdesign.plan.chart import GoalDistance
 from expdesign.plan.local_planner import Departure, PartialPlans, SearchSpace, Successors
+from expdesign.plan.local_planner.agile import AgilePlanner
 from expdesign.plan.search import place_runs
 from expdesign.plan.search.beam import SORTED_AT_ONCE, _in_order
 from expdesign.plan.search.local_search import clear_successors, runs_clear
+from expdesign.plan.values import WorkBudget
 from plan_case import leg_water, primitive, space_of
 
 START = np.array([0.0, -400.0, 0.0])
@@ -63,6 +65,24 @@ def test_each_run_and_each_order_is_told(space):
     shares = [share for _, share in told]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("orders", [0, 6])
+def test_runs_are_placed_and_moved_only_where_there_is_a_way_on(space, monkeypatch, orders):
+    usual = place_runs(space, [3], Departure(pose=START), width=20, orders=orders)
+    north_m = max(run.pose[0] for run in usual)
+    monkeypatch.setattr(AgilePlanner, "ways_on", lambda self, space, primitive, start, end: start[:, 0] > north_m)
+    placed = place_runs(space, [3], Departure(pose=START), width=20, orders=orders)
+    assert all(run.pose[0] > north_m for run in placed)
+
+
+def test_the_work_is_counted_the_same_each_time_and_polishing_is_work_too(space):
+    spent_s = []
+    for orders in (0, 6, 6):
+        budget = WorkBudget()
+        place_runs(space, [3], Departure(pose=START), width=20, orders=orders, budget=budget)
+        spent_s.append(budget.spent_s)
+    assert 0.0 < spent_s[0] < spent_s[1] == spent_s[2]
 
 
 def test_rows_chosen_from_several_sets_are_those_of_the_joined_set(space):
