@@ -76,6 +76,13 @@ def test_runs_are_placed_and_moved_only_where_there_is_a_way_on(space, monkeypat
     assert all(run.pose[0] > north_m for run in placed)
 
 
+def test_where_the_grid_knows_no_way_on_runs_are_placed_all_the_same(space, monkeypatch):
+    usual = place_runs(space, [3], Departure(pose=START), width=20, orders=0)
+    monkeypatch.setattr(AgilePlanner, "ways_on", lambda self, space, primitive, start, end: start[:, 0] > np.inf)
+    placed = place_runs(space, [3], Departure(pose=START), width=20, orders=0)
+    np.testing.assert_array_equal([run.pose for run in placed], [run.pose for run in usual])
+
+
 def test_the_work_is_counted_the_same_each_time_and_polishing_is_work_too(space):
     spent_s = []
     for orders in (0, 6, 6):

@@ -25,8 +25,6 @@ from expdesign.vessel import VesselModel
 
 # Estimates with their diagnostics.
 
-"""How the names of methods with instruments begin."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disturbances:

@@ -232,7 +232,7 @@ def for_confidence(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterato
 def for_sailing(problem: PlanProblem, refused: NoPlan, tell: Tell) -> Iterator[str]:
     """Less clearance, or a design without the run that no leg led to, with which every run is sailed.
 
-    Each takes a plan, whose legs are counted: none is begun that `REMEDY_WORK` leaves no work for.
+    Each takes a plan, which is counted: none is begun that `REMEDY_WORK` leaves no work for.
     """
     budget, affords = _limit(refused.spent_s)
     asked = problem.settings.clearance_m

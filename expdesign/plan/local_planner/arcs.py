@@ -15,8 +15,8 @@ from expdesign.values import Array
 ARC_TURNS_DEG = (0, 15, -15, 30, -30, 50, -50, 75, -75, 105, -105, 140, -140, 180, -180)
 ARC_STRAIGHTS = (0.0, 1.0, 2.0, 3.0, 4.5, 6.0)
 PATH_HEADINGS_DEG = (0, 30, -30, 60, -60, 90, -90, 135, -135, 180)  # headings of runs on it, from its direction
-WAY_TURNS, WAY_RAD, WAY_POINTS = (0.0, 1.0, -1.0), np.pi / 3, 5  # arcs of ways on, their turn, places looked at on each
-WAY_ARCS = 3  # arcs of a way on: half a turn to either side, or as far straight ahead
+# ways on: turns of their arcs and straights, all as long, how many follow each other, and places looked at on each
+WAY_TURNS_DEG, WAY_ARCS, WAY_POINTS = (0, 60, -60), 3, 5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,23 +156,18 @@ def ways_on(space: SearchSpace, pose: Array, *, backwards: bool = False) -> np.n
     found = np.asarray(clearance_m >= margin_m + 2.0 * radius_m)  # a turning circle
     rows = np.flatnonzero(~found & (clearance_m >= margin_m))
     places = pose[rows] + np.array([0.0, 0.0, np.pi * backwards])
+    turns = np.deg2rad(WAY_TURNS_DEG)
+    straights_m = np.where(turns == 0.0, radius_m * np.abs(turns).max(), 0.0)
     for _ in range(WAY_ARCS):
-        bends = np.repeat(WAY_TURNS, len(rows)) / radius_m
-        rows, places = np.tile(rows, len(WAY_TURNS)), np.tile(places, (len(WAY_TURNS), 1))
+        turn, straight_m = np.repeat(turns, len(rows)), np.repeat(straights_m, len(rows))
+        rows, places = np.tile(rows, len(turns)), np.tile(places, (len(turns), 1))
         clear = np.ones(len(rows), dtype=bool)
         for share in np.linspace(0.0, 1.0, WAY_POINTS + 1)[1:]:
-            ends = _along_arc(places, bends, share * WAY_RAD * radius_m)
+            ends = arc_end(places, share * turn, share * straight_m, radius_m)
             clear &= space.field.at(ends[:, :2]) >= margin_m
         rows, places = rows[clear], ends[clear]
     found[rows] = True
     return found
-
-
-def _along_arc(pose: Array, curvature: Array, length_m: float) -> Array:
-    """(n, 3) poses (n, 3) moved along arcs of curvatures (n,), or straight on."""
-    half = curvature * length_m / 2
-    chord_m = length_m * np.sinc(half / np.pi)
-    return moved(pose, np.stack([chord_m * np.cos(half), chord_m * np.sin(half), 2 * half], axis=1))
 
 
 def between(start: Array, end: Array, spacing_m: float) -> Array:

@@ -148,7 +148,10 @@ def _advance(
     found = space.planner.successors(space, beam)
     budget.placed(sum(map(len, found)))
     left = beam.left[:, None] - np.eye(len(space.footprints), dtype=int)  # (b, q, q) after each next run
-    chosen = _select(space, found, left, _totals_s(space, beam, found, left, ahead), width)
+    totals_s = _totals_s(space, beam, found, left, ahead)
+    chosen = _select(space, found, left, totals_s, width)
+    if not len(chosen):  # the grid may not know of a way that is there
+        chosen = _select(space, found, left, totals_s, width, closed=True)
     if not len(chosen):
         raise _what_blocks(space, beam)
     return PartialPlans(
@@ -185,14 +188,20 @@ def _totals_s(
 
 
 def _select(
-    space: SearchSpace, found: Sequence[Successors], left: np.ndarray, totals_s: Array, width: int
+    space: SearchSpace,
+    found: Sequence[Successors],
+    left: np.ndarray,
+    totals_s: Array,
+    width: int,
+    *,
+    closed: bool = False,
 ) -> Successors:
     """The best successors whose leg and run are clear, at most one for each kind of place and remainder."""
     kept: list[int] = []
     seen: set[tuple[int, ...]] = set()
     for rows in _in_order(totals_s, CHECKED_AT_ONCE):
         some = Successors.chosen(found, rows)
-        clear = clear_successors(space, some)
+        clear = clear_successors(space, some, closed=closed)
         some, rows = some[clear], rows[clear]
         places = np.rint(some.end[:, :2] / (CELL_HULLS * space.hull_m)).astype(int)
         headings = np.rint(wrap_angle(some.end[:, 2]) / HEADING_RAD).astype(int)

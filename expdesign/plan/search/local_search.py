@@ -33,8 +33,11 @@ LEAST_GAIN_S = 0.05  # for which a block is moved
 # Whether successors of partial plans keep their clearances on the grid.
 
 
-def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
-    """(n,) whether legs, runs and their ends keep their margins on the grid, with a way to each run and on after it."""
+def clear_successors(space: SearchSpace, found: Successors, *, closed: bool = False) -> np.ndarray:
+    """(n,) whether legs, runs and their ends keep their margins on the grid, with a way to each run and on after it.
+
+    With `closed` also where there is no such way, as far as the grid knows.
+    """
     start, turn = found.start, found.turn
     clear: np.ndarray = _ends_clear(space, start, found.end) & ~space.is_refused(start)
     arcs = np.flatnonzero(clear & ~np.isnan(turn))
@@ -44,7 +47,8 @@ def clear_successors(space: SearchSpace, found: Successors) -> np.ndarray:
     left = np.flatnonzero(clear)
     left = left[~_surely_clear(space, found.primitive[left], start[left])]
     clear[left] = _hulls_clear(space, found.primitive[left], start[left])
-    clear[clear] = space.planner.ways_on(space, found.primitive[clear], start[clear], found.end[clear])
+    if not closed:
+        clear[clear] = space.planner.ways_on(space, found.primitive[clear], start[clear], found.end[clear])
     return clear
 
 
@@ -278,11 +282,11 @@ class _Legs:
             np.concatenate([starts, ends[..., :2]], axis=1).reshape(-1, 2),
             np.concatenate([some[..., :2], stops], axis=1).reshape(-1, 2),
         )
-        seen = shapely.covers(self.space.goal_distance.graph.water, lines)
-        clear[clear] = seen.reshape(len(some), len(runs) + 1).all(axis=1)
-        some = blocks[clear].reshape(-1, 3)
-        primitive = primitive[: len(some)]
-        on = self.space.planner.ways_on(self.space, primitive, some, run_ends(self.space, primitive, some))
+        covered = shapely.covers(self.space.goal_distance.graph.water, lines)
+        seen = covered.reshape(len(some), len(runs) + 1).all(axis=1)
+        some, ends = some[seen].reshape(-1, 3), ends[seen].reshape(-1, 3)
+        on = self.space.planner.ways_on(self.space, primitive[: len(some)], some, ends)
+        clear[clear] = seen
         clear[clear] = on.reshape(-1, len(runs)).all(axis=1)
         return clear
 
