@@ -1,8 +1,11 @@
 """The filter of the unmeasured force judges stretch by stretch as all of them together would be judged."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from expdesign.monitoring.cusum import SURELY, _scattered
 from expdesign.monitoring.evidence import stretches_of
 from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
@@ -90,3 +93,28 @@ def test_a_wind_that_keeps_its_direction_is_known_by_the_cosine_of_a_turn() -> N
         assert turning.memory(60.0, turn)[1] == pytest.approx(np.exp(-0.1))
     assert turning.memory(60.0, 2.0)[0] == 0.0
     assert turning.memory(60.0, np.nan) == pytest.approx(np.exp(-0.1))
+
+
+@pytest.mark.parametrize(("scatter", "shift"), [(1.0, 0.0), (1.0, 5.0), (3.0, 0.0)])
+def test_scores_that_scatter_by_chance_count_whole_and_those_moved_up_and_down_by_gusts_do_not(scatter, shift) -> None:
+    """A steady change moves all scores by its size times their information, and is no scatter."""
+    rng, trials, count = np.random.default_rng(8), 2000, 12
+    information = rng.uniform(0.5, 2.0, (trials, count))
+    score = shift * information + scatter * np.sqrt(information) * rng.standard_normal((trials, count))
+    calibration = SimpleNamespace(inflation=np.ones(1))
+    found = []
+    for known, seen in zip(information, score, strict=True):
+        sums = SimpleNamespace(
+            stretches=np.array([float(count)]),
+            information=np.array([[[known.sum()]]]),
+            score=np.array([[seen.sum()]]),
+            squares=np.array([[(seen**2 / known).sum()]]),
+        )
+        found.append(_scattered(SimpleNamespace(shift=np.zeros(1), sums=sums), 0, calibration))
+    more = np.mean(np.array(found) > 1.0)
+    if scatter == 1.0:
+        chance = 1.0 - SURELY
+        assert abs(more - chance) < 3.0 * np.sqrt(chance * SURELY / trials)
+    else:
+        assert more > 0.99
+        assert np.median(found) > 3.0
