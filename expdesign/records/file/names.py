@@ -15,9 +15,9 @@ from expdesign.signals import AUXILIARY
 FORCES = ("tau_x", "tau_y", "tau_psi")
 STEERED, PLANNED, REACHED = "steered", "planned_", "reached_"
 PLAIN = ("batch", STEERED, *FORCES)
+"""Names without a unit."""
 LABEL = "manoeuvre"
 """A column of texts, which only `records.labels` reads."""
-"""Names without a unit."""
 
 DEGREE = math.pi / 180.0
 SPEED = {
