@@ -42,7 +42,6 @@ FLOORS = {
         ("identify",),
     ),
     "estimation": (
-        ("tuning",),
         ("regression",),
         ("noise", "replay"),
         ("solve",),

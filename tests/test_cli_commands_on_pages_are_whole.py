@@ -18,7 +18,7 @@ from expdesign.estimation.excitation import SAMPLES
 from expdesign.estimation.instrumental import STARTS
 from expdesign.estimation.regression import MEANS, UNKNOWN
 from expdesign.estimation.replay import STEERED
-from expdesign.estimation.replay.compiled import INTEGRATORS
+from expdesign.estimation.replay.replay import INTEGRATORS
 from expdesign.estimation.solve import BLOCKS
 from expdesign.information import MEAN_SUBTRACTIONS
 from expdesign.monitoring.tuning import TUNING

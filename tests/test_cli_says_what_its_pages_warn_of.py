@@ -14,7 +14,7 @@ import pytest
 
 from design_case import SCENARIOS
 from expdesign.cli import main
-from expdesign.cli.summary import as_json, print_summary
+from expdesign.cli.commands import as_json, print_summary
 from expdesign.export.document import Table
 from expdesign.scenario import load_scenario
 from expdesign.sea_area import UNKNOWN_DEPTH

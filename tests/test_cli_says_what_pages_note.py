@@ -10,7 +10,7 @@ import pytest
 
 import expdesign.export
 from expdesign.cli import main
-from expdesign.cli.summary import as_json, print_summary
+from expdesign.cli.commands import as_json, print_summary
 from expdesign.workflows import Outcome
 from instrumented_ship import POSE, voyages, write_log, write_vessel
 

@@ -19,7 +19,7 @@ from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay import simulate_batch
 from expdesign.estimation.solve import Prior
-from expdesign.estimation.tuning import TUNING
+from expdesign.estimation.solve.solution import MOST_REFINEMENTS
 from expdesign.signals import Batch
 
 
@@ -79,7 +79,7 @@ def test_equations_that_do_not_settle_keep_their_first_instruments() -> None:
     """After one refinement nothing has settled: the estimate is that of the first instruments, and a warning tells."""
     data = record(measured(TRUE, commands(2000, np.random.default_rng(7)), weather=CALM_CURRENT, seed=8))
     first, restless, settled = (
-        estimate(data, NOMINAL, settings=Settings(most_refinements=most)) for most in (0, 1, TUNING.most_refinements)
+        estimate(data, NOMINAL, settings=Settings(most_refinements=most)) for most in (0, 1, MOST_REFINEMENTS)
     )
     np.testing.assert_array_equal(restless.values, first.values)
     assert any("keep their first instruments" in warning for warning in restless.warnings)

@@ -16,13 +16,12 @@ from expdesign.estimation.noise.components import (
     stretches,
 )
 from expdesign.estimation.noise.coupled import Coupled, coupled_covariance, fit_coupled
-from expdesign.estimation.noise.covariance import score_covariance
+from expdesign.estimation.noise.covariance import SPECTRUM_MISFIT, score_covariance
 from expdesign.estimation.regression import build_layout, build_regression
 from expdesign.estimation.regression.regression import single_output
 from expdesign.estimation.replay.instruments import apart_from_start
 from expdesign.estimation.solve.sandwich import widening
 from expdesign.estimation.solve.solution import Weighting, solve_iv
-from expdesign.estimation.tuning import TUNING
 from expdesign.simulation import Variation
 from expdesign.simulation.environment import vary
 
@@ -188,7 +187,7 @@ def test_small_forces_are_found_beside_the_sensor_noise_of_another_output() -> N
     assert (np.abs(error) < 5 * std).all(), error / std
     assert std[0] < 0.15 * force[0] ** 2  # by itself, sway knows its force to 60 % only
     assert found.variances[:, 2:].sum() < 0.05 * force[0] ** 2
-    assert (found.misfit < TUNING.spectrum_misfit).all()
+    assert (found.misfit < SPECTRUM_MISFIT).all()
 
 
 def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> None:
@@ -196,7 +195,7 @@ def test_noise_of_other_shape_is_noticed_and_noise_of_these_parts_is_not() -> No
     parts = stretches(np.zeros(2000, dtype=np.int64), np.arange(2000))
 
     def noticed(noise: np.ndarray) -> float:
-        return float(np.mean([fitted.misfit > TUNING.spectrum_misfit for fitted in fit_components(noise.T, parts)]))
+        return float(np.mean([fitted.misfit > SPECTRUM_MISFIT for fitted in fit_components(noise.T, parts)]))
 
     e = rng.normal(size=(100, 2001))
     assert noticed(np.diff(e) + 0.3 * rng.normal(size=(100, 2000))) < 0.01 + 4 * np.sqrt(0.01 * 0.99 / 100)

@@ -15,7 +15,7 @@ from typing import get_args
 import pytest
 
 import expdesign.export
-from expdesign.cli.summary import as_json, print_summary
+from expdesign.cli.commands import as_json, print_summary
 from expdesign.export.document import (
     Block,
     Document,

@@ -23,8 +23,7 @@ from expdesign.export.report import report_html
 from expdesign.export.report.chart import chart, draw_position_ticks, footprints, nice_step, place_labels, sea_figure
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
-from expdesign.export.report.design import chain
-from expdesign.export.report.parameters import parameter_rows
+from expdesign.export.report.design import chain, parameter_rows
 from expdesign.growing.search import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM

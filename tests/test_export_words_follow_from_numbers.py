@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from expdesign.export import words
 from expdesign.export.files import Known
-from expdesign.export.report.parameters import known_sentences
+from expdesign.export.report.design import known_sentences
 from expdesign.export.whatif_content import Case, WhatIfContent, explanations
 from expdesign.export.words import MINUS, NB
 from expdesign.sea_area import LocalFrame

@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 from design_case import SCENARIOS
 from expdesign.diagnosis.vessel_file import extended_model
 from expdesign.errors import InputError
-from expdesign.export.operation_page import (
+from expdesign.export.foresight_page import (
     OperationContent,
     operation_document,
     operation_json,

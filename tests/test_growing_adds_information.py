@@ -14,7 +14,7 @@ from expdesign.errors import InputError, UnknownName
 from expdesign.growing.loop import grow_dictionary, motion_limits, optimum, sensitivity
 from expdesign.growing.search import GrowSettings, Growth, Measure, Worth, family_spaces, pool_of, refined, violation
 from expdesign.information import MEAN_SUBTRACTIONS, score_primitives
-from expdesign.information.many import bordered_runs
+from expdesign.information.disturbed import bordered_runs
 from expdesign.simulation import CALM, Environment
 from rudder_ship import rudder_ship
 

@@ -8,7 +8,7 @@ import pytest
 from expdesign.importing import family, presumed, sides
 from expdesign.importing.mapping import Mapping, Use
 from expdesign.importing.sampling import Stretch
-from expdesign.indices.steered_run import orders
+from expdesign.indices.read import orders
 from expdesign.signals import Batch
 from expdesign.simulation.helm import Helm
 from logged_trial import Voyage, voyage

@@ -14,8 +14,7 @@ import pytest
 from expdesign.cli import main
 from expdesign.errors import FileError
 from expdesign.importing import Channel, Log, guess, read_log
-from expdesign.importing.mapping import dimension
-from expdesign.importing.units import FACTORS, SHARES, unit_word
+from expdesign.importing.mapping import FACTORS, SHARES, dimension, unit_word
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -11,10 +11,9 @@ from expdesign.durations import DurationProblem, bordered, build_durations, opti
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named
 from expdesign.estimation.regression import build_layout, model_for
-from expdesign.indices import outcomes
+from expdesign.indices import outcome_gradients, outcomes
 from expdesign.information import score_primitives
 from expdesign.information.disturbed import score_augmented
-from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.recorded import pooled, recorded_information
 from expdesign.signals import Batch, Record
 from expdesign.simulation import simulate, steady_ahead

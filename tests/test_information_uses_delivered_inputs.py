@@ -15,9 +15,8 @@ import pytest
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.durations import bordered
 from expdesign.information import score_primitives
-from expdesign.information.disturbed import score_augmented
+from expdesign.information.disturbed import bordered_runs, score_augmented
 from expdesign.information.expected import TrialPart, expected_covariance
-from expdesign.information.many import bordered_runs
 from expdesign.information.recorded import recorded_information
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.signals import Batch, Record

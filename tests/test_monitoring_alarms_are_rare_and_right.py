@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.export.monitor_page import Moment, MonitorContent, monitor_document
-from expdesign.export.monitor_page.content import monitor_json, sentences
+from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json, sentences
+from expdesign.export.monitor_page import monitor_document
 from expdesign.export.pages import document_html
 from expdesign.monitoring import (
     AS_LIKELY,

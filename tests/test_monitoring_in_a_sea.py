@@ -14,7 +14,7 @@ from expdesign.cli import main
 from expdesign.diagnosis.motion import stable_windows
 from expdesign.diagnosis.select import Suspected, suspected_tests
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.export.monitor_page.content import said_of_reference
+from expdesign.export.monitor_content import said_of_reference
 from expdesign.monitoring import (
     WHITE,
     Alarm,

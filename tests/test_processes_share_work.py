@@ -18,7 +18,7 @@ import pytest
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError, NoPlan, NotInformative, SpeedOutOfReach, UnknownName
 from expdesign.processes import as_finished, in_order, local_processes
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.outcome import workers
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.cli.summary import print_summary
+from expdesign.cli.commands import print_summary
 from expdesign.errors import FileError
 from expdesign.export.document import Table
 from expdesign.scenario import load_scenario

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from expdesign.errors import InputError
+from expdesign.indices import outcome_gradients
 from expdesign.information.expected import expected_covariance
-from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import load_scenario
 from expdesign.shortest_day import AccuracySettings, stated_accuracy

@@ -12,8 +12,16 @@ from expdesign.estimation.excitation import ALL, SAMPLES, WorstCase, with_strata
 from expdesign.estimation.output_error import ActuatorTime, Begun
 from expdesign.estimation.regression import Guess, Layout, Rows, build_regression
 from expdesign.estimation.replay import STEERED, InstrumentModel, Integration, Replay, apart_from_start, build_replay
-from expdesign.estimation.solve import Prior, Refined, Solution, Weighting, refine_iv, solve_ls
-from expdesign.estimation.tuning import TUNING
+from expdesign.estimation.solve import (
+    MOST_REFINEMENTS,
+    SETTLED_DEVIATIONS,
+    Prior,
+    Refined,
+    Solution,
+    Weighting,
+    refine_iv,
+    solve_ls,
+)
 from expdesign.signals import Record
 from expdesign.values import Array
 from expdesign.vessel import Sensors
@@ -38,7 +46,7 @@ class Settings:
     # how IV equations are formed; least squares subtracts no mean and uses one block
     weighting: Weighting = field(default_factory=lambda: Weighting(mean="complete"))
     start: str = "nominal"  # first instruments from the "nominal" model or from the "ls" estimate
-    most_refinements: int = TUNING.most_refinements  # 0 for instruments of the first model only
+    most_refinements: int = MOST_REFINEMENTS  # 0 for instruments of the first model only
     heading: str = "measured"  # of the instruments, "measured" or "simulated"
     wind: str = "lagged"  # of the instruments, "lagged", "mean" or "measured"
     # how models are simulated, for instruments and for output error
@@ -120,7 +128,7 @@ def _settled_current(
         layout, _, refined = found
         moved, old = refined.solution.values[-2:], layout.guess
         assert old is not None
-        if (np.abs(moved) <= TUNING.settled_deviations * np.sqrt(np.diag(refined.solution.covariance)[-2:])).all():
+        if (np.abs(moved) <= SETTLED_DEVIATIONS * np.sqrt(np.diag(refined.solution.covariance)[-2:])).all():
             break
         parameters = layout.full_parameters(refined.solution.values)
         guess = Guess(

@@ -2,7 +2,7 @@
 
 A function of each kind of result says once what is found, what is noted, and in which tables and figures. Findings,
 facts and notes are on the page (`expdesign.export.pages.document_html`), on the terminal and in the JSON of a command
-(`expdesign.cli.summary`), wherever they stand in the document; paragraphs and figures are on the page alone.
+(`expdesign.cli.commands`), wherever they stand in the document; paragraphs and figures are on the page alone.
 """
 
 from __future__ import annotations

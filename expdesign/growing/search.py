@@ -17,7 +17,7 @@ from expdesign.dictionary import Family, PrimitiveSpec, Setting
 from expdesign.dictionary.build import excite_many
 from expdesign.errors import InputError
 from expdesign.information import PrimitiveInformation
-from expdesign.information.many import bordered_runs
+from expdesign.information.disturbed import bordered_runs
 from expdesign.processes import in_order
 from expdesign.progress import Progress, silent
 from expdesign.simulation import Environment

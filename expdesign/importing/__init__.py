@@ -16,18 +16,20 @@ Times count from 1970 UTC where a clock has a date. Angles are in radians, headi
 from expdesign.importing.alignment import lag_of, zone_lag_of
 from expdesign.importing.channels import COMPUTER, GNSS, NONE, OWN, Channel, Log, joined
 from expdesign.importing.guess import guess
-from expdesign.importing.labels import family, fitted, presumed
-from expdesign.importing.machines import bow_signals, sides
 from expdesign.importing.mapping import FileClock, Mapping
+from expdesign.importing.names import bow_signals, sides
 from expdesign.importing.readers import READERS, read_log
 from expdesign.importing.responses import Followed, followed, sensor_keys
 from expdesign.importing.runs import (
     Run,
     cut,
     cut_by_plan,
+    family,
     file_name,
+    fitted,
     inputs_of,
     length_of_speed_m,
+    presumed,
     typical_length_m,
 )
 from expdesign.importing.sampling import NothingToWrite, Sampled, Stretch, sampled

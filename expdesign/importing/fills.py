@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from expdesign.importing.channels import Channel, Log
+from expdesign.importing.mapping import counted
 from expdesign.importing.names import family_of, marked
-from expdesign.importing.units import counted
 from expdesign.values import Array
 
 NINES = tuple(float(f"{'9' * digits}{end}") for digits in (2, 3, 4, 5, 6) for end in ("", ".9", ".99"))

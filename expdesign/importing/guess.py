@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.importing.channels import Channel, Log, Places
-from expdesign.importing.machines import numbered
 from expdesign.importing.mapping import (
     COG,
     EASTWARD,
+    FACTORS,
     MAGNETIC,
     NORTHWARD,
     SOG,
@@ -22,8 +22,7 @@ from expdesign.importing.mapping import (
     Use,
     dimension,
 )
-from expdesign.importing.names import COURSE_OR_HEADING, Mark, family_of, marked
-from expdesign.importing.units import FACTORS
+from expdesign.importing.names import COURSE_OR_HEADING, Mark, family_of, marked, numbered
 from expdesign.values import Array
 from expdesign.vessel import Actuator
 

@@ -21,5 +21,5 @@ from expdesign.indices.criteria import (
     judge,
 )
 from expdesign.indices.measured import NotStandard, measured_trial
-from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcomes, standard_results
-from expdesign.indices.steered_run import steered_run
+from expdesign.indices.outcomes import OUTCOMES, StandardResults, outcome_gradients, outcomes, standard_results
+from expdesign.indices.read import steered_run

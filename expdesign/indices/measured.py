@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from expdesign.errors import InputError
 from expdesign.indices.criteria import Circle, Stop, ZigZag
-from expdesign.indices.read import SIDE_NAMES, read_circle, read_stop, read_zigzag
-from expdesign.indices.steered_run import SteeredRun, orders
+from expdesign.indices.read import SIDE_NAMES, SteeredRun, orders, read_circle, read_stop, read_zigzag
 from expdesign.signals import Batch
 from expdesign.simulation import Helm, steady_ahead
 from expdesign.vessel import Vessel

@@ -7,6 +7,5 @@ Parameters, frames and signs are those of `roll`; parameters that the vessel fil
 free, the others count as known.
 """
 
-from expdesign.loading.choice import LoadPlan, Question, build_question, choose_loads
+from expdesign.loading.choice import LoadOption, LoadPlan, Question, build_question, choose_loads, run_information
 from expdesign.loading.inclining import Inclining, heel_in_waves, heel_of_shift, inclining
-from expdesign.loading.information import LoadOption, run_information

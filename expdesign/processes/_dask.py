@@ -180,7 +180,7 @@ def _sent_by_value() -> tuple[Callable[..., tuple[str, str, bytes]], Callable[[S
         found = own_version()
         if found != expected:
             return get_worker().address, found, b""
-        from expdesign.processes.local import outcome_of
+        from expdesign.processes.sharing import outcome_of
 
         return get_worker().address, found, outcome_of(both, task)
 

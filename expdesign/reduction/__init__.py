@@ -8,11 +8,12 @@ Lags, dead times, dead bands and misalignments act on inputs as in simulation (`
 `simulation.sensors.observe` are undone in reverse: time, own axes and scale, place.
 """
 
-from expdesign.reduction.averaging import averaged, samples_of_a_mean
 from expdesign.reduction.reduce import (
     at_reference_point,
+    averaged,
     readings_by_sensor,
     reduced,
+    samples_of_a_mean,
     with_delivered_inputs,
     with_reduced_wind,
 )

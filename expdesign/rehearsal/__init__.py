@@ -1,5 +1,13 @@
 """Designs put to the test: Monte Carlo trials of a true ship, and subsets of recorded data."""
 
-from expdesign.rehearsal.covariances import Alone, estimates_alone
 from expdesign.rehearsal.recorded import Drawn, drawn_subsets, random_subsets, recorded_pieces, try_subsets
-from expdesign.rehearsal.validation import RANDOM, Rehearsal, Validated, equal_runs, trial_parts, validate
+from expdesign.rehearsal.validation import (
+    RANDOM,
+    Alone,
+    Rehearsal,
+    Validated,
+    equal_runs,
+    estimates_alone,
+    trial_parts,
+    validate,
+)

@@ -10,7 +10,13 @@ every manoeuvre evenly over the wind. Predictions use these headings.
 Trials are divided into chunks with independent random streams: the result does not depend on the number of processes,
 and finished chunks are kept.
 
-Source: F. Ljungberg, doctoral thesis, Linköping University, 9.1.2.
+Covariances of estimates from each primitive alone (7.59) come from trials that are a few runs of one primitive by the
+nominal ship, measured with its sensors and estimated from alone. The scatter about the nominal parameters counts bias
+as well as noise. A primitive whose trials do not all give an estimate of every parameter is not informative on its own,
+and has no covariance. Where instruments are weak, few trials far off decide the covariance: the assumption (7.60) of
+normal estimates then fails, and shares by information are safer.
+
+Source: F. Ljungberg, doctoral thesis, Linköping University, 7.3.1 and 9.1.2.
 """
 
 from __future__ import annotations
@@ -21,6 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.dictionary import Primitive
+from expdesign.durations import monte_carlo_covariance
 from expdesign.errors import InputError, NoAnswer
 from expdesign.estimation.excitation import EQUATION_WISE, worst_case
 from expdesign.estimation.instrumental import Settings
@@ -220,10 +227,8 @@ def _sailed(rehearsal: Rehearsal, runs: Sequence[int], trials: int, rng: np.rand
             rows = Record(batches=tuple(replace(ensemble.batch(trial), name=name) for trial in range(trials)))
             rows = with_delivered_inputs(rows, rehearsal.nominal.model, standing=primitive.entry_inputs)
             batches.append(rows.batches)
-    return [
-        at_reference_point(Record(batches=tuple(rows)), rehearsal.nominal.sensors)
-        for rows in zip(*batches, strict=True)
-    ]
+    sensors = rehearsal.nominal.sensors
+    return [at_reference_point(Record(batches=tuple(rows)), sensors) for rows in zip(*batches, strict=True)]
 
 
 def heading_rad(number: int) -> float:
@@ -237,12 +242,10 @@ def _estimated(rehearsal: Rehearsal, record: Record) -> Array:
     fixed = tuple(name for name in model.names if name not in rehearsal.parameters)
     settings = Settings(fixed=fixed, weighting=Weighting(mean=rehearsal.mean_subtraction))
     if rehearsal.excitation != FREE:
-        weather, sigmas = rehearsal.environment, SIGMAS
-        worst = worst_case(
-            rehearsal.nominal.sensors,
-            current_mps=float(np.hypot(*weather.current_to)) + sigmas * weather.current_std_mps,
-            wind_mps=float(np.hypot(*weather.wind_to)) + sigmas * weather.wind_std_mps,
-        )
+        weather, sensors = rehearsal.environment, rehearsal.nominal.sensors
+        current_mps = float(np.hypot(*weather.current_to)) + SIGMAS * weather.current_std_mps
+        wind_mps = float(np.hypot(*weather.wind_to)) + SIGMAS * weather.wind_std_mps
+        worst = worst_case(sensors, current_mps=current_mps, wind_mps=wind_mps)
         settings = replace(settings, samples=EQUATION_WISE, worst=worst)
     if rehearsal.integrator == "rk4":
         settings = replace(settings, integration=Integration("rk4", SUBSTEPS), quadrature="trapezoid")
@@ -326,4 +329,121 @@ def trial_parts(
         )
         for primitive, number in zip(primitives, runs, strict=True)
         for turn in range(count if number else 0)
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Alone:
+    """Estimates from one primitive alone."""
+
+    primitive: Primitive  # the manoeuvre
+    runs: int  # whole runs of it in every trial
+    parameters: tuple[str, ...]  # p names
+    nominal: Array  # (p,) parameters of the ship that was simulated
+    estimates: Array  # (n, p) of the trials that give one
+    failed: int  # trials without an estimate
+
+    def __post_init__(self) -> None:
+        seal(self, nominal="p", estimates="n p")
+
+    @property
+    def informative(self) -> bool:
+        """Whether every trial gives an estimate, and there are enough for a regular covariance."""
+        return not self.failed and len(self.estimates) > len(self.parameters) + 1
+
+    @property
+    def covariance(self) -> Array:
+        """(p, p) about the nominal parameters.
+
+        Raises:
+            InputError: the primitive is not informative.
+        """
+        if not self.informative:
+            raise InputError(f"{self.primitive.name!r} is not informative on its own")
+        return monte_carlo_covariance(self.estimates, self.nominal)
+
+    @property
+    def seconds(self) -> float:
+        """Length of the data of a trial [s]."""
+        return self.runs * self.primitive.duration_s
+
+
+def estimates_alone(
+    vessel: Vessel,
+    primitives: Sequence[Primitive],
+    *,
+    parameters: Sequence[str],
+    total_s: float,
+    trials: int,
+    environment: Environment = CALM,
+    method: str = "iv",
+    mean_subtraction: str = "complete",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[Alone, ...]:
+    """Estimates from trials of each primitive alone, as long as its equal share of a time.
+
+    Args:
+        vessel: nominal ship, simulated and estimated in the form of its model: continuous motion, or Euler's map.
+        parameters: names to estimate; the others are held.
+        total_s: informative time of the whole design [s].
+        trials: of each primitive.
+        environment: weather, drawn anew for each trial as far as it is uncertain.
+        seed: of all random numbers.
+
+    Raises:
+        InputError: fewer trials than a covariance of so many parameters needs.
+    """
+    if trials <= len(parameters) + 1:
+        raise InputError(f"{trials} trials give no covariance of {len(parameters)} parameters, expected more than "
+                         f"{len(parameters) + 1}")  # fmt: skip
+    runs = equal_runs(primitives, total_s)
+    names = [str(number) for number in range(len(primitives))]
+    alone = {name: tuple(count if name == other else 0 for other, count in zip(names, runs, strict=True))
+             for name in names}  # fmt: skip
+    continuous = vessel.model.form == "continuous"
+    rehearsal = Rehearsal(
+        truth=vessel,
+        nominal=vessel,
+        primitives=tuple(primitives),
+        designs=alone,
+        total_s=total_s,
+        environment=environment,
+        parameters=tuple(parameters),
+        method=method,
+        mean_subtraction=mean_subtraction,
+        integrator="rk4" if continuous else "euler",
+        trials=trials,
+        seed=seed,
+    )
+    chunks = [(name, number) for name in names for number in range(-(-trials // CHUNK_TRIALS))]
+    found: dict[tuple[str, int], Array] = {}
+    for name, number, rows in as_finished(_runs_of_one, (rehearsal,), chunks):
+        found[name, number] = rows
+        progress("simulating each manoeuvre alone", len(found) / len(chunks))
+    known = dict(zip(vessel.model.names, vessel.model.parameters.tolist(), strict=True))
+    nominal = np.array([known[name] for name in parameters])
+    return tuple(
+        _alone(primitive, count, rehearsal.parameters, nominal, [found[key] for key in chunks if key[0] == name])
+        for name, primitive, count in zip(names, primitives, runs, strict=True)
+    )
+
+
+def _runs_of_one(rehearsal: Rehearsal, name: str, number: int) -> tuple[str, int, Array]:
+    trials = min(CHUNK_TRIALS, rehearsal.trials - number * CHUNK_TRIALS)
+    return name, number, estimates_of(rehearsal, name, number, trials)
+
+
+def _alone(
+    primitive: Primitive, runs: int, parameters: tuple[str, ...], nominal: Array, parts: Sequence[Array]
+) -> Alone:
+    rows = np.concatenate(parts)[:, : len(parameters)]
+    kept = rows[np.isfinite(rows).all(axis=1)]
+    return Alone(
+        primitive=primitive,
+        runs=runs,
+        parameters=parameters,
+        nominal=nominal,
+        estimates=kept,
+        failed=len(rows) - len(kept),
     )

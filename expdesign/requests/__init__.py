@@ -9,7 +9,6 @@ import shlex
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from expdesign.requests.operation import Monitor, WatchSteps
 from expdesign.requests.options import Argument, Request
 from expdesign.requests.planning import (
     CheckRoute,
@@ -23,7 +22,7 @@ from expdesign.requests.planning import (
     Score,
     WhatIf,
 )
-from expdesign.requests.recorded import Diagnose, Estimate, IdentifySteps, Import, Indices, Mine
+from expdesign.requests.recorded import Diagnose, Estimate, IdentifySteps, Import, Indices, Mine, Monitor, WatchSteps
 from expdesign.requests.trials import Foresee, Incline, Replan, Roll, Simulate, TrialResult, Validate
 
 

@@ -10,9 +10,8 @@ from expdesign.scenario.card_file import load_card
 from expdesign.scenario.charts import load_area
 from expdesign.scenario.design_file import load_repeats
 from expdesign.scenario.dictionaries import load_dictionary
-from expdesign.scenario.instruments_file import INSTRUMENTS, equipped_vessel
+from expdesign.scenario.import_files import INSTRUMENTS, equipped_vessel, load_mapping
 from expdesign.scenario.loads_file import LoadCases, load_cases
-from expdesign.scenario.mapping_file import load_mapping
 from expdesign.scenario.scenario_file import load_scenario
 from expdesign.scenario.values import Scenario
 from expdesign.scenario.variants import load_variant

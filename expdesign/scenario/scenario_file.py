@@ -21,7 +21,7 @@ from expdesign.scenario.charts import Latitude, Longitude, load_area
 from expdesign.scenario.design_file import design_settings, named_files
 from expdesign.scenario.design_tables import DesignTable
 from expdesign.scenario.dictionaries import NAME, NAME_RULE, load_dictionary
-from expdesign.scenario.instruments_file import equipped_vessel
+from expdesign.scenario.import_files import equipped_vessel
 from expdesign.scenario.tables import Entry, NonNegative, Number, Positive, Table, Text, check_table, read_toml, shown
 from expdesign.scenario.values import Scenario
 from expdesign.scenario.vessels import EnvironmentTable, build_environment

@@ -28,9 +28,9 @@ from expdesign.durations import Collected, DurationDesign
 from expdesign.durations.criteria import LogTrace, congruent
 from expdesign.durations.measures import SmoothMeasure
 from expdesign.errors import InputError, NotInformative
+from expdesign.indices import outcome_gradients
 from expdesign.information.disturbed import beside_current, curved_beside_current, slope_of_whole
 from expdesign.information.expected import expected_covariance
-from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise
 from expdesign.rehearsal import trial_parts
 from expdesign.shortest_day.values import AccuracySettings

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expdesign.dictionary import Primitive
-from expdesign.information.many import bordered_runs
+from expdesign.information.disturbed import bordered_runs
 from expdesign.plan.assembly import ship_on_legs
 from expdesign.plan.problem import PlanProblem
 from expdesign.plan.solve import Draft

@@ -25,7 +25,7 @@ from expdesign.errors import InputError
 from expdesign.web import answers
 from expdesign.web.folder import Folder
 from expdesign.web.jobs import Jobs
-from expdesign.web.pages import data, files, manoeuvres, plan, sea, ship, trial, whatif
+from expdesign.web.pages import data, manoeuvres, plan, sea, trial, whatif
 from expdesign.web.site import Site, warmed
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -168,8 +168,10 @@ def _application(folder: Path, *, hosts: tuple[str, ...], token: str | None) -> 
             return PlainTextResponse(f"{name} does not exist\n", 404)
         return FileResponse(path, headers={"Content-Security-Policy": RESULTS, "Cache-Control": "no-store"})
 
-    for page in (trial, sea, ship, manoeuvres, plan, whatif, data, files):
+    for page in (trial, sea, manoeuvres, plan, whatif, data):
         page.register(site)
+    trial.register_ship(site)
+    trial.register_files(site)
     ui.run_with(app, title="expdesign", show_welcome_message=False, tailwind=False, reconnect_timeout=30.0)
     return Gate(app, hosts=hosts, token=token), site
 

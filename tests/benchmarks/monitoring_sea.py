@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.diagnosis.vessel_file import extended_model
-from expdesign.export.monitor_page.content import said_of_reference
+from expdesign.export.monitor_content import said_of_reference
 from expdesign.monitoring import (
     AS_LIKELY,
     WHITE,

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from expdesign.errors import InputError
-from expdesign.workflows.steps.workers import workers
+from expdesign.workflows.outcome import workers
 
 
 def add_sharing(parser: argparse.ArgumentParser, *, jobs: int = 1) -> None:

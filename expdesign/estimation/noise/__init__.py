@@ -11,6 +11,8 @@ from expdesign.estimation.noise.components import (
 )
 from expdesign.estimation.noise.coupled import coupled_covariance, fit_coupled
 from expdesign.estimation.noise.covariance import (
+    SPECTRUM_MISFIT,
+    WHITENING_PASSES,
     automatic_lags,
     long_run_covariance,
     lost_share,

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from expdesign.errors import UnknownName
 from expdesign.estimation.noise.components import SENSOR, Components, Slow, Stretch, Timeline, filtered
 from expdesign.estimation.regression import Integers, batch_slices
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
+SPECTRUM_MISFIT = 1.628  # Bartlett's statistic at 1 % (Kolmogorov's distribution)
+WHITENING_PASSES = 2  # the second filter finds a slow disturbance below the measurement noise
 SLOWEST_POLE = 0.98  # bound on the autoregressive coefficient of a whitening filter
 LONGEST_LAG_SHARE = 8  # automatic lags end at the longest batch divided by this
 FEW_LAGS = 10  # up to this number, sums of products are faster than Fourier transforms
@@ -248,9 +249,7 @@ class Colour:
 WHITE = Colour(0.0, 0.0)
 
 
-def white_parts(
-    Z: Array, residuals: Array, when: Timeline, *, passes: int = TUNING.whitening_passes
-) -> tuple[Array, Array]:
+def white_parts(Z: Array, residuals: Array, when: Timeline, *, passes: int = WHITENING_PASSES) -> tuple[Array, Array]:
     """zeta (t, n, p) and n (t, n) from instruments (k, n, p) and residuals (k, n); no filter crosses batches."""
     zeta, white = when.spread(Z).copy(), when.spread(residuals).copy()
     batches, present = batch_slices(when.batch), when.spread(np.ones(len(when.place)))

@@ -26,12 +26,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from expdesign.estimation.noise import Fitted, Stretch, coupled_covariance, fit_coupled, stretches
+from expdesign.estimation.noise import SPECTRUM_MISFIT, Fitted, Stretch, coupled_covariance, fit_coupled, stretches
 from expdesign.estimation.output_error.gauss_newton import regular, runs_away
 from expdesign.estimation.output_error.problem import Problem
 from expdesign.estimation.regression import STEADY_CURRENT, Integers, Layout, Regression, headings_at
 from expdesign.estimation.solve import Solution, Weighting, changing_variance, misfit_note, solve_ls, widening
-from expdesign.estimation.tuning import TUNING
 from expdesign.signals import Record
 from expdesign.values import Array
 
@@ -67,7 +66,7 @@ def with_covariance(
     whole = _with_known(regression, problem, values)
     last = solve_ls(whole, weighting)
     P, misfit = (last.covariance, np.zeros(n)) if quick else _propagated(problem, layout, record, simulated)
-    if (misfit > TUNING.spectrum_misfit).any():
+    if (misfit > SPECTRUM_MISFIT).any():
         robust = solve_ls(whole, replace(weighting, covariance="hac"))
         own, other = np.diag(P), np.diag(robust.covariance)
         scale = np.sqrt(np.divide(np.maximum(own, other), own, out=np.ones_like(own), where=own > 0))

@@ -47,7 +47,6 @@ from expdesign.estimation.output_error.problem import (
 )
 from expdesign.estimation.regression import Layout, Regression
 from expdesign.estimation.solve import Solution
-from expdesign.estimation.tuning import TUNING
 from expdesign.progress import Estimated, Progress, silent
 from expdesign.signals import Record
 from expdesign.values import Array
@@ -65,6 +64,8 @@ COVARIANCE_STEPS = 4.0  # how many such steps the covariance takes as long as
 LOADING_SAMPLES, COMPILING_SAMPLES = 7e4, 7e3
 SLOWEST_CONVERGENCE = 1.5  # least ratio of successive expected decreases that the progress told counts on
 SETTLED_COST = 1e-4  # expected decrease of the cost, in squared standard deviations, that ends the last horizons
+ROUGH_SAMPLES = 10_000  # compared at earlier horizons than the last, spread over the data
+ROUGH_STEP_S = 0.5  # longest step of simulations that compare some samples only
 ROUGH_COST = 0.1  # the same for earlier horizons
 
 
@@ -231,8 +232,8 @@ def _stages(record: Record, fitting: Fitting) -> list[Stage]:
     if fitting.begun is not None:
         known_s = fitting.begun.horizon_s
         growing = [] if known_s is None else [samples for samples in growing if samples * time_s > known_s]
-    rough = [Excerpt(samples=samples, most=TUNING.rough_samples) for samples in growing]
-    thinner = int(min(total / TUNING.rough_samples, TUNING.rough_step_s / time_s, last / FIRST_HORIZON_SAMPLES))
+    rough = [Excerpt(samples=samples, most=ROUGH_SAMPLES) for samples in growing]
+    thinner = int(min(total / ROUGH_SAMPLES, ROUGH_STEP_S / time_s, last / FIRST_HORIZON_SAMPLES))
     if thinner > 1:
         rough.append(Excerpt(samples=-(-last // thinner), every=thinner))
     whole = Excerpt(samples=last)
@@ -263,7 +264,7 @@ def _between(answered: int, stage: Stage) -> Stage | None:
     samples = round(math.sqrt(max(answered, SHORTEST_HORIZON_SAMPLES) * stage.excerpt.length))
     if samples > stage.excerpt.length / LEAST_HORIZON_GROWTH:
         return None
-    excerpt = Excerpt(samples=samples, most=TUNING.rough_samples)
+    excerpt = Excerpt(samples=samples, most=ROUGH_SAMPLES)
     return Stage(excerpt=excerpt, settled=ROUGH_COST, steps=2 * EXPECTED_STEPS)
 
 

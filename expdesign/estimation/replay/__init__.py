@@ -1,6 +1,5 @@
 """Batches simulated again: instruments, and fast simulation for output error."""
 
-from expdesign.estimation.replay.compiled import Compiled, Stretches, compiled
 from expdesign.estimation.replay.instruments import (
     LEAVE_OUT,
     PLANNED,
@@ -13,4 +12,12 @@ from expdesign.estimation.replay.instruments import (
     open_loop,
     treatment_of,
 )
-from expdesign.estimation.replay.replay import Integration, Replay, build_replay, simulate_batch
+from expdesign.estimation.replay.replay import (
+    Compiled,
+    Integration,
+    Replay,
+    Stretches,
+    build_replay,
+    compiled,
+    simulate_batch,
+)

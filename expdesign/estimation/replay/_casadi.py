@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from expdesign.estimation.regression import drive_width
-from expdesign.estimation.replay.compiled import INTEGRATORS, Called, Simulate, Stretches
+from expdesign.estimation.replay.replay import INTEGRATORS, Called, Simulate, Stretches
 from expdesign.simulation import motion_rates
 from expdesign.simulation.motion import rates_over_ground, turns_current
 from expdesign.simulation.run import SUBSTEPS

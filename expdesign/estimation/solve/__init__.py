@@ -2,5 +2,15 @@
 
 from expdesign.estimation.solve.null_space import Direction, NullSpace
 from expdesign.estimation.solve.sandwich import changing_variance, misfit_note, widening
-from expdesign.estimation.solve.solution import Prior, Refined, Solution, Weighting, refine_iv, solve_iv, solve_ls
+from expdesign.estimation.solve.solution import (
+    MOST_REFINEMENTS,
+    SETTLED_DEVIATIONS,
+    Prior,
+    Refined,
+    Solution,
+    Weighting,
+    refine_iv,
+    solve_iv,
+    solve_ls,
+)
 from expdesign.estimation.solve.systems import BLOCKS

@@ -29,6 +29,8 @@ import numpy as np
 import scipy
 
 from expdesign.estimation.noise import (
+    SPECTRUM_MISFIT,
+    WHITENING_PASSES,
     Components,
     Fitted,
     Stretch,
@@ -45,7 +47,6 @@ from expdesign.estimation.noise import (
 from expdesign.estimation.regression import Integers, Regression
 from expdesign.estimation.solve.null_space import UNSEEN
 from expdesign.estimation.solve.systems import Part, Weighting
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array
 
 LEAST_FREEDOM = 2.0  # degrees of freedom that a variance is taken to have at least
@@ -69,7 +70,7 @@ def covariance_of(regression: Regression, weighting: Weighting, parts: Sequence[
     factor = 1.0 if kind == "hc0" else residuals.size / max(1, residuals.size - p)
     if kind == "components":
         return _by_components(regression, weighting, parts, residuals, factor)
-    P, lags = _summed(regression, weighting, parts, residuals, passes=TUNING.whitening_passes if kind == "hac" else 0)
+    P, lags = _summed(regression, weighting, parts, residuals, passes=WHITENING_PASSES if kind == "hac" else 0)
     return Uncertainty(factor * P, lags)
 
 
@@ -197,21 +198,21 @@ def _by_components(
         odd[system.columns] = max(fitted[output].misfit for output in system.outputs)
     scale *= widened
     P *= np.outer(scale, scale)
-    doubtful = odd > TUNING.spectrum_misfit
+    doubtful = odd > SPECTRUM_MISFIT
     if not doubtful.any():
         return Uncertainty(P, 0)
-    robust, lags = _summed(regression, weighting, parts, residuals, passes=TUNING.whitening_passes)
+    robust, lags = _summed(regression, weighting, parts, residuals, passes=WHITENING_PASSES)
     own, other = np.diag(P), factor * np.diag(robust)
     larger = doubtful & (other > own) & (own > 0)
     scale = np.sqrt(np.divide(other, own, out=np.ones_like(own), where=larger))
     misfit = np.array([item.misfit for item in fitted])
-    notes = (misfit_note(regression.outputs, misfit),) if (misfit > TUNING.spectrum_misfit).any() else ()
+    notes = (misfit_note(regression.outputs, misfit),) if (misfit > SPECTRUM_MISFIT).any() else ()
     return Uncertainty(P * np.outer(scale, scale), lags, notes)
 
 
 def misfit_note(outputs: Sequence[str], misfit: Array) -> str:
     """A warning that names the outputs with a large misfit (n,)."""
-    names = [name for name, own in zip(outputs, misfit, strict=True) if own > TUNING.spectrum_misfit]
+    names = [name for name, own in zip(outputs, misfit, strict=True) if own > SPECTRUM_MISFIT]
     return (
         f"Sensor noise and slow disturbances do not explain the colour of the residuals of {', '.join(names)}. The "
         "standard deviations are the larger of two estimates, and less reliable than usual."

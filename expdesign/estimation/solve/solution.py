@@ -13,10 +13,11 @@ from expdesign.estimation.solve.null_space import NullSpace, joined, require_inf
 from expdesign.estimation.solve.sandwich import covariance_of
 from expdesign.estimation.solve.systems import Part, System, build_part, occupied, split
 from expdesign.estimation.solve.systems import Weighting as Weighting
-from expdesign.estimation.tuning import TUNING
 from expdesign.values import Array, seal
 
 # of the first model, tried one after the other where an estimate is unstable
+MOST_REFINEMENTS = 30  # of simulated instruments
+SETTLED_DEVIATIONS = 1e-3  # change of an estimate, in standard deviations, that ends the refinement
 STABILISING_WEIGHTS = (0.01, 0.1, 1.0, 10.0, 100.0, 1e4)
 
 
@@ -231,7 +232,7 @@ def refine_iv(
     weighting: Weighting,
     *,
     prior: Prior | None = None,
-    most: int = TUNING.most_refinements,
+    most: int = MOST_REFINEMENTS,
 ) -> Refined:
     """Refine from first instruments.
 
@@ -263,15 +264,15 @@ def refine_iv(
         deviations = np.sqrt(np.diag(covariance))
         moved = np.abs(newer - values) / np.maximum(deviations, 1e-150)
         origin, values, count = before, newer, count + 1
-        if moved.max() < TUNING.settled_deviations:
+        if moved.max() < SETTLED_DEVIATIONS:
             break
     restless = np.zeros(len(equations.uses), dtype=bool)
-    if count == most and moved.max() >= TUNING.settled_deviations:
+    if count == most and moved.max() >= SETTLED_DEVIATIONS:
         warnings.append(
             f"The estimate still changes by {moved.max():.2g} standard deviations after {most} refinements; equations "
             "that do not settle keep their first instruments."
         )
-        restless = np.asarray((equations.uses[:, moved >= TUNING.settled_deviations] > 0).any(axis=1))
+        restless = np.asarray((equations.uses[:, moved >= SETTLED_DEVIATIONS] > 0).any(axis=1))
         instruments = np.where(restless[:, None], first(), instruments)
     parts = build_parts(equations, instruments)
     del instruments

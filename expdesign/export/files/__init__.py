@@ -13,9 +13,10 @@ if TYPE_CHECKING:
         recorded_dictionary_json,
         subsets_json,
     )
-    from expdesign.export.files.disturbances import disturbance_entries, disturbance_table
     from expdesign.export.files.estimates import (
         breach_sentences,
+        disturbance_entries,
+        disturbance_table,
         estimate_json,
         estimate_warnings,
         estimated_vessel,

@@ -13,15 +13,22 @@ from expdesign.export.report import tables
 from expdesign.export.report.checks import checks, conditions, procedure_sentences
 from expdesign.export.report.content import ReportContent
 from expdesign.export.report.design import (
+    accuracy_table,
     certificate,
     chain,
     comparison,
     criterion_sentence,
     equal_time_sentence,
+    equation_sentence,
     growth_rows,
     growth_sentences,
+    known_rows,
+    known_sentences,
     limit_rows,
+    measures_velocity,
+    parameter_rows,
     short_of_optimum,
+    unknown_current_sentence,
 )
 from expdesign.export.report.figures import (
     durations_figure,
@@ -30,15 +37,6 @@ from expdesign.export.report.figures import (
     primitive_figure,
     timeline_figure,
     uncertainty_figure,
-)
-from expdesign.export.report.parameters import (
-    accuracy_table,
-    equation_sentence,
-    known_rows,
-    known_sentences,
-    measures_velocity,
-    parameter_rows,
-    unknown_current_sentence,
 )
 
 AGENDA = ("Leg", "Run", "Start", "What", "Position", "Duration", "Heading", "Speed kn", "Speed m/s")

@@ -11,11 +11,9 @@ from pathlib import Path
 from expdesign.errors import FileError
 from expdesign.importing.channels import Log, Reader, TooManyNumbers, check_size
 from expdesign.importing.fills import cleaned
-from expdesign.importing.readers.autopilots import is_ardupilot, read_ardupilot, read_px4
-from expdesign.importing.readers.n2k import is_n2k, read_n2k
-from expdesign.importing.readers.ros import is_ros, read_ros
+from expdesign.importing.readers.autopilots import is_ardupilot, is_ros, read_ardupilot, read_px4, read_ros
+from expdesign.importing.readers.n2k import is_n2k, is_signalk, read_n2k, read_signalk
 from expdesign.importing.readers.sheets import read_excel, read_matlab, read_matlab73, read_parquet
-from expdesign.importing.readers.signalk import is_signalk, read_signalk
 from expdesign.importing.readers.text import is_text, read_text
 from expdesign.input_files import check_ends
 

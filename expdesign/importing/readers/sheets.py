@@ -16,10 +16,9 @@ import numpy as np
 
 from expdesign.errors import FileError
 from expdesign.importing.channels import COMPUTER, GNSS, MOST_NUMBERS, NONE, OWN, Log, channels_of, check_size
-from expdesign.importing.clocks import Clock, clock_of
+from expdesign.importing.mapping import split_unit, words
 from expdesign.importing.readers.text import read_text
-from expdesign.importing.times import TIME_NAME, read_stamps
-from expdesign.importing.units import split_unit, words
+from expdesign.importing.times import TIME_NAME, Clock, clock_of, read_stamps
 
 MOST_COLUMNS = 64
 """Columns of one array beyond which it is an image or a map."""

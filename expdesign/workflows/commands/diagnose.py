@@ -29,9 +29,8 @@ from expdesign.signals import Commands, Record
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel, VesselModel, direct_terms, generalised_force
 from expdesign.vessel.structures import FORCE_SIGNALS, SHOAL
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.measured import doubted, equipped, measured
-from expdesign.workflows.steps.workers import shared
 
 SINCE_CHANGE = "since-change.csv"
 """File that a watch leaves for a diagnosis."""

@@ -1,4 +1,4 @@
-"""`expdesign durations`: how long to run each manoeuvre."""
+"""`expdesign score` and `expdesign durations`: what each manoeuvre tells, and how long to run it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from expdesign import requests
 from expdesign.dictionary import Primitive, build_dictionary
+from expdesign.dictionary.build import deviating
 from expdesign.durations import DurationProblem, build_fused, efficiencies, solve_durations
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import durations_json
@@ -17,11 +18,43 @@ from expdesign.export.files import strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, document_of, workflow
+from expdesign.workflows.outcome import Outcome, document_of, shared, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_summary, design_tables, designed
-from expdesign.workflows.steps.scored import growth_files, growth_summary, growth_tables, parameters_of, ready
-from expdesign.workflows.steps.workers import shared
+from expdesign.workflows.steps.scored import (
+    actuation_remarks,
+    growth_files,
+    growth_summary,
+    growth_tables,
+    parameters_of,
+    ranking,
+    ready,
+    score_files,
+    scored,
+    speed_remarks,
+)
+
+
+@workflow
+def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
+    """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
+    case = loaded(request.scenario, progress, vessel=request.vessel)
+    information = scored(case, progress=within(progress, 0.05, 0.95))
+    summary: dict[str, object] = {
+        "primitives": len(information),
+        "parameters": len(parameters_of(case)),
+        "meet_excitation_condition": sum(item.excitation_condition for item in information),
+        "informative_alone": sum(item.log_det_alone is not None for item in information),
+        "most_beside_the_others": ranking(case, information).rows[0][1],
+        "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
+    }
+    told = actuation_remarks(case.vessel, [item.primitive.commands for item in information], "candidate")
+    told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
+    if case.remarks or told:
+        summary["remarks"] = [*case.remarks, *told]
+    document = document_of(summary, (ranking(case, information),))
+    return written(request, case, score_files(case, information), noted(case, document), progress)
+
 
 # The duration problem of a scenario from covariances of simulated trials, (7.59)-(7.63).
 

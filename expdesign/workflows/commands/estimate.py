@@ -12,9 +12,8 @@ from expdesign.export import Content, estimate_json, estimated_vessel
 from expdesign.export.estimate_page import EstimateContent, estimate_document
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, workers, workflow
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
-from expdesign.workflows.steps.workers import workers
 
 
 @workflow

@@ -8,8 +8,14 @@ from pathlib import Path
 from expdesign import requests
 from expdesign.errors import FileError, InputError
 from expdesign.export import Content
-from expdesign.export.foresight_page import ForesightContent, foresight_document, foresight_json
-from expdesign.export.operation_page import OperationContent, operation_document, operation_json
+from expdesign.export.foresight_page import (
+    ForesightContent,
+    OperationContent,
+    foresight_document,
+    foresight_json,
+    operation_document,
+    operation_json,
+)
 from expdesign.export.routes import read_plan
 from expdesign.foresight import TrialRun, design_runs, foresee_operation
 from expdesign.foresight import foresee as foresee_trial
@@ -17,11 +23,10 @@ from expdesign.information import PrimitiveInformation
 from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
-from expdesign.workflows.outcome import Outcome, workflow
+from expdesign.workflows.outcome import Outcome, shared, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
-from expdesign.workflows.steps.workers import shared
 
 OF_DESIGN = "the runs of the design, without the legs between them"
 OF_ACCURACY = "the durations that state the accuracy, not the day: --plan foresees that"

@@ -15,7 +15,8 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.export import Content, write_files
-from expdesign.export.monitor_page import Moment, MonitorContent, budget_entries, monitor_document, monitor_json
+from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json
+from expdesign.export.monitor_page import budget_entries, monitor_document
 from expdesign.export.pages import document_html
 from expdesign.export.words import counted
 from expdesign.monitoring import (
@@ -32,7 +33,7 @@ from expdesign.processes import ahead
 from expdesign.progress import Progress, silent
 from expdesign.records import STREAM, Taken, pieces
 from expdesign.requests import repeating
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.measured import data_files, equipped
 from expdesign.workflows.steps.watched_ship import Asked, Late, Read, prepared
 from expdesign.workflows.steps.watching import (
@@ -49,7 +50,6 @@ from expdesign.workflows.steps.watching import (
     with_piece,
     with_reference,
 )
-from expdesign.workflows.steps.workers import shared
 
 
 def restored_watch(table: Mapping[str, Any]) -> Watch:

@@ -27,7 +27,7 @@ from expdesign.requests import repeating
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
+from expdesign.workflows.outcome import Outcome, document_of, finished, shared, workflow
 from expdesign.workflows.steps.case import drafted
 from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
 from expdesign.workflows.steps.design_problem import designed
@@ -35,7 +35,6 @@ from expdesign.workflows.steps.known import data_parts, expected_std, in_recorde
 from expdesign.workflows.steps.planned import built_route, plan_summary, report_content, trial_files
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
 from expdesign.workflows.steps.scored import growth_summary, ready
-from expdesign.workflows.steps.workers import shared
 
 VESSEL_FILE = "vessel-used.toml"
 

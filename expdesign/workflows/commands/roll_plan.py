@@ -20,12 +20,11 @@ from expdesign.progress import Progress, ending, silent, within
 from expdesign.requests import command_text, repeating
 from expdesign.scenario import Scenario, load_cases
 from expdesign.vessel import ROLL_PARAMETERS, RollPendulum
-from expdesign.workflows.outcome import Outcome, workflow
+from expdesign.workflows.outcome import Outcome, load_planner, shared, workflow
 from expdesign.workflows.steps.case import loaded
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import built_route, check_plannable, planned, report_content, trial_files
 from expdesign.workflows.steps.scored import scored
-from expdesign.workflows.steps.workers import load_planner, shared
 
 Files = dict[str, Content]
 

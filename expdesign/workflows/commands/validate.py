@@ -19,10 +19,9 @@ from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import RANDOM, Rehearsal, equal_runs, validate
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
-from expdesign.workflows.steps.workers import shared
 
 OPTIMISED, EQUAL = "optimised", "equal shares"
 

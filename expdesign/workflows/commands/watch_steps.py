@@ -16,7 +16,7 @@ from expdesign import __version__, requests
 from expdesign.errors import FileError, NotInformative
 from expdesign.export import write_files
 from expdesign.export.document import Table as TextTable
-from expdesign.export.step_trial_live import (
+from expdesign.export.step_trial_page import (
     TO_DO_HEADER,
     LiveContent,
     event_line,

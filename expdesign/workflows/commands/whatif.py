@@ -27,12 +27,11 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.rehearsal import trial_parts
 from expdesign.scenario import Scenario, load_scenario, load_variant
 from expdesign.values import Array
-from expdesign.workflows.outcome import Outcome, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, load_plans, shared, workflow
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed, duration_problem
 from expdesign.workflows.steps.planned import check_plannable, plan_summary
 from expdesign.workflows.steps.scored import ready, scored
-from expdesign.workflows.steps.workers import load_plans, shared
 
 WHOLE_RUNS = "repeats"
 SEARCHED = 0.1

@@ -22,6 +22,7 @@ from expdesign.durations import (
 )
 from expdesign.errors import FloorOutOfReach, InputError, NoAnswer, NotInformative
 from expdesign.export.document import Table
+from expdesign.indices import outcome_gradients
 from expdesign.information import (
     MEAN_SUBTRACTIONS,
     PrimitiveInformation,
@@ -30,7 +31,6 @@ from expdesign.information import (
     excitation_refusal,
 )
 from expdesign.information.disturbed import score_augmented
-from expdesign.information.outcome_gradients import outcome_gradients
 from expdesign.information.prior import equation_noise, score_prior, stated_information
 from expdesign.information.recorded import pooled, recorded_information
 from expdesign.memory import recalled

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from expdesign.errors import FileError, NotInformative
-from expdesign.export.monitor_page import Moment
+from expdesign.export.monitor_content import Moment
 from expdesign.monitoring import (
     TUNING,
     WHITE,

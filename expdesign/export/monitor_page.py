@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.export.document import Document, Figure, Table, section
 from expdesign.export.files import finite
-from expdesign.export.monitor_page.content import MonitorContent, monitor_header, monitor_rows, sentences
+from expdesign.export.monitor_content import MonitorContent, monitor_header, monitor_rows, sentences
 from expdesign.export.pages.figures import (
     BLUE,
     GREY,
