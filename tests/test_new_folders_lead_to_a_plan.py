@@ -4,15 +4,17 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.scenario import load_scenario, load_vessel
+from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
 from expdesign.workflows.commands.new import KINDS
+from expdesign.workflows.steps import day
 from expdesign.workflows.steps.first_trial import (
     ABLE,
     DRAWN,
@@ -197,6 +199,28 @@ def test_drawn_ships_of_a_wide_prior_are_driven_and_steered_to_the_side_of_the_n
     pushes = [index for index, name in enumerate(wide.names) if name in wide.parameter_range]
     assert len(pushes) >= 7
     assert (drawn[:, pushes] * wide.parameters[pushes] >= 0.0).all()
+
+
+def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A draft is never verified, so that ships which differ half as much would tell nothing."""
+    case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
+    tried = []
+
+    def calibrated(first: Scenario, *_) -> day.Day:
+        tried.append(first)
+        plan = SimpleNamespace(verified=False, draft=case.plan.draft)
+        return day.Day(information=(), design=None, plan=plan, note="a first trial")
+
+    monkeypatch.setattr(day, "whole_trial", lambda *_: None)
+    monkeypatch.setattr(day, "plan_problem", lambda *_, **__: None)
+    monkeypatch.setattr(day, "_calibrated", calibrated)
+    for draft in (True, False):
+        case, tried = replace(case, plan=replace(case.plan, draft=draft)), []
+        wide = replace(case.vessel.model, parameter_std=0.5 * np.abs(case.vessel.model.parameters))
+        case = replace(case, vessel=replace(case.vessel, model=wide))
+        note = day.planned_day(case, (), None).note
+        assert len(tried) == (1 if draft else 2)
+        assert ("half the standard deviations" in note) is not draft
 
 
 def test_half_as_wide_a_prior_has_half_the_deviations_also_where_none_is_stated(tmp_path: Path) -> None:

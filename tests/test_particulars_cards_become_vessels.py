@@ -15,13 +15,14 @@ from expdesign.export import vessel_toml
 from expdesign.indices import standard_results
 from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
 from expdesign.particulars.fit import Problem, fitted
-from expdesign.particulars.model import SAMPLES, STEERING
+from expdesign.particulars.model import SAMPLES, STEERING, with_scatter
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import load_card, load_vessel
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 CARDS = Path(__file__).parents[1] / "scenarios" / "cards"
+SHIPS = Path(__file__).parent / "benchmarks" / "ships"
 COASTER = Card(
     name="coaster",
     hull=Hull(length_m=80.0, beam_m=13.0, draught_m=5.0, mass_kg=0.7 * 1025 * 80 * 13 * 5.0),
@@ -168,6 +169,18 @@ def test_parameters_keep_the_signs_that_physics_gives(made: Path) -> None:
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("path", [*CARDS.glob("*.toml"), *SHIPS.glob("*.toml")], ids=lambda path: path.stem)
+def test_ships_of_every_card_keep_to_their_own_ranges(path: Path) -> None:
+    """The nominal ship is within the signs that her file states, and drawn ones not by rare luck."""
+    problem = Problem(load_card(path))
+    unknowns = np.zeros(len(FACTORS))
+    ship = with_scatter(problem.ship, problem.slopes(unknowns), np.eye(len(problem.active)))
+    for name, value in zip(ship.model.names, ship.model.parameters.tolist(), strict=True):
+        low, high = ship.model.parameter_range.get(name, (-math.inf, math.inf))
+        assert low <= value <= high, name
+    assert ship.model.share_in_range() > 0.2
+
+
 def test_values_that_contradict_are_named() -> None:
     known = values_of(Problem(COASTER), np.zeros(len(FACTORS)), None)
     wrong = tuple(

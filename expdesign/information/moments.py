@@ -169,7 +169,8 @@ def check_informative(information: Sequence[PrimitiveInformation], names: Sequen
     blind = tuple(np.array(names)[unidentifiable].tolist())
     raise NotInformative(
         f"the dictionary cannot separate these parameters: {', '.join(blind)}; add primitives that excite them, "
-        "state a mean wind if they are W terms, or list some in design.fixed_parameters",
+        "state a mean wind if they are W terms, count what is known of them (model.parameter_std with design.prior = "
+        "'parameter_std'), or list some in design.fixed_parameters",
         parameters=blind,
     )
 

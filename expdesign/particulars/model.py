@@ -11,7 +11,7 @@ import numpy as np
 
 from expdesign.particulars.card import Card, Thruster
 from expdesign.particulars.forces import Propeller, design_speed, forces, tunnel
-from expdesign.particulars.hull import Force, factors, masses
+from expdesign.particulars.hull import FACTORS, Force, factors, masses
 from expdesign.values import Array
 from expdesign.vessel import Actuator, Limit, Response, Term, Vessel, VesselModel
 
@@ -25,7 +25,8 @@ RANGES = (
     (re.compile(r"X_un\d+|X_drag_\w+|Y_(u|n\d+)rudder\d+"), (-math.inf, 0.0)),  # loss of thrust, rudders
     (re.compile(r"X_n\d+(_astern)?|Y_(side_)?n\d+"), (0.0, math.inf)),  # thrust
 )
-"""Parameters whose sign physics gives: a hull that is driven by its own drag runs away."""
+"""Parameters whose sign physics gives: a hull that is driven by its own drag runs away. Not of a force that acts in an
+equation by the coupling of sway and yaw alone."""
 STEERING = re.compile(r"[YN]_ua\d+|N_(u|n\d+)rudder\d+|N_turn_n\d+|N_n\d+")
 """Parameters that keep their sign, which place and side of the actuator give: a helm turns her to its side."""
 
@@ -96,10 +97,18 @@ def sample_time(card: Card) -> float:
     return min(usual, key=lambda step: abs(math.log(step * SAMPLES * design_speed(card) / card.hull.length_m)))
 
 
-def _sides(found: Mapping[Term, float]) -> dict[str, tuple[float, float]]:
+def _ranges(card: Card, driving: tuple[Propeller, ...], found: Mapping[Term, float]) -> dict[str, tuple[float, float]]:
     """Ranges of parameters that keep their sign."""
     steering = {term.name: value for term, value in found.items() if STEERING.fullmatch(term.name) and value}
-    return {name: (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0) for name, value in steering.items()}
+    sides = {name: (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0) for name, value in steering.items()}
+    acting = {
+        _term(equation, force).name
+        for force in forces(card, driving, factors(card.hull, np.zeros(len(FACTORS))))
+        for equation, own in (("u", force.x_n), ("v", force.y_n), ("r", force.n_nm))
+        if own
+    }
+    physics = {name: ends for name in acting for names, ends in RANGES if names.fullmatch(name)}
+    return sides | {term.name: physics[term.name] for term in found if term.name in physics}
 
 
 def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> Vessel:
@@ -110,9 +119,7 @@ def vessel_of(card: Card, driving: tuple[Propeller, ...], deviations: Array) -> 
     model = VesselModel(
         terms=tuple(found), parameters=np.array([*found.values()]), parameter_std=np.zeros(len(found)),
         form="continuous", sample_time_s=step, actuators=actuators(card, driving),
-        parameter_range={**_sides(found), **{
-            term.name: ends for term in found for names, ends in RANGES if names.fullmatch(term.name)
-        }},
+        parameter_range=_ranges(card, driving, found),
     )  # fmt: skip
     return Vessel(
         name=card.name, length_m=hull.length_m, beam_m=hull.over_all_m or hull.beam_m, draught_m=hull.draught_m,

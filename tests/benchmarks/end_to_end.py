@@ -85,7 +85,7 @@ def folder_of(name: str, folder: Path) -> Scenario:
     (folder / "dictionary.toml").write_text("[[primitives]]".join(one for one in listed if "stop" not in one), "utf-8")
     astern = sorted({*found.model.names} - {*ahead.model.names})
     task = (folder / "scenario.toml").read_text("utf-8")
-    task = task.replace("[design]", f"[design]\nfixed_parameters = {json.dumps(astern)}")
+    task = task.replace("[design]", f'[design]\nprior = "parameter_std"\nfixed_parameters = {json.dumps(astern)}')
     (folder / "scenario.toml").write_text(task, "utf-8")
     scaled(folder / "dictionary.toml", {"speed_mps": swift, "from_speed_mps": swift, "_s": size / swift})
     scaled(folder / "scenario.toml", {"_m": size, "_mps": swift, "total_s": size / swift})
@@ -217,7 +217,8 @@ def outcome(
         data.append(folder / f"{run.name}.csv")
         np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
-    told = expdesign(["estimate", *common, "--method", *methods, "--out", str(folder / "estimate")])
+    known = ["--prior", "parameter_std", "--method", *methods]
+    told = expdesign(["estimate", *common, *known, "--out", str(folder / "estimate")])
     error = before = math.nan
     inside = np.array([], dtype=bool)
     if told == 0:

@@ -114,7 +114,7 @@ def _first_day(
         day = _calibrated(case, stated, seed, first)
     except NoAnswer as error:
         raise NoPlan(f"{error}; {_with_narrower_prior(case, stated, seed, advising)}") from error
-    if day.plan.verified:
+    if day.plan.verified or day.plan.draft:
         return day
     return replace(day, note=f"{day.note}; {_with_narrower_prior(case, stated, seed, advising)}")
 
