@@ -8,6 +8,7 @@ import pytest
 from expdesign.assessment import EstimateOptions
 from expdesign.assessment.values import with_prior
 from expdesign.errors import InputError
+from expdesign.estimation.values import into_range
 from expdesign.vessel import Term, VesselModel
 
 NAMES = ("X_u", "X_abs_u_u")
@@ -75,6 +76,49 @@ def test_a_contradiction_is_told_and_agreement_is_not() -> None:
     (warning,) = with_prior(far, model).warnings
     assert "contradict" in warning
     assert "X_abs_u_u" in warning
+
+
+def test_values_outside_a_stated_range_move_to_its_end_and_the_others_with_them() -> None:
+    """The most probable point of a normal density on a half-space: on its face, others by their correlation."""
+    before, model = found(2), known([0.5, 2.0])
+    free = with_prior(before, model)
+    ranges = {"X_u": (free.values[0] + 0.4, np.inf), "X_abs_u_u": (-np.inf, 1e3)}
+    after = with_prior(before, replace(model, parameter_range=ranges))
+    slope = free.joint_covariance[:, 0] / free.joint_covariance[0, 0]
+    expected = np.concatenate([free.values, free.nuisance_values]) + 0.4 * slope
+    np.testing.assert_allclose(np.concatenate([after.values, after.nuisance_values]), expected, rtol=1e-9)
+    np.testing.assert_array_equal(after.covariance, free.covariance)
+    assert "range that the vessel file states: X_u." in after.warnings[-1]
+    assert with_prior(before, replace(model, parameter_range={"X_u": (-1e3, 1e3)})).warnings == free.warnings
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_values_in_range_are_the_most_probable_of_many(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(4, 4))
+    covariance, values = root @ root.T + 0.01 * np.eye(4), rng.normal(size=4)
+    ends = [(0.5, np.inf), (-np.inf, -0.5), (-0.1, 0.1), (-np.inf, np.inf)]
+    low, high = np.array(ends).T
+
+    def apart(x: np.ndarray) -> np.ndarray:
+        return np.einsum("ij,ij->i", x - values, np.linalg.solve(covariance, (x - values).T).T)
+
+    best = into_range(values, covariance, ends)
+    assert (low <= best).all()
+    assert (best <= high).all()
+    others = np.clip(best + 10.0 ** rng.uniform(-6, 1, (5000, 1)) * rng.normal(size=(5000, 4)), low, high)
+    assert apart(best[None])[0] <= apart(others).min() * (1 + 1e-9)
+
+
+def test_a_range_falls_away_where_the_estimate_alone_contradicts_it() -> None:
+    """Without a prior the data alone speak; no ship could be drawn between such values and the range."""
+    model = replace(known([0.1, 0.1]), parameter_range={"X_u": (0.0, np.inf), "X_abs_u_u": (-np.inf, 0.0)})
+    near = model.with_parameters({"X_u": -0.2}).with_kept_ranges()
+    far = model.with_parameters({"X_u": -0.4}).with_kept_ranges()
+    assert near.parameter_range == model.parameter_range
+    assert far.contradicted_ranges == ()
+    assert far.parameter_range == {"X_abs_u_u": (-np.inf, 0.0)}
+    assert (far.drawn_parameters(100, np.random.default_rng(0))[:, 1] <= 0.0).all()
 
 
 def test_euler_s_parameters_have_no_such_prior() -> None:

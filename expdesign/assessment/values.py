@@ -18,7 +18,7 @@ from expdesign.estimation.methods import Method
 from expdesign.estimation.regression import MEANS
 from expdesign.estimation.replay import STEERED, Integration
 from expdesign.estimation.solve import BLOCKS
-from expdesign.estimation.values import Estimate
+from expdesign.estimation.values import Estimate, into_range
 from expdesign.signals import Record
 from expdesign.simulation.run import SUBSTEPS
 from expdesign.vessel import VesselModel
@@ -111,7 +111,8 @@ class Assessment:
 #     K = C_: (C + P)^-1          x + K (theta_0 - theta)          C_:: - K C_:'
 #
 # with the estimate theta and covariance C of the parameters, all numbers x and their covariance C_::, columns C_: of
-# the parameters, and the prior theta_0 with P.
+# the parameters, and the prior theta_0 with P. Values outside the ranges that the file states move to the most probable
+# ones theta' within, and all others by x + C_: C^-1 (theta' - theta).
 #
 # Source: A. Gelb (ed.), Applied Optimal Estimation (1974), 4.2.
 
@@ -135,7 +136,10 @@ def check_prior(model: VesselModel, name: str) -> None:
 
 
 def with_prior(found: Estimate, model: VesselModel) -> Estimate:
-    """An estimate joined with the normal prior of a model; parameters without standard deviation count as known."""
+    """An estimate joined with the normal prior of a model and the ranges of its parameters.
+
+    Parameters without standard deviation count as known.
+    """
     places, count = [model.names.index(name) for name in found.names], len(found.names)
     prior = model.parameter_covariance[np.ix_(places, places)]
     apart = model.parameters[places] - found.values
@@ -154,6 +158,14 @@ def with_prior(found: Estimate, model: VesselModel) -> Estimate:
             f"{scores[worst]:.1f} standard deviations. Estimates without --prior do not depend on it.",
         )
     values = np.concatenate([found.values, found.nuisance_values]) + gain @ apart
+    ends = [model.parameter_range.get(name, (-np.inf, np.inf)) for name in found.names]
+    inside = into_range(values[:count], joint[:count, :count], ends)
+    beyond = [name for name, old, (low, high) in zip(found.names, values, ends, strict=False) if not low <= old <= high]
+    if beyond:
+        values = values + joint[:, :count] @ np.linalg.pinv(joint[:count, :count], hermitian=True) @ (
+            inside - values[:count]
+        )
+        warnings = (*warnings, f"Held at the end of the range that the vessel file states: {', '.join(beyond)}.")
     return replace(
         found,
         values=values[:count],

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from expdesign.errors import UnknownName
 from expdesign.estimation.feedback import Feedback
@@ -14,6 +15,9 @@ from expdesign.estimation.replay import Steered
 from expdesign.estimation.solve import NullSpace
 from expdesign.values import Array, frozen_set, seal
 from expdesign.vessel import VesselModel
+
+ROUNDING = 1e-12
+"""Added to correlations, of which some are nearly one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,8 +87,12 @@ class Estimate:
         return self.assignments[name]
 
     def model(self, model: VesselModel) -> VesselModel:
-        """A model with these values and this covariance as its prior; held parameters count as known."""
-        return model.with_parameters(self.assignments).with_covariance(self.names, self.covariance)
+        """A model with these values and this covariance as its prior; held parameters count as known.
+
+        Ranges of parameters that the estimate contradicts fall away.
+        """
+        found = model.with_parameters(self.assignments).with_covariance(self.names, self.covariance)
+        return found.with_kept_ranges()
 
 
 # Fit of a simulated output to a measured one.
@@ -104,3 +112,22 @@ def fit_percent(measured: Array, simulated: Array) -> Array:
     size, reference = np.sqrt((error**2).sum(axis=0)), np.sqrt((spread**2).sum(axis=0))
     constant = reference <= 1e-12 * np.sqrt(np.where(seen, measured**2, 0.0).sum(axis=0))
     return np.asarray(np.where(constant, np.nan, 100.0 * (1.0 - size / np.where(constant, 1.0, reference))))
+
+
+def into_range(values: Array, covariance: Array, ends: Sequence[tuple[float, float]]) -> Array:
+    """(p,) most probable numbers within their ranges, where normal ones (p,) with a covariance (p, p) are outside.
+
+    They minimise (x - values)' C^-1 (x - values): those that are not at an end follow the others by their correlation.
+    """
+    low, high = np.array(ends).T
+    if ((low <= values) & (values <= high)).all():
+        return values
+    std = np.sqrt(np.diag(covariance))
+    free = std > 0
+    size = std[free]
+    correlation = covariance[np.ix_(free, free)] / np.outer(size, size)
+    white = np.linalg.inv(np.linalg.cholesky(correlation + ROUNDING * np.eye(len(size))))
+    bounds = (low[free] / size, high[free] / size)
+    found = values.copy()
+    found[free] = size * scipy.optimize.lsq_linear(white, white @ (values[free] / size), bounds=bounds, method="bvls").x
+    return np.where(free, np.clip(found, low, high), values)

@@ -100,6 +100,8 @@ UNSTATED_SHARE = 0.1
 """Standard deviation, as a share of the value, with which drawn ships differ where none is stated."""
 FEWEST_DRAWN = 1000
 SHARE_DRAWN = 2500
+FAR_OUTSIDE = 3.0
+"""Standard deviations outside of its range from which on a parameter contradicts it."""
 LEAST_KEPT = 1e-3
 """Share of drawn vessels within the stated range below which the range contradicts the prior."""
 
@@ -252,6 +254,25 @@ class VesselModel:
                 (names[i], names[j]): float(correlation[i, j])
                 for i, j in zip(*np.nonzero(np.tril(correlation, -1)), strict=True)
             },
+        )
+
+    def with_kept_ranges(self) -> VesselModel:
+        """The model without the ranges that its own values contradict, whose ships could not be drawn.
+
+        They are `FAR_OUTSIDE` standard deviations outside: data say otherwise than the vessel file.
+        """
+        kept = self.parameter_range.keys() - self.contradicted_ranges
+        return replace(self, parameter_range={name: self.parameter_range[name] for name in self.names if name in kept})
+
+    @property
+    def contradicted_ranges(self) -> tuple[str, ...]:
+        """Parameters whose value is far outside the range that is stated of them."""
+        rows = zip(self.names, self.parameters.tolist(), self.drawn_std.tolist(), strict=True)
+        ranged = [
+            (name, value, std, *self.parameter_range[name]) for name, value, std in rows if name in self.parameter_range
+        ]
+        return tuple(
+            name for name, value, std, low, high in ranged if max(low - value, value - high) > FAR_OUTSIDE * std
         )
 
     def drawn_parameters(self, count: int, rng: np.random.Generator) -> Array:

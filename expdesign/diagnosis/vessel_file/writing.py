@@ -148,7 +148,7 @@ def found_model(
         parameters=np.array([row.value for row in rows]),
         parameter_std=np.array([row.std for row in rows]),
         roll=_roll(model, ship),
-    )
+    ).with_kept_ranges()
     found, depths = _in_depth(found, model, ship)
     return found, (*notes, *depths)
 

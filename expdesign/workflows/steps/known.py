@@ -11,7 +11,7 @@ from expdesign.assessment import INSTRUMENTS, Assessed, EstimateOptions, assess
 from expdesign.durations import DurationDesign
 from expdesign.errors import Diverged, NoAnswer, NotInformative
 from expdesign.estimation.regression import in_depth
-from expdesign.estimation.values import Estimate
+from expdesign.estimation.values import Estimate, into_range
 from expdesign.export.files import Purchase
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.plan.values import Plan
@@ -100,10 +100,12 @@ def combined(vessel: Vessel, estimate: Estimate, *, prior_counts: bool) -> Vesse
         gain = np.linalg.solve(covariance[np.ix_(index, index)] + stated, covariance[index]).T
         values = values + gain @ (model.parameters[known] - values[index])
         covariance = covariance - gain @ covariance[index]
+        ends = [model.parameter_range.get(name, (-np.inf, np.inf)) for name in estimate.names]
+        values = into_range(values, covariance, ends)
     whole = np.diag(model.parameter_std**2)
     whole[np.ix_(places, places)] = covariance
     assigned = model.with_parameters(dict(zip(estimate.names, values.tolist(), strict=True)))
-    return replace(vessel, model=assigned.with_covariance(model.names, whole))
+    return replace(vessel, model=assigned.with_covariance(model.names, whole).with_kept_ranges())
 
 
 def data_parts(record: Record, vessel: Vessel) -> tuple[TrialPart, ...]:
