@@ -7,7 +7,7 @@ import pytest
 
 from expdesign.monitoring.cusum import SURELY, _scattered
 from expdesign.monitoring.evidence import stretches_of
-from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
 from monitoring_case import CHANGES, FORCES, STARTS, STRETCH_S, drawn_columns, drawn_grams, grams_from
 
 NOISE = np.array([1.0, np.inf, np.inf, np.inf])
@@ -41,11 +41,10 @@ def test_the_likelihood_and_the_scores_are_those_of_all_stretches_together() -> 
         if index:
             known, taken = after_gap(known, FORCE, STRETCH_S), FORCE.memory(STRETCH_S)[:, None] * taken
         one = judged(products, CHANGES, known)
-        cross = one.by_force @ taken
-        score += one.score - taken.T @ one.force_score
-        information += one.information - cross - cross.T + taken.T @ one.force_information @ taken
+        more, told, taken = beside(one, taken)
+        score, information = score + more, information + told
         quadratic += float(one.quadratic)
-        known, taken = after_stretch(known, one), taken + one.gain @ (one.seen[0] - one.seen[1] @ taken)
+        known = after_stretch(known, one)
     assert quadratic == pytest.approx(e @ np.linalg.solve(R, e), rel=1e-4)
     assert score == pytest.approx(X.T @ np.linalg.solve(R, e), rel=1e-3, abs=1e-3)
     assert information == pytest.approx(X.T @ np.linalg.solve(R, X), rel=1e-3, abs=1e-3)
@@ -93,6 +92,29 @@ def test_a_wind_that_keeps_its_direction_is_known_by_the_cosine_of_a_turn() -> N
         assert turning.memory(60.0, turn)[1] == pytest.approx(np.exp(-0.1))
     assert turning.memory(60.0, 2.0)[0] == 0.0
     assert turning.memory(60.0, np.nan) == pytest.approx(np.exp(-0.1))
+
+
+def test_a_steady_wind_on_all_headings_is_no_change_of_the_ship_and_a_push_that_turns_with_her_is() -> None:
+    """A wind's columns go with the heading: once she has turned, the filter tells it from a change along her axis."""
+    headings = np.tile([0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi], 10)
+    force = Force(
+        variance=np.array([1e-3, 1e-3, 4.0, 4.0]), time_s=np.array([300.0, 43200.0, 7200.0, 7200.0]),
+        turning=np.array([1.0, 0.0, 0.0, 0.0]),
+    )  # fmt: skip
+    ratio = dict[str, float]()
+    for name, pushed in (("wind", np.cos(headings - 0.4)), ("change", np.ones(len(headings)))):
+        known, taken, score, information = Known.nothing(force), np.zeros((4, 1)), 0.0, 0.0
+        for index, heading in enumerate(headings):
+            if index:
+                gap = (STRETCH_S, float(heading - headings[index - 1]))
+                known, taken = after_gap(known, force, *gap), force.memory(*gap)[:, None] * taken
+            row = np.array([1.0, np.cos(heading), np.sin(heading), 1.0, pushed[index]])
+            one = judged(9.0 * np.outer(row, row), 1, known)
+            more, told, taken = beside(one, taken)
+            known, score, information = after_stretch(known, one), score + more[0], information + told[0, 0]
+        ratio[name] = score / information
+    assert abs(ratio["wind"]) < 0.1
+    assert ratio["change"] == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize(("scatter", "shift"), [(1.0, 0.0), (1.0, 5.0), (3.0, 0.0)])

@@ -40,7 +40,7 @@ from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel
 from expdesign.workflows.commands.diagnose import with_alarms
-from sea_case import CALM, CASES, FRESH, HOUR, OTHER_SEAS, Sea, Ship, sailed, vessel_file, written
+from sea_case import CALM, CASES, FRESH, HOUR, OTHER_SEAS, WINDS, Sea, Ship, sailed, vessel_file, written
 
 PUSHED = Sea(pushed_s=5.0)
 STEPS = 14
@@ -174,6 +174,22 @@ def test_a_wind_as_in_the_reference_that_she_turns_in_is_no_change_of_hers(vesse
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("wind", ["twice as strong", "turning by 120 degrees in 20 min"])
+def test_another_wind_than_the_references_is_no_change_of_the_ship(vessel: Vessel, wind: str) -> None:
+    """Nor is one that she meets in the whole of a voyage: along her axes it goes with her heading."""
+    assert false_in(vessel, Sea(wind=FRESH), [77000, 77060], hours=2, later=Sea(wind=WINDS[wind])) == []
+
+
+@pytest.mark.thorough
+def test_less_thrust_than_the_size_that_matters_is_found_where_a_slow_force_hides_a_third_of_it(vessel: Vessel) -> None:
+    """A sum that grows fastest for the whole size does not grow at all for a half of it."""
+    (before,) = sailed([Ship()], 4 * HOUR, seeds=[74070])
+    (after,) = sailed([CASES["thrust - 8 %"]], 2 * HOUR, seeds=[74072], since_s=HOUR)
+    _, noise, grams = stretches(vessel, before)
+    assert alarms_of(vessel, (noise, calibrate(grams)), after)[1] in (["theta:X_nn"], ["gain"])
+
+
+@pytest.mark.thorough
 def test_a_disturbance_in_yaw_beyond_the_reference_does_not_stop_surge(
     vessel: Vessel, known: tuple[Noise, Calibration]
 ) -> None:
@@ -225,9 +241,10 @@ def test_what_slow_forces_hide_within_stretches_inflates_no_score(vessel: Vessel
     assert each.max() < 0.8, ratios  # of the same stretches, so that chance is common to both
 
 
-def false_in(vessel: Vessel, sea: Sea, seeds: Sequence[int], *, hours: int = 2) -> list[str]:
+def false_in(vessel: Vessel, sea: Sea, seeds: Sequence[int], *, hours: int = 2, later: Sea | None = None) -> list[str]:
     """What is named falsely of unchanged ships in so many hours, or said of their references of twice as many."""
-    voyages = [sailed([Ship()] * len(seeds), length * HOUR, seeds=seeds, sea=sea) for length in (2 * hours, hours)]
+    both = ((2 * hours, sea), (hours, later or sea))
+    voyages = [sailed([Ship()] * len(seeds), length * HOUR, seeds=seeds, sea=one) for length, one in both]
     false = list[str]()
     for seed, before, after in zip(seeds, *voyages, strict=True):
         changes, noise, grams = stretches(vessel, before)

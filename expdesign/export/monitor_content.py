@@ -21,6 +21,7 @@ from expdesign.monitoring import (
     RollWatch,
     State,
     calls_of,
+    soonest,
 )
 from expdesign.values import Array
 from expdesign.vessel.quantities import GYRO
@@ -287,8 +288,7 @@ def alike(content: MonitorContent, number: int) -> list[str]:
 
 def delay_s(content: MonitorContent, number: int) -> float:
     """Expected time to the alarm after a change of its size [s], in data like the reference."""
-    rate = float(content.calibration.rate[number])
-    return float(np.ceil(2.0 * content.limit / rate)) * content.calibration.stretch_s if rate > 0 else float("inf")
+    return float(soonest(content.calibration.rate[number], content.limit)) * content.calibration.stretch_s
 
 
 def monitor_header(content: MonitorContent) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from expdesign.export.pages.figures import (
     svg,
 )
 from expdesign.export.words import HOUR, SINCE_1970_S, hours, when
-from expdesign.monitoring import KINDS
+from expdesign.monitoring import KINDS, soonest
 from expdesign.values import Array
 
 # What each term of the model contributes in every kind of stretch, and how soon such stretches reveal a change.
@@ -48,7 +48,7 @@ def delays_s(content: MonitorContent) -> Array:
     c, budget = content.calibration, content.state.budget
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = budget.information / np.maximum(budget.stretches, 1.0)[:, None] / c.inflation
-        return np.asarray(np.where(rate > 0, np.ceil(2.0 * content.limit / rate) * c.stretch_s, np.inf))
+        return soonest(rate, content.limit) * c.stretch_s
 
 
 @page_figure

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from expdesign.errors import NotInformative
 from expdesign.monitoring.evidence import STARTS, Grams, Stretches, stretches_of
-from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, judged, likelihood, surprise
+from expdesign.monitoring.force import Force, Known, after_gap, after_stretch, beside, judged, likelihood, surprise
 from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array, seal
 
@@ -27,21 +29,24 @@ QUICK_S, SLOW_S = 300.0, 43200.0
 # that the reference covers
 SPARE = 8.0
 SLOW_SHARE = 1 / 16  # of the variance, in the slow part where the search begins; it never is more than the whole
+WIND_S = 7200.0  # correlation time of winds [s]
+STRONGER = 4.0  # variance that winds may have later, in that of the reference
 SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the force is learnt
-SEARCH_ROUNDS, SEARCH_GAIN = 12, 0.5  # rounds of that search, and the least gain of twice the log-likelihood in one
-
+# iterations of that search, least relative gain of the likelihood in one, and the step of its slopes, in powers of two
+SEARCH_ITERATIONS, SEARCH_GAIN, SEARCH_STEP = 15, 1e-4, 0.01
+MOST_QUICK = 6.0  # largest variance of the quick part in that of independent stretches, in powers of two
 
 LEAST_VARIANCE = 1e-14
 """Of a force that is none."""
 ROUGHER = ((2.0, False), (5.0, False), (3.0, True))
 """Standard deviations of the force in other weathers, in those of the reference, and whether it lasts `LASTING_S`."""
+WINDIER = 2.0
+"""Standard deviation of winds in another weather, in the larger of those that they may have and of quick forces."""
 LASTING_S = 900.0
 PUSHES = 3
 """Accelerations among the components of the force, the last of them."""
 LEAST_SURPRISE = 0.1
 """Of a stretch on average, where the reference shows no force."""
-STEPS = np.array([-4.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
-"""By which logarithms of variances and times are changed in a round of the search, to base two."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +65,7 @@ class Calibration:
     stretches: int  # number of stretches of the reference
     stretch_s: float  # their length [s]
     misfit_limit: float  # misfit per measured number beyond which a stretch is not judged
-    seas: Force  # (a, 2 q) the force in other weathers, see `_seas`
+    seas: Force  # (a, n) the force in other weathers, see `_seas`
     weights: Array  # (m, q) of the surprises of components of the force, for every change, see `force.surprise`
     surprise: Array  # (m,) of a stretch on average, with these: how well the weather is predicted
     load: Array  # (m,) standard deviation of what a port call may change of the load, in sizes
@@ -139,9 +144,9 @@ def calibrate(grams: Grams, *, load: Array | None = None) -> Calibration:
             f"least {FEWEST_STRETCHES}, {FEWEST_STRETCHES * grams.stretch_s / 3600.0:.1f} h"
         )
     m = grams.changes
-    std, ramp, variance = _independent(grams)
+    std, ramp, variance = _independent(_windless(grams))
     stretches = stretches_of(grams, std, ramp)
-    force = _spared(_varying(stretches, variance, grams.stretch_s), grams.time_s)
+    force = _spared(_varying(stretches, variance, grams.stretch_s), grams.time_s, grams.winds)
     score, information = _filtered(stretches, force)
     whole = information.sum(axis=0)
     baseline = np.linalg.solve(whole + np.eye(m), score.sum(axis=0))
@@ -176,6 +181,13 @@ def misfit_of(quadratic: float, score: Array, information: Array, count: float) 
     """Squared error per measured number, in standard deviations, that no change explains, large ones included."""
     explained = np.linalg.solve(information + np.eye(len(score)) / LARGEST_SIZE**2, score)
     return float((quadratic - score @ explained) / max(count, 1.0))
+
+
+def _windless(grams: Grams) -> Grams:
+    """The stretches without the columns of winds, each of which is a push within a stretch."""
+    first = grams.changes + STARTS + grams.ramps
+    kept = np.delete(np.arange(grams.products.shape[-1]), np.s_[first : first + grams.winds])
+    return replace(grams, products=grams.products[:, :, kept][..., kept], winds=0)
 
 
 def _independent(grams: Grams) -> tuple[Array, Array, Array]:
@@ -217,7 +229,13 @@ def _improved(grams: Grams, total: Array, std: Array, variance: Array) -> tuple[
 
 
 def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
-    """The force as it varies from stretch to stretch: variances of its quick and slow parts, and quick times."""
+    """The force as it varies from stretch to stretch: variances of its quick and slow parts and of winds, quick times.
+
+    Args:
+        stretches: of a reference.
+        variance: (k,) of currents and accelerations, where each stretch has its own.
+        stretch_s: length of a stretch [s].
+    """
     part = replace(
         stretches,
         time_s=stretches.time_s[:SEARCHED_STRETCHES],
@@ -225,76 +243,72 @@ def _varying(stretches: Stretches, variance: Array, stretch_s: float) -> Force:
         products=stretches.products[:SEARCHED_STRETCHES],
         counts=stretches.counts[:SEARCHED_STRETCHES],
     )
-    q = len(variance)
-    best = np.log2(np.concatenate([variance / 2, variance * SLOW_SHARE, np.full(q, QUICK_S)]))
-    most = np.concatenate([np.full(q, np.inf), np.log2(variance), np.full(q, np.inf)])
-    cost = float(likelihood(part, _force(best, q, stretch_s)))
-    for _ in range(SEARCH_ROUNDS):
-        tried = np.minimum(best + np.concatenate([step * np.eye(3 * q) for step in STEPS]), most)
-        costs = likelihood(part, _force(tried, q, stretch_s))
-        gains = cost - costs
-        better = [_best_step(gains.reshape(len(STEPS), -1)[:, place]) for place in range(3 * q)]
-        together = np.minimum(best + np.array(better), most)
-        whole = float(likelihood(part, _force(together, q, stretch_s)))
-        single = int(np.argmin(costs))
-        new, value = (together, whole) if whole <= costs[single] else (tried[single], float(costs[single]))
-        if cost - value < SEARCH_GAIN:
-            break
-        best, cost = new, value
-    return _force(best, q, stretch_s)
+    k, axes = len(variance), stretches.winds // 2
+    whole, winds = np.log2(variance), np.log2(variance[k - axes :])
+    slow = np.concatenate([whole, winds])
+    first = np.concatenate([whole - 1.0, slow + np.log2(SLOW_SHARE), np.full(k, np.log2(QUICK_S))])
+    least = np.log2(LEAST_VARIANCE)
+    bounds = [
+        *[(least, high + MOST_QUICK) for high in whole.tolist()],
+        *[(least, max(high, least)) for high in slow.tolist()],
+        *[(np.log2(stretch_s / 2), np.log2(SLOW_S / 4))] * k,
+    ]
+    steps = np.vstack([np.zeros(len(first)), SEARCH_STEP * np.eye(len(first))])
+
+    def cost(logarithms: Array) -> tuple[float, Array]:
+        costs = likelihood(part, _force(logarithms + steps, k, axes))
+        return float(costs[0]), (costs[1:] - costs[0]) / SEARCH_STEP
+
+    words = {"maxiter": SEARCH_ITERATIONS, "ftol": SEARCH_GAIN}
+    best: Any = minimize(cost, first, jac=True, bounds=bounds, method="L-BFGS-B", options=words)
+    return _force(best.x, k, axes)
 
 
-def _spared(force: Force, time_s: Array) -> Force:
+def _spared(force: Force, time_s: Array, winds: int) -> Force:
     """The force with more variance of its slow currents, of which a short reference shows few independent values.
 
-    The accelerations get none: a ship meets another mean current in every water, while slow wind and waves vary within
-    a reference, too.
+    So with winds, which may be stronger later. The accelerations get none: a ship meets another mean current in every
+    water, while slow wind and waves vary within a reference, too.
     """
-    q = len(force.variance) // 2
+    n = len(force.variance)
+    k = (n - winds) // 2
     seen = len(np.unique(np.floor((time_s - time_s[0]) / SLOW_S)))
-    spare = np.ones(2 * q)
-    spare[q : 2 * q - PUSHES if q > PUSHES else 2 * q] += SPARE / seen
+    spare = np.ones(n)
+    spare[k : 2 * k - PUSHES if k > PUSHES else 2 * k] += SPARE / seen
+    spare[2 * k :] = STRONGER
     return replace(force, variance=spare * force.variance)
 
 
-def _best_step(gains: Array) -> float:
-    """The step of one number that gains most, or none."""
-    place = int(np.argmax(gains))
-    return float(STEPS[place]) if gains[place] > 0 else 0.0
-
-
-def _force(logarithms: Array, q: int, stretch_s: float) -> Force:
-    """The force whose parameters have these logarithms (..., 3 q)."""
+def _force(logarithms: Array, k: int, axes: int) -> Force:
+    """The force whose parameters have these logarithms (..., 3 k + axes)."""
     values = np.exp2(logarithms)
-    variance = np.maximum(values[..., : 2 * q], LEAST_VARIANCE)
-    quick = np.clip(values[..., 2 * q :], stretch_s / 2, SLOW_S / 4)
-    return Force(
-        variance=variance, time_s=np.concatenate([quick, np.full_like(quick, SLOW_S)], axis=-1),
-        turning=np.tile(1.0 * (np.arange(q) >= q - PUSHES), 2),
-    )  # fmt: skip
+    processes, winds, quick = np.split(values, [2 * k, 2 * k + axes], axis=-1)
+    variance = np.concatenate([processes, winds, winds], axis=-1)
+    time_s = [quick, np.full_like(quick, SLOW_S), *[np.full_like(winds, WIND_S)] * 2]
+    turning = np.zeros(variance.shape[-1])
+    turning[max(k - PUSHES, 0) : k] = 1.0
+    return Force(variance=np.maximum(variance, LEAST_VARIANCE), time_s=np.concatenate(time_s, axis=-1), turning=turning)
 
 
 def _filtered(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     """(w, m) scores and (w, m, m) information of changes that were there from the first stretch on."""
     m = stretches.changes
     known, taken = Known.nothing(force), np.zeros((force.variance.shape[-1], m))
-    scores, known_of = np.empty((len(stretches), m)), np.empty((len(stretches), m, m))
+    scores, told = np.empty((len(stretches), m)), np.empty((len(stretches), m, m))
     for index, products in enumerate(stretches.products):
         if index:
             gap = stretches.since(index)
             known, taken = after_gap(known, force, *gap), force.memory(*gap)[:, None] * taken
         one = judged(products, m, known)
-        scores[index] = one.score - taken.T @ one.force_score
-        cross = one.by_force @ taken
-        known_of[index] = one.information - cross - cross.T + taken.T @ one.force_information @ taken
-        known, taken = after_stretch(known, one), taken + one.gain @ (one.seen[0] - one.seen[1] @ taken)
-    return scores, known_of
+        scores[index], told[index], taken = beside(one, taken)
+        known = after_stretch(known, one)
+    return scores, told
 
 
 def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
     """(w,) `misfit_of` every stretch of a reference, and (w, q) squared `surprise`."""
     known, found = Known.nothing(force), np.empty(len(stretches))
-    surprises = np.empty((len(stretches), len(force.variance) // 2))
+    surprises = np.empty((len(stretches), stretches.products.shape[-1] - stretches.changes - 1))
     for index, products in enumerate(stretches.products):
         if index:
             known = after_gap(known, force, *stretches.since(index))
@@ -306,22 +320,28 @@ def _misfits(stretches: Stretches, force: Force) -> tuple[Array, Array]:
 
 
 def _seas(force: Force, stretches: Stretches) -> Force:
-    """(a, 2 q) forces of which one acceleration, or all currents, vary more than in the reference.
+    """(a, n) forces of which one acceleration, or all currents, vary more than in the reference; or winds, the last.
 
     The quick part does, or what a stretch can tell of it, where it shows less; or, of an acceleration, a part of
     minutes takes the place of that of hours: a wind that comes and goes lasts as a change of the ship does for a while.
     """
-    q = len(force.variance) // 2
-    told = np.einsum("wqq->q", stretches.products[:, -1 - q : -1, -1 - q : -1]) / len(stretches)
-    quick = np.maximum(force.variance[:q], 1.0 / np.maximum(told, 1e-300))
-    first, axes = max(q - PUSHES, 0), np.arange(q)
-    groups = [*(axes == axis for axis in range(first, q)), *[axes < first] * (first > 0)]
+    n, winds = len(force.variance), stretches.winds
+    k = (n - winds) // 2
+    told = np.einsum("wkk->k", stretches.products[:, -1 - k : -1, -1 - k : -1]) / len(stretches)
+    quick = np.maximum(force.variance[:k], 1.0 / np.maximum(told, 1e-300))
+    again = np.concatenate([quick, quick, np.tile(quick[k - winds // 2 :], 2)])
+    first, axes = max(k - PUSHES, 0), np.arange(k)
+    groups = [*(axes == axis for axis in range(first, k)), *[axes < first] * (first > 0)]
     variances, times = list[Array](), list[Array]()
     for group in groups:
         for factor, lasts in ROUGHER:
-            place = np.concatenate([group & (not lasts), group & lasts & (axes >= first)])
-            variances.append(np.where(place, factor**2 * np.tile(quick, 2), force.variance))
-            times.append(np.where(place & (np.arange(2 * q) >= q), LASTING_S, force.time_s))
+            place = np.concatenate([group & (not lasts), group & lasts & (axes >= first), np.zeros(winds, dtype=bool)])
+            variances.append(np.where(place, factor**2 * again, force.variance))
+            times.append(np.where(place & (np.arange(n) >= k), LASTING_S, force.time_s))
+    if winds:
+        place = np.arange(n) >= 2 * k
+        variances.append(np.where(place, WINDIER**2 * np.maximum(again, force.variance), force.variance))
+        times.append(np.where(place, LASTING_S, force.time_s))
     return replace(force, variance=np.array(variances), time_s=np.array(times))
 
 

@@ -25,7 +25,7 @@ class Change:
     """One way in which the ship may differ from its model."""
 
     effect: str  # key of an effect of the extended model, e.g. "theta:N_r".
-    size: float  # change that matters, in the effect's unit; CUSUM is tuned to it in both directions
+    size: float  # change that matters, in the effect's unit; sums are tuned to a share of it in both directions
     unit: tuple[float, str]  # of sizes in words: a divisor and what it gives, e.g. (0.01, "%").
     words: str  # e.g. "parameter N_r".
     whole: float = 0.0  # value of the effect that is the whole term: of a parameter itself; zero where there is no term

@@ -1,7 +1,7 @@
 """Sums of log-likelihood ratios of changes (CUSUM), the alarms they raise, and what changed since when.
 
-The log-likelihood ratio of a change by its size, in either direction, is d score - d^2 information / 2 with d = +-1 in
-units of the size. Its sum begins anew whenever it falls below zero. Where there is no change, exp of the ratio has mean
+The log-likelihood ratio of a change, in either direction, is d score - d^2 information / 2, with d a share of the size
+that matters. Its sum begins anew whenever it falls below zero. Where there is no change, exp of the ratio has mean
 one, so that a sum reaches h in exp(h) stretches on average, or later: the threshold follows from the time between false
 alarms that is asked for.
 
@@ -17,11 +17,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from expdesign.monitoring.alarms import REFINED, Again, beside_baseline, fits, raised, settling
+from expdesign.monitoring.alarms import AS_LIKELY, REFINED, Again, beside_baseline, fits, raised, settling
 from expdesign.monitoring.calibration import PUSHES, ROUGHER, Calibration
 from expdesign.monitoring.evidence import Grams, stretches_of
 from expdesign.monitoring.force import Judged, after_gap, after_stretch, judged, surprise
 from expdesign.monitoring.state import Alarm, Call, Load, Rules, State, Step
+from expdesign.monitoring.tuning import TUNING
 from expdesign.values import Array
 
 WEATHER_STRETCHES = 30.0  # over which the surprise of the force is averaged
@@ -30,6 +31,7 @@ WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond w
 # is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
 WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
+SIZED = 2.5  # standard errors of its size, those of the reference among them, that a change has to have
 SURELY = 0.95  # of how much scores scatter by chance
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
 LOAD_SETTLED = (2, 6, 20, 60, 240)  # stretches after a port call from which its load is taken for the ship's, and again
@@ -100,6 +102,13 @@ def estimates(state: State, calibration: Calibration) -> tuple[Array, Array]:
 def threshold(watched: int, stretches: float) -> float:
     """Alarm limit for sums of so many changes, both ways, with so many stretches between false alarms or more."""
     return math.log(max(2.0 * watched * stretches, 2.0))
+
+
+def soonest(rate: Array, limit: float) -> Array:
+    """Stretches from a change of the size that matters to its alarm, on average, for information of each (...)."""
+    grows = rate * TUNING.tuned_to * (1.0 - TUNING.tuned_to / 2.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.where(grows > 0, np.ceil(limit / grows), np.inf))
 
 
 def watch(
@@ -192,7 +201,8 @@ def _noticed(
     """Raise an alarm where a sum has passed the limit, unless weather explains it.
 
     The sums of changes that such weather looks like then begin anew, and the others go on: weather in yaw does not stop
-    surge. Returns also the step with the largest sum that was compared with the limit.
+    surge. So where a steady push explains the data better. A change whose size the errors of the reference leave open
+    is waited for. Returns also the step with the largest sum that was compared with the limit.
     """
     m = len(state.shift)
     passed = [int(place) for place in np.argsort(-state.ratios) if state.ratios[place] > rules.limit]
@@ -215,10 +225,15 @@ def _noticed(
             doubtful |= alike
         else:
             step = replace(step, statistic=float(state.ratios[place]), change=one)
-            state, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration, again, rules)
-            explained_s = min(state.beyond_s, state.until_s - alarm.since_s)
-            judged_s, left_out_s = state.judged_s + explained_s, state.left_out_s - explained_s
-            return replace(state, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, step
+            after, alarm = raised(replace(state, undecided_s=0.0), step, place, calibration, again, rules)
+            if any(gain > AS_LIKELY for _, gain in alarm.pushes):
+                explained |= alike
+            elif abs(alarm.value) < SIZED * alarm.std:
+                doubtful |= alike
+            else:
+                explained_s = min(after.beyond_s, after.until_s - alarm.since_s)
+                judged_s, left_out_s = after.judged_s + explained_s, after.left_out_s - explained_s
+                return replace(after, judged_s=judged_s, left_out_s=left_out_s, beyond_s=0.0), alarm, step
     undecided_s = state.undecided_s + duration_s if doubtful.any() else 0.0
     state = replace(state, undecided_s=undecided_s, by_weather=state.by_weather + bool(explained.any()))
     if explained.any():
@@ -233,7 +248,7 @@ def _noticed(
 def _rougher_by(state: State, place: int, calibration: Calibration) -> float:
     """Log-likelihood by which a rougher weather explains the data of a sum better than the change does.
 
-    Of weathers count those in which a component varies more that the change resembles, and currents.
+    Of weathers count those in which a component varies more that the change resembles, currents and winds.
     """
     change, sums = place % len(state.shift), state.sums
     known = max(float(sums.information[place, change, change]), 1e-300)
@@ -241,7 +256,8 @@ def _rougher_by(state: State, place: int, calibration: Calibration) -> float:
     pushes = calibration.weights[change][-PUSHES:]
     alike = np.append(pushes > ALIKE * pushes.max(), True)
     others = np.repeat(alike, len(ROUGHER))[: len(state.rougher)]
-    return float((state.rougher - sums.rougher[place])[others].max()) - gain
+    winds = np.ones(len(state.rougher) - len(others), dtype=bool)
+    return float((state.rougher - sums.rougher[place])[np.append(others, winds)].max()) - gain
 
 
 def _scattered(state: State, place: int, calibration: Calibration) -> float:
@@ -291,8 +307,9 @@ def _summed(state: State, one: Judged, before: State, begin_s: float, calibratio
     m = score.shape[1]
     own, number = np.arange(2 * m), np.arange(2 * m) % m
     sign, inflation = np.repeat([1.0, -1.0], m), np.tile(calibration.inflation, 2)
-    ratios = state.ratios + (sign * score[own, number] - 0.5 * information[own, number, number]) / inflation
-    fresh = (sign * one.score[number] - 0.5 * one.information[number, number]) / inflation
+    size = TUNING.tuned_to
+    ratios = state.ratios + (sign * score[own, number] - size / 2 * information[own, number, number]) * size / inflation
+    fresh = (sign * one.score[number] - size / 2 * one.information[number, number]) * size / inflation
     late = fresh > ratios
     ratios = np.maximum(ratios, fresh)
     ended = (ratios <= 0.0) | ~np.tile(calibration.watched, 2)

@@ -68,7 +68,8 @@ class Grams:
     kind: NDArray[np.int64]  # (w,) number in `KINDS`
     stretch_s: float  # length of a whole one [s]
     ramps: int = 0  # columns R
-    pushes: int = 0  # steady accelerations, the last of the columns F
+    winds: int = 0  # accelerations that keep their direction on the earth, the first of the columns F
+    pushes: int = 0  # steady accelerations, the last of them
     # (w,) draught over depth, where it is measured and the model does not read it; else zero
     shoal: Array = field(default_factory=lambda: np.zeros(0))
     heading: Array = field(default_factory=lambda: np.zeros(0))  # (w,) mean in each [rad], nan where it is not known
@@ -159,6 +160,7 @@ def _grams(simulated: Simulated, changes: Sequence[Change], noise: Noise, *, str
         shoal=_shoal(linear)[keep],
         heading=_headings(linear)[keep],
         ramps=_pushes(linear) + _drifts(linear),
+        winds=_winds(linear),
         pushes=_pushes(linear),
     )
 
@@ -198,8 +200,8 @@ def _noise_of(simulated: Simulated, changes: Sequence[Change], known: Noise | No
     linear, acting, columns, seen, _ = simulated
     keep = _usable(linear, seen) & ~_still(linear, _budget(linear, acting, changes), changes)
     windows, first = linear.motion.windows, len(changes) + STARTS
-    ramps = np.s_[first : first + _pushes(linear) + _drifts(linear)]
-    columns = np.delete(columns, ramps, axis=0)  # they are noise themselves
+    left = np.s_[first : first + _pushes(linear) + _drifts(linear) + _winds(linear)]
+    columns = np.delete(columns, left, axis=0)  # ramps are noise themselves, and a wind within a stretch is a push
     return learnt_noise(
         columns[:, keep], seen[keep], linear.transition[keep], changes=len(changes), sample_s=windows.sample_s,
         known=known,
@@ -314,6 +316,7 @@ def joined(parts: Sequence[Grams]) -> Grams:
         heading=np.concatenate([part.heading for part in parts]),
         stretch_s=parts[0].stretch_s,
         ramps=parts[0].ramps,
+        winds=parts[0].winds,
         pushes=parts[0].pushes,
     )
 
@@ -328,15 +331,21 @@ def _pushes(linear: LinearisedMotion) -> int:
     return sum(name in linear.motion.ship.model.outputs for name in "uvr")
 
 
+def _winds(linear: LinearisedMotion) -> int:
+    """Number of accelerations that keep their direction on the earth."""
+    return 2 * _pushes(linear) * linear.motion.windows.has_heading
+
+
 def _drifts(linear: LinearisedMotion) -> int:
     """Number of sensors that may drift within a stretch: a gyro beside a compass tells."""
     return int(linear.motion.windows.has_heading and not {"r"} & {*linear.motion.windows.derived})
 
 
 def _forces(linear: LinearisedMotion) -> list[Disturbance]:
-    """Ramps, a steady current where a heading is measured, and steady accelerations of the modelled velocities.
+    """Ramps; where a heading is measured, winds and a steady current; and steady accelerations of modelled velocities.
 
-    Ramps are accelerations that grow within the stretch, with variance one in it.
+    Ramps are accelerations that grow within the stretch, with variance one in it. Winds are accelerations that go as
+    the cosine and the sine of the heading.
     """
     motion = linear.motion
     flows = [
@@ -347,12 +356,14 @@ def _forces(linear: LinearisedMotion) -> list[Disturbance]:
     axes = [axis for axis, name in enumerate("uvr") if name in motion.ship.model.outputs]
 
     def pushes(over: Array) -> list[Disturbance]:
-        """Of every axis, as it goes over the steps (k - 1,)."""
-        return [
-            Disturbance(force=over[:, None] * (np.arange(n) == axis) * np.ones((w, 1, 1)), sensor=None) for axis in axes
-        ]
+        """Of every axis, as it goes over the steps (w, k - 1) or (k - 1,)."""
+        force = over[..., None, None] * np.eye(n)[axes] * np.ones((w, 1, 1, 1))  # (w, k - 1, axes, n)
+        return [Disturbance(force=force[:, :, place], sensor=None) for place in range(len(axes))]
 
-    return [*pushes(np.sqrt(3.0) * np.linspace(-1.0, 1.0, k - 1)), *flows, *pushes(np.ones(k - 1))]
+    heading = motion.windows.heading[:, : k - 1]
+    turned = [np.cos(heading), np.sin(heading)] if motion.windows.has_heading else []
+    winds = [one for over in turned for one in pushes(over)]
+    return [*pushes(np.sqrt(3.0) * np.linspace(-1.0, 1.0, k - 1)), *winds, *flows, *pushes(np.ones(k - 1))]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -364,6 +375,7 @@ class Stretches:
     counts: Array  # (w,) measured numbers
     changes: int  # m
     heading: Array  # (w,) as in `Grams`
+    winds: int = 0  # columns of winds, the first of F
 
     def __post_init__(self) -> None:
         seal(self, time_s="w", products="w c c", counts="w", heading="w")
@@ -397,5 +409,6 @@ def stretches_of(grams: Grams, std: Array, ramp: Array) -> Stretches:
     across = whole[:, m:first][:, :, kept]
     left = whole[:, kept][:, :, kept] - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across)
     return Stretches(
-        time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m, heading=grams.heading
-    )
+        time_s=grams.time_s, products=left, counts=grams.counts.sum(axis=0), changes=m, heading=grams.heading,
+        winds=grams.winds,
+    )  # fmt: skip

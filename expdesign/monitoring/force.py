@@ -1,10 +1,11 @@
 """The unmeasured force and the load from stretch to stretch, by a Kalman filter.
 
 Every component of the force, of the current or of an acceleration, is the sum of two Gauss-Markov processes: one that
-varies within minutes and one that varies within hours. Accelerations are those of wind and waves, which keep their
-direction when the ship turns: over all directions they are correlated by the cosine of the turn, and beyond a quarter
-not at all. The load is what a ship carries: changes of inertia and hull
-that last from port to port. A change of the ship is taken for such a force or load in part.
+varies within minutes and one that varies within hours. Accelerations within minutes are those of gusts and waves,
+which keep their direction when the ship turns: over all directions they are correlated by the cosine of the turn, and
+beyond a quarter not at all. A wind is a third process, of hours: it keeps its direction on the earth, and pushes along
+each axis of the ship as the cosine and the sine of her heading. The load is what a ship carries: changes of inertia
+and hull that last from port to port. A change of the ship is taken for such a force or load in part.
 
 Source: R. E. Kalman, Journal of Basic Engineering 82 (1960), 35-45; A. S. Willsky and H. L. Jones, IEEE Transactions on
 Automatic Control 21 (1976), 108-112, for the sensitivity of a filter to a jump.
@@ -28,12 +29,14 @@ NO_LOADS = np.array([], dtype=np.int64)
 class Force:
     """Covariance of the unmeasured force over time, and of a load."""
 
-    variance: Array  # (..., 2 q) of the quick processes, then of the slow ones; then (..., l) zeros for the load
-    time_s: Array  # (..., 2 q + l) their correlation times [s]; infinite for the load
-    turning: Array = field(default_factory=lambda: np.zeros(1))  # (2 q + l,) one for those that a turn changes
+    # (..., n) of the quick processes of currents and accelerations, then of the slow ones, then of winds; then zeros
+    # for the load
+    variance: Array
+    time_s: Array  # (..., n) their correlation times [s]; infinite for the load
+    turning: Array = field(default_factory=lambda: np.zeros(1))  # (n,) one for those that a turn changes
 
     def memory(self, gap_s: float, turn_rad: float = 0.0) -> Array:
-        """(..., 2 q + l) autocorrelation over a time and a turn; one that is not known (nan) is none."""
+        """(..., n) autocorrelation over a time and a turn; one that is not known (nan) is none."""
         kept = max(math.cos(turn_rad), 0.0) if math.isfinite(turn_rad) else 1.0
         return np.asarray(np.exp(-gap_s / self.time_s) * np.where(self.turning, kept, 1.0))
 
@@ -52,7 +55,7 @@ class Force:
 class Known:
     """What is known of force and load at the beginning of a stretch: normal with this mean and covariance."""
 
-    mean: Array  # (..., n), n = 2 q + l
+    mean: Array  # (..., n)
     covariance: Array  # (..., n, n)
 
     @classmethod
@@ -95,8 +98,7 @@ def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64]
 
     The load is that of the changes with these numbers (l,), in their sizes.
     """
-    m = changes
-    force = np.concatenate([np.tile(np.arange(m, len(products) - 1), 2), loads])
+    m, force = changes, _columns(products, changes, known, loads)
     XX, XF, Xe = products[:m, :m], products[:m, force], products[:m, -1]
     FF, Fe, ee = products[np.ix_(force, force)], products[force, -1], products[-1, -1]
     grown = np.eye(len(force)) + known.covariance @ FF
@@ -121,6 +123,31 @@ def judged(products: Array, changes: int, known: Known, loads: NDArray[np.int64]
     )
 
 
+def _columns(products: Array, changes: int, known: Known, loads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) columns of the products by which force and load act: those that are not of winds, twice."""
+    q = len(products) - 1 - changes
+    winds = 2 * q + len(loads) - known.mean.shape[-1]
+    once = np.arange(changes, changes + winds)
+    both = np.arange(changes + winds, changes + q)
+    return np.concatenate([both, both, once, loads])
+
+
+def beside(one: Judged, taken: Array) -> tuple[Array, Array, Array]:
+    """Score (..., m) and information (..., m, m) of changes that were there before a stretch, and what is taken after.
+
+    Args:
+        one: the stretch.
+        taken: (..., n, m) what the filter has taken of each change for the force and the load before it.
+
+    Source: P. de Jong, Annals of Statistics 19 (1991), 1073-1083, for a regression beside a filter.
+    """
+    turned = np.swapaxes(taken, -1, -2)
+    score = one.score - np.einsum("...nm,...n->...m", taken, one.force_score)
+    cross = one.by_force @ taken
+    information = one.information - cross - np.swapaxes(cross, -1, -2) + turned @ one.force_information @ taken
+    return score, information, taken + one.gain @ (one.seen[0] - one.seen[1] @ taken)
+
+
 def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int64] = NO_LOADS) -> Array:
     """(q,) squared errors of the prediction of a stretch's force, in standard deviations: one on average.
 
@@ -129,8 +156,7 @@ def surprise(products: Array, changes: int, known: Known, loads: NDArray[np.int6
         changes: m, as for `judged`; loads: too.
         known: before the stretch.
     """
-    own = slice(changes, len(products) - 1)
-    columns = np.concatenate([np.tile(np.arange(changes, len(products) - 1), 2), loads])
+    own, columns = slice(changes, len(products) - 1), _columns(products, changes, known, loads)
     across = products[own, columns]
     missed = products[own, -1] - across @ known.mean
     variance = np.diag(products[own, own]) + np.einsum("qi,ij,qj->q", across, known.covariance, across)
@@ -158,14 +184,17 @@ def likelihood(stretches: Stretches, force: Force) -> Array:
 
     Source: D. A. Harville, Journal of the American Statistical Association 72 (1977), 320-338.
     """
-    changes = np.arange(stretches.changes)
-    force = force.with_load(len(changes))
     known, total = Known.nothing(force), np.zeros(force.variance.shape[:-1])
-    known.covariance[..., -len(changes) + changes, -len(changes) + changes] = 1.0
+    *batch, n = force.variance.shape
+    m = stretches.changes
+    taken, score, information = np.zeros((*batch, n, m)), np.zeros((*batch, m)), np.tile(np.eye(m), (*batch, 1, 1))
     for index, products in enumerate(stretches.products):
         if index:
-            known = after_gap(known, force, *stretches.since(index))
-        one = judged(products, len(changes), known, changes)
-        total = total + one.deviance
+            gap = stretches.since(index)
+            known, taken = after_gap(known, force, *gap), force.memory(*gap)[..., None] * taken
+        one = judged(products, m, known)
+        more, told, taken = beside(one, taken)
+        score, information, total = score + more, information + told, total + one.deviance
         known = after_stretch(known, one)
-    return np.asarray(total)
+    explained = np.einsum("...m,...m->...", score, np.linalg.solve(information, score[..., None])[..., 0])
+    return np.asarray(total - explained + np.linalg.slogdet(information)[1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from expdesign.monitoring.calibration import Calibration
 from expdesign.monitoring.evidence import KINDS
-from expdesign.monitoring.force import Judged, Known
+from expdesign.monitoring.force import Judged, Known, beside
 from expdesign.values import Array
 
 
@@ -122,15 +122,10 @@ class Sums:
 
     def added(self, one: Judged) -> tuple[Sums, Array, Array]:
         """The sums with one more stretch; and its scores (n, m) and information (n, m, m)."""
-        score = one.score - np.einsum("nfm,f->nm", self.taken, one.force_score)
-        cross = one.by_force @ self.taken
-        information = (
-            one.information - cross - np.swapaxes(cross, 1, 2)
-            + np.swapaxes(self.taken, 1, 2) @ one.force_information @ self.taken
-        )  # fmt: skip
+        score, information, taken = beside(one, self.taken)
         after = replace(
             self,
-            taken=self.taken + one.gain @ (one.seen[0] - one.seen[1] @ self.taken),
+            taken=taken,
             score=self.score + score,
             information=self.information + information,
             squares=self.squares + _squares(score, information),
