@@ -12,11 +12,11 @@ from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.causes.candidate import Candidate, Situation
 from expdesign.diagnosis.conclusions.findings import note_on_unconverged, notes_on_rejected
 from expdesign.diagnosis.data.windows import cut_windows
-from expdesign.diagnosis.fit.cross_validation import _fitted
+from expdesign.diagnosis.fit.cross_validation import CrossValidation, _fitted
 from expdesign.diagnosis.fit.fit import Fit
 from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.fit.held_out import HeldOut, held_out_gain, judged
-from expdesign.diagnosis.motion.simulation import initial_states
+from expdesign.diagnosis.motion.simulation import initial_states, simulate_from_measured
 from expdesign.diagnosis.select import backward_elimination
 from expdesign.diagnosis.select.backward_elimination import before_first_without_gain, improves_held_out
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, to_take_out
@@ -216,6 +216,43 @@ def test_a_change_that_comes_after_the_data_of_a_fold_is_no_part_of_its_fit(barg
     both = _fitted(whole, windows, windows.batch > windows.batch.min())
     assert both is not None
     assert both.get("change:gain") != 0.0
+
+
+@pytest.mark.parametrize("key", ["slew:rudder", "lag:rudder", "delay:rudder"])
+def test_an_actuator_that_is_quicker_than_its_file_says_is_so_in_every_fold(key: str):
+    """At zero a slew time has no slope, which is no reason to hold out runs beside the time of the file."""
+    record = hidden_record("coaster", seed=3, batches=3, samples=120)
+    slow = extended_model(vessel_of("coaster"), record)
+    ship = replace(slow, effects={key: 5.0}, stated={key: 5.0})
+    windows = cut_windows(ship.model, record)
+    whole = fit(ship, windows, (key,), starts=initial_states(windows))
+    assert whole.value(key) == pytest.approx(0.0, abs=0.5)
+    for out in np.unique(windows.batch):
+        apart = _fitted(whole, windows, windows.batch != out)
+        assert apart is not None
+        assert apart.get(key) == pytest.approx(0.0, abs=0.5)
+
+
+def test_stretches_of_a_run_are_predicted_by_models_that_saw_other_runs_only():
+    """In the order of time: as simulated by hand with the models of the whole runs that were held out."""
+    record = hidden_record("barge", seed=4, batches=3, samples=120, factors={"N_r": 1.2})
+    ship = extended_model(vessel_of("barge", relative_std=0.2), record)
+    windows = cut_windows(ship.model, record)
+    validation = CrossValidation(windows, record)
+    held = validation.of(fit(ship, windows, (), starts=initial_states(windows)))
+    assert held.on_other_runs is not None
+    found = held.on_other_runs()
+    assert found.run is not None
+    assert (np.diff(found.run) >= 0.0).all()
+    short = validation.short_windows(ship)
+    (model,) = (one for out, one in held.models if out[windows.batch == 1.0].all())
+    assert model is not None
+    error = simulate_from_measured(model, short.selected(short.batch == 1.0)).error[..., :3]
+    assert found.squared_error[found.run == 1.0].sum() == pytest.approx(np.nansum(error**2), rel=1e-9)
+    both = replace(record, batches=record.batches[:2])  # two runs: as parts of them are held out
+    windows = cut_windows(ship.model, both)
+    held = CrossValidation(windows, both).of(fit(ship, windows, (), starts=initial_states(windows)))
+    assert held.on_other_runs is held.ahead
 
 
 def test_folds_that_cannot_be_fitted_count_for_neither_model():

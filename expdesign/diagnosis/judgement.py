@@ -329,25 +329,30 @@ def worth_writing(
     """Causes whose model predicts stretches held out better than the file does, where re-estimated parameters do not.
 
     What is written has to help other runs, not these. Many parameters re-estimated from few runs may spoil what a right
-    cause gains, or be what a wrong one needs. Where they predict no better than those of the file, causes are fitted
-    beside the latter if that predicts better and each improves there; if it does not, and the model of all takes less
-    than `Tuning.least_reduction` off the error of the file's, nothing is found. Arguments as of
-    `harmless_beside_the_file`, and the errors that belong to the causes.
+    cause gains, or be what a wrong one needs: they learn the weather and the manoeuvres of these runs, which parts of
+    the same runs do not show. So causes are fitted beside the parameters of the file where each improves on it so,
+    unless re-estimated parameters predict runs that they were not fitted to better for certain. If causes do not, and
+    the model of all takes less than `Tuning.least_reduction` off the error of the file's, nothing is found. Arguments
+    as of `harmless_beside_the_file`, and the errors that belong to the causes.
     """
     windows, record = data
     if not _re_estimates(kept) or only_nuisance(kept.steps[0], kept):
         return kept, held
-    stated, alone, written = _ahead([as_stated, *map(validation.of, (kept.first, kept.last))])
-    if alone.mean_fit > stated.mean_fit:
-        return kept, held
     known = fitted_ahead(kept, windows, validation.short_windows(ship), beside_stated=True)
     if known is not None and not harms(ship, known.last.ship, record):
         beside = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
-        if beside[-1].mean_fit > written.mean_fit and all(improves_held_out(known, beside, seed, windows)):
+        parameters = [validation.of(one.last) for one in (known, kept)]
+        if all(improves_held_out(known, beside, seed, windows)) and not _gains_on_other_runs(parameters, seed):
             rng = np.random.default_rng(seed)
             return with_runs_counted(known, open_candidates(known.last, windows), rng), beside
-    gains = written.left < (1.0 - SELECTION_TUNING.least_reduction) * stated.left
+    stated, alone, written = _ahead([as_stated, *map(validation.of, (kept.first, kept.last))])
+    gains = alone.mean_fit > stated.mean_fit or written.left < (1.0 - SELECTION_TUNING.least_reduction) * stated.left
     return (kept, held) if gains else (kept.with_steps(()), held[:1])
+
+
+def _gains_on_other_runs(held: Sequence[HeldOut], seed: int) -> bool:
+    """Whether the second of two models predicts runs that it was not fitted to better, for certain."""
+    return _gains_for_certain([item.on_other_runs() for item in held if item.on_other_runs is not None], seed)
 
 
 def _re_estimates(kept: Selection) -> bool:

@@ -18,7 +18,7 @@ Forecasting 8 (1992), 69-80).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from weakref import WeakKeyDictionary
@@ -109,7 +109,11 @@ def cross_validate(
     def ahead() -> HeldOut:
         return replace(_in_stretches(ship, free, windows, record), models=whole.models)
 
-    return replace(whole, ahead=cache(ahead))
+    def on_other_runs() -> HeldOut:
+        return _on_other_runs(whole, windows.batch, _stretches(windows, unit, ship, record), ship.model.outputs)
+
+    known = cache(ahead)
+    return replace(whole, ahead=known, on_other_runs=cache(on_other_runs) if unit is windows.batch else known)
 
 
 def _in_stretches(
@@ -128,6 +132,33 @@ def _in_stretches(
     except (FloatingPointError, np.linalg.LinAlgError):
         return _of_stretches(ship, short, _not_fitted)
     return _of_stretches(ship, short) if found is None else cross_validate_ahead(found)
+
+
+def _on_other_runs(whole: HeldOut, batch: Array, short: Windows, outputs: Sequence[str]) -> HeldOut:
+    """Errors in short stretches of every run, by models that were fitted to other runs.
+
+    Args:
+        whole: errors in whole runs, with the models.
+        batch: (w,) run of every window that they were fitted to.
+        short: the data in short stretches.
+        outputs: that are compared.
+    """
+    columns = [OUTPUTS.index(name) for name in outputs]
+    measured = short.measured[..., columns]
+    lost, varied = np.full((2, len(measured), len(columns)), np.nan)
+    most = error_of_constants(measured, short.batch)
+    for held_out, model in whole.models:
+        rows = np.isin(short.batch, batch[held_out])
+        if model is not None:
+            error = simulate_from_measured(model, short.selected(rows)).error[..., columns]
+            lost[rows], varied[rows] = squared_sums(error, measured[rows])
+    order = np.lexsort((short.first, short.batch))
+    return HeldOut(
+        squared_error=np.minimum(lost, most)[order],
+        squared_deviation=varied[order],
+        in_stretches=True,
+        run=short.batch[order],
+    )
 
 
 def cross_validate_ahead(found: Fit) -> HeldOut:
@@ -260,12 +291,14 @@ def _fitted(found: Fit, windows: Windows, train: NDArray[np.bool_]) -> ExtendedM
 def _seen(found: Fit, train: NDArray[np.bool_]) -> tuple[ExtendedModel, tuple[str, ...]]:
     """The model without effects that do nothing in some windows, and the free ones that are left.
 
-    Nothing is known there of a change of the ship that comes later, for example.
+    Nothing is known there of a change of the ship that comes later, for example. What does nothing more anywhere, as
+    the slew time of an actuator that is as quick as its signal, stays as it was found: the file may say otherwise.
     """
-    values = found.sensitivities.values[: found.free_count, train]
-    sizes = np.abs(values).max(axis=(1, 2, 3), initial=0.0)
-    unseen = {key for key, size in zip(found.free_keys, sizes.tolist(), strict=True) if not size > 0.0}
-    return found.ship.without_effects(unseen), tuple(key for key in found.free_keys if key not in unseen)
+    values = np.abs(found.sensitivities.values[: found.free_count])
+    size, elsewhere = (values[:, part].max(axis=(1, 2, 3), initial=0.0).tolist() for part in (train, ~train))
+    unseen = {key for key, own, other in zip(found.free_keys, size, elsewhere, strict=True) if own == 0.0 < other}
+    free = tuple(key for key, own in zip(found.free_keys, size, strict=True) if own > 0.0)
+    return found.ship.without_effects(unseen), free
 
 
 def _not_fitted(windows: Windows, train: NDArray[np.bool_]) -> ExtendedModel | None:

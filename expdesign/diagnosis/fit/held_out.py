@@ -59,6 +59,9 @@ class HeldOut:
     unconverged: int = 0  # folds that kept the effects fitted to all units
     # of the same units in stretches of `Tuning.ahead_s`, fitted and simulated when it is called
     ahead: Callable[[], HeldOut] | None = None
+    # in the same stretches, by the models that simulate whole runs held out: none has seen any of the run it predicts;
+    # as `ahead` where there are fewer than `FEWEST_RUNS`
+    on_other_runs: Callable[[], HeldOut] | None = None
     in_stretches: bool = False  # whether these are such errors
     # (b,) of each unit, where these are stretches of runs in the order of time: those of one run share its errors
     run: Array | None = None
