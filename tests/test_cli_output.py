@@ -12,9 +12,9 @@ import pytest
 import expdesign
 from expdesign.cli import main
 from expdesign.cli.entry import repeat_option
-from expdesign.export.document import fact_rows
+from expdesign.export.document import Document, fact_rows
 from expdesign.requests import Request
-from expdesign.workflows.outcome import Outcome, document_of, workflow
+from expdesign.workflows.outcome import Outcome, workflow
 from short_examples import copied
 
 SUMMARY = {
@@ -84,7 +84,7 @@ class Workflows:
             self.calls.append((name, request, options))
             for fraction in (0.0, 0.01, 0.5, 1.0):
                 progress("at work", fraction)  # type: ignore[operator]
-            return Outcome(files=FILES, document=document_of(self.summary))
+            return Outcome(files=FILES, document=Document(facts=self.summary))
 
         return work
 

@@ -15,12 +15,11 @@ import pytest
 from design_case import SCENARIOS
 from expdesign.cli import main
 from expdesign.cli.commands import as_json, print_summary
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.scenario import load_scenario
 from expdesign.sea_area import UNKNOWN_DEPTH
 from expdesign.workflows import Outcome
-from expdesign.workflows.outcome import document_of
-from expdesign.workflows.steps.planned import plan_summary
+from expdesign.workflows.steps.planned import plan_document
 from export_case import plan, tug
 from roll_files import KNOWN, UNKNOWN, stated, three
 from short_examples import SHORTER, copied
@@ -97,23 +96,18 @@ def test_what_a_page_says_first_is_on_the_terminal(
 
 
 def test_water_without_depths_is_said_with_the_plan() -> None:
-    assert (
-        plan_summary(replace(load_scenario(SCENARIOS / "story.toml"), vessel=tug()), plan())["note_on_depths"]
-        == UNKNOWN_DEPTH
-    )
+    assert UNKNOWN_DEPTH in plan_document(replace(load_scenario(SCENARIOS / "story.toml"), vessel=tug()), plan()).notes
 
 
-def test_a_remark_is_printed_once_however_long_and_whatever_tables_there_are(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    long, tabled = "A sentence that goes on. " * 20, "A sentence of the table."
-    table = Table(title="Findings", header=("finding",), rows=((tabled,),))
-    summary = {"number": float("nan"), "note_on_depths": long, "remarks": [tabled, "Another."], "chart_remarks": [long]}
-    outcome = Outcome(files=(), document=document_of(summary, (table,)))
+def test_a_note_is_printed_once_however_long_and_whatever_tables_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    long = "A sentence that goes on. " * 20
+    table = Table(title="Findings", header=("finding",), rows=(("A cell.",),))
+    part = Document(facts={"number": float("nan")}, findings=("Another.",), sections=tabled(table), notes=(long,))
+    outcome = Outcome(files=(), document=part + Document(notes=(long,)))
     print_summary(outcome)
     told = capsys.readouterr().out
-    assert [told.count(text) for text in (tabled, "Another.", f"note on depths: {long}", f"chart remarks: {long}")] == [
-        1, 1, 1, 1,
-    ]  # fmt: skip
+    assert [told.count(text) for text in ("A cell.", "Another.", long)] == [1, 1, 1]
     assert "nan" not in told
-    assert json.loads(as_json("run", outcome))["summary"]["number"] is None
+    printed = json.loads(as_json("run", outcome))
+    assert printed["summary"]["number"] is None
+    assert printed["notes"] == [long]

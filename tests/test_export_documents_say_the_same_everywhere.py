@@ -27,6 +27,7 @@ from expdesign.export.document import (
     Note,
     Section,
     Table,
+    Terms,
     fact_rows,
     filled,
     section,
@@ -43,6 +44,7 @@ BESIDE: tuple[Block, ...] = (
     replace(FIGURE, above=True),
     Gallery((FIGURE,), small=True, folded="Others"),
     Items(("An item.",)),
+    Terms((("Word", "what it means"),)),
     Listing(("expdesign run a.toml",)),
     Note("Another <note> & more."),
 )
@@ -108,6 +110,35 @@ def test_tables_are_on_page_and_terminal_unless_one_stands_for_the_other(capsys:
     page, terminal, _ = renderings(replace(WHOLE, sections=(section("Part", *tables),)), capsys)
     assert ["cell all" in page, "cell page" in page, "cell terminal" in page] == [True, True, False]
     assert ["cell all" in terminal, "cell page" in terminal, "cell terminal" in terminal] == [True, False, True]
+
+
+def test_sections_beside_each_other_are_in_one_pair_and_others_in_none() -> None:
+    for flags, pairs in (("", 0), ("01", 1), ("110", 1), ("1101", 2), ("111", 1), ("000", 0)):
+        parts = tuple(section(f"Part {place}", "Text.", beside=flag == "1") for place, flag in enumerate(flags))
+        page = document_html(replace(WHOLE, sections=parts))
+        assert page.count('<div class="pair">') == pairs
+        for opened in page.split('<div class="pair">')[1:]:
+            inside = opened.split("</div>")[0]
+            assert inside.count("<section") == inside.count("</section>") > 0
+        kept = re.findall(r"<section id=.part-\d+.>", re.sub(r'<div class="pair">.*?</div>', "", page, flags=re.DOTALL))
+        assert len(kept) == flags.count("0")
+
+
+def test_joined_documents_say_what_each_says_in_order(capsys: pytest.CaptureFixture[str]) -> None:
+    more = Document(
+        facts={"legs": 3},
+        values={"why": "so"},
+        findings=("A third.",),
+        sections=(section("Part", "Text."),),
+        notes=("B",),
+    )
+    joined = WHOLE + more
+    assert (joined.title, joined.mark, joined.command) == (WHOLE.title, WHOLE.mark, WHOLE.command)
+    assert joined.summary == {**WHOLE.summary, **more.summary}
+    assert joined.findings == (*WHOLE.findings, *more.findings)
+    for told in renderings(joined, capsys):
+        assert told.index("The second.") < told.index("A third.")
+        assert told.index("ignored mood") < told.rindex("B")
 
 
 def makers() -> list[Callable[..., Document]]:

@@ -18,7 +18,7 @@ from expdesign.export.routes import read_plan
 from expdesign.plan.values import LegOutcome, Plan, RiskEstimate
 from expdesign.scenario import load_scenario
 from expdesign.vessel import column_name
-from expdesign.workflows.steps.planned import plan_summary, trial_remarks
+from expdesign.workflows.steps.planned import plan_document, trial_remarks
 from scenario_files import write_scenario
 
 LIMIT = 0.1
@@ -60,18 +60,18 @@ def test_report_cards_files_and_terminal_agree_on_the_verdict(tmp_path, share: f
     content = case.report_content(plan=plan, remarks=("the wind moves no ship",))
     report, cards = report_html(content), cards_html(content)
     file = json.loads(case.plan_files(plan)["plan.json"])
-    summary = plan_summary(replace(load_scenario(write_scenario(tmp_path)), vessel=case.tug()), plan)
+    document = plan_document(replace(load_scenario(write_scenario(tmp_path)), vessel=case.tug()), plan)
     head = html.fromstring(report).find_class("verdict")[0]
     assert ("yes" in head.get("class")) is within
     assert ("verified" in head.text_content()) is within
-    for told in (report, cards, json.dumps(file, ensure_ascii=False), json.dumps(summary, ensure_ascii=False)):
+    for told in (report, cards, json.dumps(file, ensure_ascii=False), " ".join(document.notes)):
         plain = " ".join(told.split())
         assert (SAID.format(100 * share) in plain) is not within
     rule = f"than the whole planned trial, {words.duration(plan.day.planned_s)}."  # as drawn trials are aborted
     assert rule in report
     assert rule in cards
     assert ("Verified by simulation" in cards) is within
-    assert file["verified"] is summary["verified"] is within
+    assert file["verified"] is document.facts["verified"] is within
     assert file["drawn_trials"]["aborted_share"] == share
     assert file["drawn_trials"]["aborted_most"] == LIMIT
     (checks,) = html.fromstring(report).xpath("//section[h2='Verification']")

@@ -129,9 +129,9 @@ def test_estimates_are_those_without_roll_and_say_so(tmp_path: Path) -> None:
     plain = tmp_path / "plain.toml"
     plain.write_text(ROLL_MODEL.read_text().split("[roll]")[0])
     with_, without = (
-        estimate([data], tmp_path / name, vessel=vessel, methods=["ls"]).summary
+        estimate([data], tmp_path / name, vessel=vessel, methods=["ls"]).document
         for name, vessel in (("with", known_file(tmp_path)), ("without", plain))
     )
-    assert with_["methods"] == without["methods"]
-    assert "does not act back on the ship's path" in str(with_["note_on_roll"])
-    assert "note_on_roll" not in without
+    assert with_.values["methods"] == without.values["methods"]
+    assert "does not act back on the ship's path" in " ".join(with_.notes)
+    assert "act back" not in " ".join(without.notes)

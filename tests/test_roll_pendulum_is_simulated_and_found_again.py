@@ -222,5 +222,5 @@ def test_a_design_says_in_one_line_that_it_leaves_roll_out(tmp_path: Path) -> No
     )
     (tmp_path / "one.toml").write_text(f'[dictionary]\nname = "one"\n\n{primitive}')
     scenario.write_text(text)
-    with_roll = score(scenario, tmp_path / "roll").summary
-    assert with_roll["note_on_roll"] == NOT_ACTING_BACK
+    with_roll = score(scenario, tmp_path / "roll").document.notes
+    assert NOT_ACTING_BACK in with_roll

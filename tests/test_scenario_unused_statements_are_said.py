@@ -12,14 +12,14 @@ import pytest
 from expdesign.cli import main
 from expdesign.cli.commands import print_summary
 from expdesign.errors import FileError
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.scenario import load_scenario
 from expdesign.scenario.scenario_file import build_scenario
 from expdesign.scenario.tables import Entry
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, Environment, simulate
 from expdesign.vessel import column_name
-from expdesign.workflows.outcome import Outcome, document_of
+from expdesign.workflows.outcome import Outcome
 from scenario_files import spoil, write_scenario
 
 WIND, CURRENT, UNREAD, CERTAIN = (
@@ -184,10 +184,9 @@ def test_a_command_says_them_on_the_terminal(tmp_path, capsys):
         assert line in told
 
 
-@pytest.mark.parametrize("key", ["remarks", "chart_remarks", "notes", "note_on_broken_off"])
-def test_what_must_be_heard_is_told_beside_tables_however_long(capsys, key):
+@pytest.mark.parametrize("part", ["findings", "notes"])
+def test_what_must_be_heard_is_told_beside_tables_however_long(capsys, part):
     long = " ".join(str(number) for number in range(200))
     table = Table(title="a", header=("b",), rows=(("c",),))
-    summary = {key: long if key.startswith("note_") else [long]}
-    print_summary(Outcome(files=(), document=document_of(summary, (table,))))
+    print_summary(Outcome(files=(), document=Document(sections=tabled(table), **{part: (long,)})))
     assert long in " ".join(capsys.readouterr().out.split())

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from markupsafe import Markup
@@ -40,6 +40,7 @@ class Table:
     on: Literal["all", "page", "terminal"] = "all"  # a table that is wide or long has a shorter one for the terminal
     shaded: int | None = None  # column that is emphasised
     marked: frozenset[int] = frozenset()  # rows that are
+    form: bool = False  # whether empty cells are to be filled in by hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +71,13 @@ class Items:
     folded: str = ""  # what they are, where the reader opens them
 
 
+@dataclass(frozen=True)
+class Terms:
+    """Words and what they mean."""
+
+    entries: tuple[tuple[str, str | Markup], ...]
+
+
 def verdict(text: str, good: bool | None) -> Markup:
     """A cell of a table on a page that says in a word or two whether something is as it should be."""
     return Markup('<span class="mark {}">{}</span>').format({True: "yes", False: "no", None: "open"}[good], text)
@@ -95,7 +103,7 @@ class Note:
         return f"{self.of}: {self.text}" if self.of else self.text
 
 
-Block = str | Markup | Table | Figure | Gallery | Items | Listing | Note
+Block = str | Markup | Table | Figure | Gallery | Items | Terms | Listing | Note
 """Of a section; a text is a paragraph that explains."""
 
 
@@ -106,6 +114,7 @@ class Section:
     title: str
     blocks: tuple[Block, ...] = ()
     level: Literal[2, 3] = 2  # of the heading
+    beside: bool = False  # whether it stands beside neighbours that do, too, on a wide page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +140,17 @@ class Document:
     sections: tuple[Section, ...] = ()
     notes: tuple[str, ...] = ()  # on the data
     command: str = ""  # to reproduce it
+
+    def __add__(self, other: Document) -> Document:
+        """Both, one after the other; what is above the first's findings stays."""
+        return replace(
+            self,
+            findings=(*self.findings, *other.findings),
+            facts={**self.facts, **other.facts},
+            values={**self.values, **other.values},
+            sections=(*self.sections, *other.sections),
+            notes=(*self.notes, *other.notes),
+        )
 
     @property
     def summary(self) -> Mapping[str, object]:
@@ -161,9 +181,14 @@ def listings(document: Document) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield from ((part.title, block.lines) for block in part.blocks if isinstance(block, Listing))
 
 
-def section(title: str, *blocks: Block, level: Literal[2, 3] = 2) -> Section:
+def section(title: str, *blocks: Block, level: Literal[2, 3] = 2, beside: bool = False) -> Section:
     """Blocks under a heading."""
-    return Section(title=title, blocks=blocks, level=level)
+    return Section(title=title, blocks=blocks, level=level, beside=beside)
+
+
+def tabled(*tables: Table) -> tuple[Section, ...]:
+    """A section of each table, under its title."""
+    return tuple(Section(title=table.title, blocks=(table,)) for table in tables)
 
 
 def filled(*sections: Section) -> tuple[Section, ...]:

@@ -155,7 +155,7 @@ def estimate_document(content: EstimateContent) -> Document:
             "runs_kept_apart": len(found.tests.batches),
             "vessel_file_holds": found.best.method.name,
         },
-        values={**estimate_values(found), **({} if ship.pendulum is None else {"note_on_roll": NOT_ACTING_BACK})},
+        values=estimate_values(found),
         sections=filled(
             _parameters(content),
             *_choice(content),

@@ -100,10 +100,11 @@ def indices_document(content: IndicesContent) -> Document:
         },
         values=_values(content),
         sections=filled(
-            section("Ship", Table(header=SHIP, rows=ship_rows(content), texts=2, on="page")),
+            section("Ship", Table(header=SHIP, rows=ship_rows(content), texts=2, on="page", form=True), beside=True),
             section(
                 "Conditions of the measured trials",
-                Table(header=CONDITIONS, rows=condition_rows(content), texts=4, on="page"),
+                Table(header=CONDITIONS, rows=condition_rows(content), texts=4, on="page", form=True),
+                beside=True,
             ),
             _verdicts(content),
             *(

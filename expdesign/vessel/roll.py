@@ -150,8 +150,8 @@ NOT_FOLLOWED = (
 ROLL_PARAMETERS = ("k", "A_x", "d", "K_r", "K_vd", "K_delta", "z_f")
 """Names of a pendulum's parameters; see `roll.MEANINGS` and `roll.UNITS`."""
 NOT_ACTING_BACK = (
-    "roll, [roll] of the vessel file, is left out here: it does not act back on the ship's path, so that results are "
-    "those without it; diagnose and monitor judge it, expdesign roll estimates it"
+    "Roll, [roll] of the vessel file, is left out here: it does not act back on the ship's path, so that results are "
+    "those without it. The commands diagnose and monitor judge it; roll estimates it."
 )
 
 

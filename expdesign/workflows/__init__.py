@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from expdesign.workflows.commands.roll import incline, roll
     from expdesign.workflows.commands.roll_plan import roll_plan
     from expdesign.workflows.commands.run import plan, run
+    from expdesign.workflows.commands.simulate import simulate
     from expdesign.workflows.commands.validate import validate_design
     from expdesign.workflows.commands.watch_steps import watch_steps
     from expdesign.workflows.commands.whatif import whatif
-    from expdesign.workflows.commands.written_plan import check_routes, export, simulate, trial_result
+    from expdesign.workflows.commands.written_plan import check_routes, export, trial_result
     from expdesign.workflows.outcome import Outcome, carry_out
     from expdesign.workflows.steps.design_problem import designed, duration_problem
     from expdesign.workflows.steps.measured import measured

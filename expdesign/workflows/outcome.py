@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial, wraps
@@ -13,14 +13,13 @@ from pathlib import Path
 
 from expdesign.errors import InputError
 from expdesign.export import Content, write_files
-from expdesign.export.document import Document, Section, Table, fact_text
+from expdesign.export.document import Document
 from expdesign.interruptions import interruptions_wait
 from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors
 from expdesign.progress import Progress, silent
 from expdesign.requests import COMMANDS, Request, command_of, repeating
 from expdesign.requests.options import Argument
-from expdesign.vessel import NOT_ACTING_BACK, Vessel
 
 FEW_CYCLES = 20_000
 """New objects after which cycles of garbage are looked for: work with arrays leaves few, and a look takes 0.1 s."""
@@ -202,54 +201,3 @@ def check_out(out: Path) -> None:
         raise InputError(f"--out {out}: {there} is a file, expected a folder")
     if not os.access(there, os.W_OK | os.X_OK):
         raise InputError(f"--out {out}: no permission to write in {there}")
-
-
-def document_of(summary: Mapping[str, object], tables: Sequence[Table] = (), notes: Sequence[str] = ()) -> Document:
-    """A result that has no page, or one of its own, for terminal and JSON.
-
-    Args:
-        summary: key numbers; entries that end with one of `SENTENCES` hold findings, those that begin with note a note.
-        tables: each with a title.
-        notes: on the data.
-    """
-    findings, own, facts, values = list[str](), list[str](), dict[str, object](), dict[str, object]()
-    cells = {cell for table in tables for row in table.rows for cell in row}
-    for key, value in summary.items():
-        words = key.replace("_", " ")
-        if key.endswith(SENTENCES):
-            findings += (line if key in SENTENCES else f"{words}: {line}" for line in _lines(value))
-        elif key.startswith("note"):
-            own += (line if key == "notes" else f"{words}: {line}" for line in _lines(value))
-        elif not tables or _brief(value, notes):
-            facts[key] = value
-            continue
-        values[key] = value
-    return Document(
-        findings=tuple(line for line in findings if line not in {*notes, *cells}),
-        facts=facts,
-        values=values,
-        sections=tuple(Section(title=table.title, blocks=(table,)) for table in tables),
-        notes=(*own, *notes),
-    )
-
-
-def _lines(value: object) -> Iterator[str]:
-    yield from (value,) if isinstance(value, str) else map(str, value)  # type: ignore[call-overload]
-
-
-def _brief(value: object, notes: Sequence[str]) -> bool:
-    """Whether a value gets a line beside tables: no table of its own, no long list, and not what notes say."""
-    if isinstance(value, (list, tuple)):
-        return 0 < len(fact_text(value)) < LONGEST and not set(map(str, value)) <= set(notes)
-    return not isinstance(value, Mapping)
-
-
-LONGEST = 200
-"""Characters of a list that gets a line beside tables."""
-SENTENCES = ("remarks",)
-"""Endings of entries of a summary that hold sentences."""
-
-
-def note_on_roll(vessel: Vessel) -> dict[str, object]:
-    """An entry of a summary, where the vessel file has roll that the command leaves out."""
-    return {} if vessel.pendulum is None else {"note_on_roll": NOT_ACTING_BACK}

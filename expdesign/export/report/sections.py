@@ -8,7 +8,7 @@ from functools import partial
 from markupsafe import Markup
 
 from expdesign.export import words
-from expdesign.export.document import Block, Figure, Gallery, Items, Section, Table, section, verdict
+from expdesign.export.document import Block, Figure, Gallery, Items, Section, Table, Terms, section, verdict
 from expdesign.export.report import tables
 from expdesign.export.report.checks import checks, conditions, procedure_sentences
 from expdesign.export.report.content import ReportContent
@@ -137,8 +137,8 @@ def report_sections(
         ),
         _admissible(content),
         section("Verification", *_verification(content)),
-        section("Assumptions", _defined(assumptions)),
-        section("Glossary", _defined(GLOSSARY)),
+        section("Assumptions", Terms(tuple(assumptions))),
+        section("Glossary", Terms(GLOSSARY)),
     )
 
 
@@ -146,10 +146,6 @@ def _page_table(
     header: tuple[str, ...], rows: Sequence[tuple[str, ...]], *, texts: int = 1, marked: frozenset[int] = frozenset()
 ) -> Table:
     return Table(header=header, rows=rows, texts=texts, marked=marked, on="page")
-
-
-def _defined(entries: Sequence[tuple[str, str]]) -> Items:
-    return Items(tuple(Markup("<b>{}:</b> {}").format(*entry) for entry in entries))
 
 
 def _known(content: ReportContent) -> Iterator[Section]:

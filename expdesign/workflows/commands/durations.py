@@ -13,19 +13,18 @@ from expdesign.dictionary.build import deviating
 from expdesign.durations import DurationProblem, build_fused, efficiencies, solve_durations
 from expdesign.errors import InputError, NotInformative
 from expdesign.export import durations_json
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
-from expdesign.workflows.outcome import Outcome, document_of, shared, workflow
+from expdesign.workflows.outcome import Outcome, shared, workflow
 from expdesign.workflows.steps.case import loaded, noted, written
-from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_summary, design_tables, designed
+from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_document, designed
 from expdesign.workflows.steps.scored import (
     actuation_remarks,
+    growth_document,
     growth_files,
-    growth_summary,
-    growth_tables,
     parameters_of,
     ranking,
     ready,
@@ -40,19 +39,18 @@ def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
     """Information of every primitive of a scenario's dictionary; `vessel` stands in for the vessel file it names."""
     case = loaded(request.scenario, progress, vessel=request.vessel)
     information = scored(case, progress=within(progress, 0.05, 0.95))
-    summary: dict[str, object] = {
+    table, strayed = ranking(case, information), deviating([item.primitive for item in information])
+    facts = {
         "primitives": len(information),
         "parameters": len(parameters_of(case)),
         "meet_excitation_condition": sum(item.excitation_condition for item in information),
         "informative_alone": sum(item.log_det_alone is not None for item in information),
-        "most_beside_the_others": ranking(case, information).rows[0][1],
-        "stray_from_their_wish": [item.name for item in deviating([item.primitive for item in information])],
+        "most_beside_the_others": table.rows[0][1],
+        **({"stray_from_their_wish": [item.name for item in strayed]} if strayed else {}),
     }
     told = actuation_remarks(case.vessel, [item.primitive.commands for item in information], "candidate")
     told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
-    if case.remarks or told:
-        summary["remarks"] = [*case.remarks, *told]
-    document = document_of(summary, (ranking(case, information),))
+    document = Document(facts=facts, findings=(*case.remarks, *told), sections=tabled(table))
     return written(request, case, score_files(case, information), noted(case, document), progress)
 
 
@@ -183,9 +181,8 @@ def durations(request: requests.Durations, *, progress: Progress = silent) -> Ou
         "durations.json": durations_json(design, compared=compared),
         **growth_files(case, growth),
     }
-    summary = {**growth_summary(growth, case), **design_summary(design)}
-    tables = (*growth_tables(growth), *design_tables(design, compared))
-    return written(request, case, files, noted(case, document_of(summary, tables)), progress)
+    document = growth_document(growth, case) + design_document(design, compared)
+    return written(request, case, files, noted(case, document), progress)
 
 
 def _from_covariances(request: requests.Durations, case: Scenario, progress: Progress) -> Outcome:
@@ -195,10 +192,7 @@ def _from_covariances(request: requests.Durations, case: Scenario, progress: Pro
     design = solve_durations(fused_problem(case, tried))
     compared = efficiencies(design)
     files = {"durations.json": durations_json(design, compared=compared), "covariances.json": covariances_json(tried)}
-    summary = {
-        "trials_of_each": trials,
-        "not_informative_on_their_own": [item.primitive.name for item in tried if not item.informative],
-        **design_summary(design),
-    }
-    document = document_of(summary, (covariance_table(tried), *design_tables(design, compared)))
+    alone = [item.primitive.name for item in tried if not item.informative]
+    facts = {"trials_of_each": trials, **({"not_informative_on_their_own": alone} if alone else {})}
+    document = Document(facts=facts, sections=tabled(covariance_table(tried))) + design_document(design, compared)
     return written(request, case, files, noted(case, document), progress)

@@ -24,7 +24,7 @@ from expdesign.durations import (
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
 from expdesign.export import durations_json
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import finite, record_csv, recorded_dictionary_json, subsets_json
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, by_label, recorded_information
@@ -35,7 +35,7 @@ from expdesign.rehearsal import Drawn, drawn_subsets, random_subsets, recorded_p
 from expdesign.requests import repeating
 from expdesign.signals import Batch, Record
 from expdesign.vessel import Vessel, VesselModel
-from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import data_files, doubted, equipped, measured, reduced_data
 
 OPTIMISED, RANDOM = "optimised", "random"
@@ -193,21 +193,7 @@ def labelled_files(found: Labelled, parameters: Sequence[str], outputs: Sequence
     }
 
 
-def labelled_summary(found: Labelled) -> Mapping[str, object]:
-    """Key numbers."""
-    design = found.design
-    return {
-        "labels": {item.name: found.labels.count(item.name) for item in found.dictionary},
-        "pieces_of_design": {name: n for name, n in zip(design.problem.names, design.repeats, strict=True) if n},
-        "log_det": design.log_det,
-        "log_det_guaranteed": finite(design.certificate.guaranteed),
-        "efficiency_of_whole_pieces": design.efficiency_repeats,
-        "median_simulation_error": {item.design: finite(float(np.median(item.norm))) for item in found.drawn},
-        "degenerate_models": {item.design: float(item.degenerate.mean()) for item in found.drawn},
-    }
-
-
-def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[Table, ...]:
+def labelled_document(found: Labelled, outputs: Sequence[str]) -> Document:
     """Labels with their shares, and simulation errors of the designs."""
     design = found.design
     order = np.argsort(-np.array(found.gains))
@@ -239,7 +225,20 @@ def labelled_tables(found: Labelled, outputs: Sequence[str]) -> tuple[Table, ...
             for item in found.drawn
         ),
     )
-    return shares, errors
+    return Document(
+        facts={
+            "log_det": design.log_det,
+            "log_det_guaranteed": finite(design.certificate.guaranteed),
+            "efficiency_of_whole_pieces": design.efficiency_repeats,
+        },
+        values={
+            "labels": {item.name: found.labels.count(item.name) for item in found.dictionary},
+            "pieces_of_design": {name: n for name, n in zip(design.problem.names, design.repeats, strict=True) if n},
+            "median_simulation_error": {item.design: finite(float(np.median(item.norm))) for item in found.drawn},
+            "degenerate_models": {item.design: float(item.degenerate.mean()) for item in found.drawn},
+        },
+        sections=tabled(shares, errors),
+    )
 
 
 def _quantiles(values: np.ndarray) -> str:
@@ -298,18 +297,16 @@ def _mined(request: requests.Mine, record: Record, ship: Vessel, progress: Progr
         "mining.json": json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
         "chosen.csv": record_csv(chosen),
     }
-    return finished(
-        request,
-        Path("runs") / request.data[0].stem,
-        files,
-        document_of(_summary(content), (_table(subset, batches),), record.notes),
-        progress,
-    )
+    document = _document(content, _table(subset, batches), record.notes)
+    return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
 SYMMETRIC = "symmetric part of the information"
 MAGNITUDE = "magnitude of the determinant: with this nominal model the symmetric part is not definite"
-MAY_FALL = "that of more batches may be less, and that of some more than 100 %: it is the magnitude of a determinant"
+MAY_FALL = (
+    "The information of more batches may be less, and that of some more than 100 %: it is the magnitude of a "
+    "determinant."
+)
 
 
 def _designed(
@@ -334,7 +331,7 @@ def _designed(
         progress=progress,
     )
     files = labelled_files(found, names, model.outputs, repeating(request))
-    document = document_of(labelled_summary(found), labelled_tables(found, model.outputs), record.notes)
+    document = replace(labelled_document(found, model.outputs), notes=record.notes)
     return finished(request, Path("runs") / request.data[0].stem, files, document, progress)
 
 
@@ -423,11 +420,12 @@ def _content(
     }
 
 
-def _summary(content: Mapping[str, object]) -> dict[str, object]:
-    shown = ("chosen", "efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
+def _document(content: Mapping[str, object], table: Table, notes: Sequence[str]) -> Document:
+    shown = ("efficiency", "efficiency_bound", "all_subsets_tried", "counts", "not_told_without_wind")
     # without a symmetric part that is definite, more data may hold less
-    note = {} if content["counts"] == SYMMETRIC else {"note_on_information": MAY_FALL}
-    return {**{name: content[name] for name in shown}, **note}
+    doubt = () if content["counts"] == SYMMETRIC else (MAY_FALL,)
+    facts = {name: content[name] for name in shown if content[name] != []}
+    return Document(facts=facts, values={"chosen": content["chosen"]}, sections=tabled(table), notes=(*doubt, *notes))
 
 
 def _table(subset: Subset, batches: Sequence[BatchInformation]) -> Table:

@@ -9,9 +9,10 @@ from typing import Any
 from expdesign import requests
 from expdesign.errors import InputError
 from expdesign.export import write_files
+from expdesign.export.document import Document
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_scenario
-from expdesign.workflows.outcome import Outcome, document_of, workflow
+from expdesign.workflows.outcome import Outcome, workflow
 
 TEMPLATES = files("expdesign") / "templates"
 KINDS = {
@@ -78,7 +79,7 @@ def new(request: requests.New, *, progress: Progress = silent) -> Outcome:
     load_scenario(request.folder / "scenario.toml")
     progress("done", 1.0)
     then = f"expdesign run {request.folder / 'scenario.toml'}"
-    return Outcome(files=paths, document=document_of({"kind": request.kind, "ship": ship, "then": then}))
+    return Outcome(files=paths, document=Document(facts={"kind": request.kind, "ship": ship, "then": then}))
 
 
 def _text(name: str) -> str:

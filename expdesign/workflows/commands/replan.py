@@ -16,7 +16,7 @@ from expdesign import requests
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
 from expdesign.export import vessel_toml
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import Known, replan_json
 from expdesign.export.report.tables import AT_REST, motion
 from expdesign.export.words import place
@@ -27,14 +27,14 @@ from expdesign.requests import repeating
 from expdesign.scenario import Scenario
 from expdesign.values import Array
 from expdesign.vessel import Vessel
-from expdesign.workflows.outcome import Outcome, document_of, finished, shared, workflow
+from expdesign.workflows.outcome import Outcome, finished, shared, workflow
 from expdesign.workflows.steps.case import drafted
-from expdesign.workflows.steps.day import compared_criteria, day_files, day_summary, day_tables, planned_day
+from expdesign.workflows.steps.day import compared_criteria, day_document, day_files, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.known import data_parts, expected_std, in_recorded_depth, plan_part, purchases
-from expdesign.workflows.steps.planned import built_route, plan_summary, report_content, trial_files
+from expdesign.workflows.steps.planned import built_route, plan_document, report_content, trial_files
 from expdesign.workflows.steps.present import PresentState, present_state, rest_of, weather_for_rest
-from expdesign.workflows.steps.scored import growth_summary, ready
+from expdesign.workflows.steps.scored import growth_document, ready
 
 VESSEL_FILE = "vessel-used.toml"
 
@@ -93,10 +93,8 @@ def _replanned(state: PresentState, request: requests.Replan, progress: Progress
                                                        f"Its model is {state.origin}."]),
         "replan.json": replan_json(known),
     }  # fmt: skip
-    facts = {**growth_summary(growth, case), **day_summary(day), **plan_summary(case, day.plan)}
-    summary = {"scenario": case.name, **_summary(known), **facts}
-    notes = (*_notes(known), *day.plan.area.notes)
-    document = document_of(summary, (_table(known), *day_tables(day)), notes)
+    document = _known_document(case.name, known) + growth_document(growth, case) + day_document(day)
+    document += plan_document(case, day.plan) + Document(notes=day.plan.area.notes)
     return finished(request, Path("runs") / case.name, files, document, progress)
 
 
@@ -156,9 +154,11 @@ def _stated(vessel: Vessel) -> dict[str, float]:
     return dict(zip(vessel.model.names, vessel.model.parameter_std.tolist(), strict=True))
 
 
-def _summary(known: Known) -> dict[str, object]:
+def _known_document(scenario: str, known: Known) -> Document:
+    """What the document says of the trial so far."""
     asked = math.isnan(known.remaining_s)
-    return {
+    facts = {
+        "scenario": scenario,
         "data_s": known.sailed_s,
         **({} if asked else {"remaining_s": known.remaining_s}),
         "model": known.model,
@@ -166,15 +166,10 @@ def _summary(known: Known) -> dict[str, object]:
         "current_to_north_mps": float(known.environment.current_to[0]),
         "current_to_east_mps": float(known.environment.current_to[1]),
         "start": f"{place(known.pose)}, {_motion(known)}",
-        "new_parameters": list(known.new),
-        "notes": list(_notes(known)),
+        **({"new_parameters": list(known.new)} if known.new else {}),
     }
-
-
-def _notes(known: Known) -> tuple[str, ...]:
-    of_total = not (math.isnan(known.remaining_s) or known.remaining_stated)
-    left = ("remaining_s is design.total_s less the time of the data",) if of_total else ()
-    return (*left, *known.notes)
+    left = () if asked or known.remaining_stated else ("remaining_s is design.total_s less the time of the data",)
+    return Document(facts=facts, sections=tabled(_table(known)), notes=(*left, *known.notes))
 
 
 def _motion(known: Known) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from expdesign import requests
 from expdesign.errors import FileError, InputError, NoAnswer, UnknownName
 from expdesign.export import Content, vessel_toml
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import finite, strict_json
 from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.loading import Inclining, heel_in_waves, inclining
@@ -36,7 +36,7 @@ from expdesign.roll.record import planned_everywhere, roll_run
 from expdesign.scenario import LoadCases, load_cases, load_vessel
 from expdesign.signals import Batch
 from expdesign.vessel import RollPendulum, Vessel
-from expdesign.workflows.outcome import Outcome, document_of, finished, workflow
+from expdesign.workflows.outcome import Outcome, finished, workflow
 from expdesign.workflows.steps.measured import equipped
 
 HEADER = ("mass [kg]", "shift [m]", "heel [deg]", "std of GM [m]", "std of GM [%]", "std of inertia [%]")
@@ -82,7 +82,7 @@ def incline(request: requests.Incline, *, progress: Progress = silent) -> Outcom
     files = {"incline.json": strict_json({**summary, "tests": rows, "remarks": list(told)})}
     table = [_row(pendulum, pair, one) for pair, one in zip(pairs, found, strict=True)]
     tests = Table(title="Inclining tests", header=HEADER, rows=tuple(table))
-    document = document_of({**summary, "remarks": told}, (tests,))
+    document = Document(facts=summary, findings=told, sections=tabled(tests))
     return finished(request, Path("runs") / f"{ship.name}-incline", files, document, progress)
 
 

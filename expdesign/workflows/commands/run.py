@@ -11,21 +11,21 @@ from expdesign.export.files import planned_accuracy
 from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_repeats
-from expdesign.workflows.outcome import Outcome, document_of, shared, workflow
+from expdesign.workflows.outcome import Outcome, shared, workflow
 from expdesign.workflows.steps.case import drafted, loaded, noted, written
-from expdesign.workflows.steps.day import Day, compared_criteria, day_files, day_summary, day_tables, planned_day
+from expdesign.workflows.steps.day import Day, compared_criteria, day_document, day_files, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import (
     built_route,
     check_no_trial,
     check_plannable,
+    plan_document,
     plan_files,
-    plan_summary,
     planned,
     report_content,
     trial_files,
 )
-from expdesign.workflows.steps.scored import growth_summary, ready
+from expdesign.workflows.steps.scored import growth_document, ready
 
 
 @workflow
@@ -59,7 +59,7 @@ def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome
         asked=case.design.accuracy,
     )
     files = {**plan_files(case, day.plan, accuracy), **day_files(case, day)}
-    document = document_of({**plan_summary(case, day.plan), **day_summary(day)}, day_tables(day))
+    document = plan_document(case, day.plan) + day_document(day)
     return written(request, case, files, noted(case, document), progress)
 
 
@@ -104,9 +104,5 @@ def _run(request: requests.Run, case: Scenario, progress: Progress) -> Outcome:
     content = report_content(case, day.information, day.design, day.plan, repeating(request))
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
-    summary = {
-        **growth_summary(growth, case),
-        **day_summary(day),
-        **plan_summary(case, day.plan),
-    }
-    return written(request, case, files, noted(case, document_of(summary, day_tables(day))), progress)
+    document = growth_document(growth, case) + day_document(day) + plan_document(case, day.plan)
+    return written(request, case, files, noted(case, document), progress)

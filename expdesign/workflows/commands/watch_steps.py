@@ -15,6 +15,7 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import FileError, NotInformative
 from expdesign.export import write_files
+from expdesign.export.document import Document, tabled
 from expdesign.export.document import Table as TextTable
 from expdesign.export.step_trial_page import (
     TO_DO_HEADER,
@@ -43,7 +44,7 @@ from expdesign.step_trials.live import (
     restored_state,
 )
 from expdesign.vessel import Actuator, Limit, column_name
-from expdesign.workflows.outcome import Outcome, Told, document_of, finished, silently, workflow
+from expdesign.workflows.outcome import Outcome, Told, finished, silently, workflow
 from expdesign.workflows.steps.measured import equipped
 from expdesign.workflows.steps.step_list import listed_steps
 
@@ -99,9 +100,7 @@ def watch_steps(request: requests.WatchSteps, *, tell: Told = silently, progress
     now = _through(now, request.data, work, tell, progress)
     _check_learnt(now.state, setup)
     content = _content(now, work)
-    return finished(
-        request, folder, _files(now, work), document_of(_summary(content), _tables(content), content.notes), progress
-    )
+    return finished(request, folder, _files(now, work), _document(content), progress)
 
 
 def _through(now: _Watch, data: Path, work: _Work, tell: Told, progress: Progress) -> _Watch:
@@ -263,20 +262,15 @@ def _resumed(path: Path, steps: StepList) -> _Watch:
         raise FileError(path, "", f"is no state of a watch by version {__version__}, expected one") from None
 
 
-def _summary(content: LiveContent) -> dict[str, object]:
-    state = content.state
-    return {
+def _document(content: LiveContent) -> Document:
+    state, found = content.state, live_sentences(content)
+    facts = {
         "steps": len(content.steps.steps),
         "steps_that_count": len(state.finished),
         "steps_to_do": [step.number for step in state.left],
         "steps_left_out": [step.number for step in state.left_out],
-        "remarks": [*live_sentences(content), *content.notes],
     }
-
-
-def _tables(content: LiveContent) -> tuple[TextTable, ...]:
-    found = tuple((text,) for text in live_sentences(content))
-    tables = [TextTable(title="The step trial so far", header=("finding",), rows=found)]
-    if content.state.left:
-        tables.append(TextTable(title="Still to be sailed", header=TO_DO_HEADER, rows=tuple(to_do_table(content))))
-    return tuple(tables)
+    to_do = TextTable(title="Still to be sailed", header=TO_DO_HEADER, rows=tuple(to_do_table(content)))
+    return Document(
+        findings=tuple(found), facts=facts, sections=tabled(*([to_do] if state.left else [])), notes=content.notes
+    )

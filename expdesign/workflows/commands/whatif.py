@@ -30,7 +30,7 @@ from expdesign.values import Array
 from expdesign.workflows.outcome import Outcome, finished, load_plans, shared, workflow
 from expdesign.workflows.steps.day import checked_day, planned_day, search_additions
 from expdesign.workflows.steps.design_problem import designed, duration_problem
-from expdesign.workflows.steps.planned import check_plannable, plan_summary
+from expdesign.workflows.steps.planned import check_plannable, plan_document
 from expdesign.workflows.steps.scored import ready, scored
 
 WHOLE_RUNS = "repeats"
@@ -139,8 +139,9 @@ def _computed(case: Scenario, changes: tuple[str, ...], with_plan: bool, seed: i
         track: Array | None = None
         if with_plan:
             day = planned_day(case, information, design, seed=seed, progress=planning)
-            information, design, plan = day.information, day.design, dict(plan_summary(case, day.plan))
-            length = day.plan.day
+            information, design, length = day.information, day.design, day.plan.day
+            told = plan_document(case, day.plan)
+            plan = {**told.facts, "remarks": list(told.findings), "notes": list(told.notes)}
             track = track_covariance(case.vessel, design, case.environment, day.plan.sailed)
             plan |= {"trial_s": length.planned_s, "day_s": length.planned_s}
             plan |= {"day_median_s": length.median_s, "day_95_s": length.most_s}

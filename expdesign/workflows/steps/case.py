@@ -15,7 +15,8 @@ from expdesign.export.document import Document
 from expdesign.progress import Progress
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario
-from expdesign.workflows.outcome import Outcome, document_of, finished, note_on_roll
+from expdesign.vessel import NOT_ACTING_BACK
+from expdesign.workflows.outcome import Outcome, finished
 from expdesign.workflows.steps.measured import measured
 
 DRAFT = ("refused.json", "refused.html")
@@ -36,17 +37,12 @@ def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) ->
 
 def noted(case: Scenario, document: Document) -> Document:
     """The document with what is to be heard about the scenario, its vessel, its chart and the data before the trial."""
-    roll = {} if "heel_max_deg" in document.summary else note_on_roll(case.vessel)
+    roll = () if case.vessel.pendulum is None or "heel_max_deg" in document.facts else (NOT_ACTING_BACK,)
     before = measured(case.design.prior_data, case.vessel).doubts if case.design.prior_data else ()
     remarks = tuple(text for text in case.remarks if text not in document.findings)
-    told = document_of(roll, notes=(*before, *case.area.notes, *remarks))
     name = {"scenario": case.name}
-    return replace(
-        document,
-        facts=document.facts if document.title else {**name, **document.facts},
-        values={**name, **document.values, **told.values},
-        notes=(*document.notes, *told.notes),
-    )
+    named = replace(document, facts=document.facts if document.title else {**name, **document.facts})
+    return named + Document(values=name, notes=(*roll, *before, *case.area.notes, *remarks))
 
 
 def written(
@@ -62,9 +58,9 @@ def written(
     usual = Path("runs") / case.name
     outcome = finished(request, usual, files, document, progress, page=page)
     if left := _undeleted(request.out or usual) if PLAN in files else ():
-        said = document_of({"note_on_earlier_draft": f"cannot be deleted, is of no use: {', '.join(left)}"})
-        document = replace(document, values={**document.values, **said.values}, notes=(*document.notes, *said.notes))
-    return replace(outcome, document=document)
+        note = f"The earlier draft cannot be deleted and is of no use: {', '.join(left)}."
+        return replace(outcome, document=outcome.document + Document(notes=(note,)))
+    return outcome
 
 
 def _undeleted(folder: Path) -> tuple[str, ...]:

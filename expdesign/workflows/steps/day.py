@@ -12,7 +12,7 @@ import numpy as np
 from expdesign.dictionary import PrimitiveSpec
 from expdesign.durations import DurationDesign, Efficiencies, efficiencies
 from expdesign.errors import InputError, NoAnswer, NoPlan
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import dictionary_files, finite
 from expdesign.growing import GrowSettings
 from expdesign.information import PrimitiveInformation
@@ -27,7 +27,7 @@ from expdesign.progress import Progress, in_phases, silent
 from expdesign.scenario import Scenario
 from expdesign.shortest_day import Accuracy, ShortestDay
 from expdesign.vessel import VesselModel
-from expdesign.workflows.steps.design_problem import design_summary, designed
+from expdesign.workflows.steps.design_problem import design_document, designed
 from expdesign.workflows.steps.first_trial import calibration, first_note, half_as_wide, is_wide, whole_trial
 from expdesign.workflows.steps.planned import plan_problem, planned
 from expdesign.workflows.steps.scored import STEM, scored
@@ -389,31 +389,13 @@ def compared_criteria(case: Scenario, design: DurationDesign) -> tuple[Efficienc
     return tuple(recalled(efficiencies, replace(design, repeats=()) if case.design.accuracy else design))
 
 
-def day_summary(day: Day) -> dict[str, object]:
-    """Key numbers of the durations and of the day."""
-    found, summary = day.shortest, design_summary(day.design)
-    summary = {**summary, "note_on_this_trial": day.note} if day.note else summary
+def day_document(day: Day) -> Document:
+    """What a document says of the durations and of the day: key numbers, and the days tried."""
+    found, durations = day.shortest, design_document(day.design)
+    if day.note:
+        durations += Document(notes=(f"This trial: {day.note}.",))
     if found is None:
-        return summary
-    return {
-        **{key: value for key, value in summary.items() if key != "efficiency_of_whole_runs"},
-        "day_s": found.plan.commands.duration_s,
-        "day_median_s": found.plan.day.median_s,
-        "day_95_s": found.plan.day.most_s,
-        "information_of_what_was_asked": found.information,
-        **{name: value for name, value in _bound(found).items() if name != "bound"},
-        **_information_bound(found),
-        "manoeuvres_added": len(day.added),
-        "days_tried": len(found.tried),
-        **({"note_on_draft": found.note} if found.plan.draft else {}),
-    }
-
-
-def day_tables(day: Day) -> tuple[Table, ...]:
-    """The days tried."""
-    found = day.shortest
-    if found is None:
-        return ()
+        return durations
     rows = tuple(
         (
             str(number),
@@ -426,4 +408,23 @@ def day_tables(day: Day) -> tuple[Table, ...]:
         for number, item in enumerate(found.tried, start=1)
     )
     header = ("day", "seconds", "with go-arounds", "of these in runs", "information of what is needed", "runs")
-    return (Table(title="Days planned in search of the shortest", header=header, rows=rows),)
+    own = Document(
+        facts={
+            "day_s": found.plan.commands.duration_s,
+            "day_median_s": found.plan.day.median_s,
+            "day_95_s": found.plan.day.most_s,
+            "information_of_what_was_asked": found.information,
+            **{name: value for name, value in _bound(found).items() if name != "bound"},
+            **_information_bound(found),
+            "manoeuvres_added": len(day.added),
+            "days_tried": len(found.tried),
+        },
+        sections=tabled(Table(title="Days planned in search of the shortest", header=header, rows=rows)),
+        notes=(f"Draft: {found.note}.",) if found.plan.draft else (),
+    )
+    facts = {name: value for name, value in durations.facts.items() if name not in OF_GIVEN_TIME}
+    return replace(durations, facts=facts) + own
+
+
+OF_GIVEN_TIME = ("runs", "efficiency_of_whole_runs")
+"""What is told of durations but not of a day, whose runs are others."""

@@ -21,7 +21,7 @@ from expdesign.durations import (
     solve_durations,
 )
 from expdesign.errors import FloorOutOfReach, InputError, NoAnswer, NotInformative
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.indices import outcome_gradients
 from expdesign.information import (
     MEAN_SUBTRACTIONS,
@@ -341,26 +341,29 @@ def _not_revealed(case: Scenario, error: FloorOutOfReach, primitives: Sequence[P
 # Durations for people: key numbers and tables.
 
 
-def design_summary(design: DurationDesign) -> dict[str, object]:
-    """Key numbers."""
+def design_document(design: DurationDesign, compared: Sequence[Efficiencies] | None = None) -> Document:
+    """What a document says of durations.
+
+    Args:
+        design: the durations.
+        compared: the design under every criterion, where tables are wanted: how long to run each primitive, every
+            design under every criterion, and how limits are kept.
+    """
     chosen = {name: count for name, count in zip(design.problem.names, design.repeats, strict=True) if count}
     certified = design.gap_relative if np.isfinite(design.gap_relative) else None
     guaranteed = design.certificate.guaranteed
-    return {
+    facts = {
         "criterion": design.problem.aim.criterion,
-        "runs": chosen,
+        **({"runs": chosen} if compared is None else {}),
         "certificate_gap": certified,
         **({} if np.isnan(guaranteed) else {"log_det": design.log_det, "log_det_guaranteed": guaranteed}),
         "efficiency_of_whole_runs": design.efficiency_repeats,
         "efficiency_of_equal_shares": design.efficiency_uniform,
-        **({"note_on_whole_runs": design.note} if design.note else {}),
         **{f"price_of_{kept.name}": kept.price for kept in limits_kept(design)},
     }
-
-
-def design_tables(design: DurationDesign, compared: Sequence[Efficiencies]) -> tuple[Table, ...]:
-    """How long to run each primitive, every design under every criterion, and how limits are kept."""
-    return (_shares_table(design), *_efficiency_tables(compared), *_limits_tables(design))
+    tables = () if compared is None else (_shares_table(design), *_efficiency_tables(compared), *_limits_tables(design))
+    notes = (f"Whole runs: {design.note}.",) if design.note else ()
+    return Document(facts=facts, values={"runs": chosen}, sections=tabled(*tables), notes=notes)
 
 
 def _shares_table(design: DurationDesign) -> Table:

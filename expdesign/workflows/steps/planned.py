@@ -24,6 +24,7 @@ from expdesign.export import (
     track_csv,
 )
 from expdesign.export.cards import cards_html
+from expdesign.export.document import Document
 from expdesign.export.files import PlannedAccuracy
 from expdesign.export.report import ReportContent, report_html
 from expdesign.growing import Growth
@@ -141,10 +142,9 @@ def leg_remarks(case: Scenario) -> tuple[str, ...]:
     return (note,) if note else ()
 
 
-def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
-    """Key numbers of a plan, units in the names."""
-    remarks = trial_remarks(case, plan)
-    return {
+def plan_document(case: Scenario, plan: Plan) -> Document:
+    """What a document says of a plan: key numbers, what its files state in vain, and doubts."""
+    facts = {
         **({"draft": True} if plan.draft else {}),
         "verified": plan.verified,
         **({} if plan.verified else {"verdict": plan.verdict}),
@@ -158,10 +158,10 @@ def plan_summary(case: Scenario, plan: Plan) -> dict[str, object]:
         "leave_water_probability": plan.leave_water_probability,
         **_risk_summary(plan.risk),
         "design_efficiency_realised": plan.design_efficiency_realised,
-        **({} if plan.area.depths else {"note_on_depths": UNKNOWN_DEPTH}),
-        **({"chart_remarks": list(plan.area.notes)} if plan.area.notes else {}),
-        **({"remarks": list(remarks)} if remarks else {}),
     }
+    broken_off = (f"Drawn trials: {plan.risk.note}.",) if plan.risk is not None and plan.risk.note else ()
+    depths = () if plan.area.depths else (UNKNOWN_DEPTH,)
+    return Document(facts=facts, findings=trial_remarks(case, plan), notes=(*broken_off, *depths))
 
 
 def _heel_summary(plan: Plan) -> dict[str, object]:
@@ -205,7 +205,6 @@ def _risk_summary(risk: RiskEstimate | None) -> dict[str, object]:
     return {
         "drawn_trials": risk.trials,
         "aborted_share": risk.aborted,
-        **({"note_on_broken_off": risk.note} if risk.note else {}),
         "extra_time_median_s": risk.extra_median_s,
         "extra_time_95_s": risk.extra_most_s,
     }

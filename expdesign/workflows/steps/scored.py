@@ -10,7 +10,7 @@ import numpy as np
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.durations import bordered, pool_gains
 from expdesign.export import dictionary_json
-from expdesign.export.document import Table
+from expdesign.export.document import Document, Table, tabled
 from expdesign.export.files import dictionary_files, growth_json
 from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
@@ -187,8 +187,8 @@ def growth_files(case: Scenario, growth: Growth | None) -> dict[str, str | bytes
     }
 
 
-def growth_note(case: Scenario) -> dict[str, object]:
-    """Settings of [design] that the search for additions ignores, if any."""
+def growth_notes(case: Scenario) -> tuple[str, ...]:
+    """What says which settings of [design] the search for additions ignores, if any."""
     settings = case.design
     limits = {
         f"criterion {settings.criterion}": settings.criterion != "D",
@@ -202,31 +202,17 @@ def growth_note(case: Scenario) -> dict[str, object]:
     }
     asked = [name for name, is_asked in limits.items() if is_asked]
     if not asked:
-        return {}
-    return {
-        "note_on_additions": "optimal for criterion D of the nominal model alone; only the durations account for "
-        f"{', '.join(asked)} of [design]"
-    }
-
-
-def growth_summary(growth: Growth | None, case: Scenario | None = None) -> dict[str, object]:
-    """Key numbers, and with the scenario the settings that the search ignored."""
-    if growth is None:
-        return {}
-    note = {} if case is None else growth_note(case)
-    return {
-        **note,
-        "manoeuvres_added": len(growth.rounds),
-        "efficiency_of_grown_dictionary": growth.rounds[-1].efficiency if growth.rounds else 1.0,
-        "candidates_looked_at": growth.evaluated,
-        "efficiency_at_least_among_candidates": growth.efficiency_left,
-    }
-
-
-def growth_tables(growth: Growth | None) -> tuple[Table, ...]:
-    """Gain of each addition."""
-    if growth is None:
         return ()
+    return (
+        "Manoeuvres were added for criterion D of the nominal model alone; only the durations account for "
+        f"{', '.join(asked)} of [design].",
+    )
+
+
+def growth_document(growth: Growth | None, case: Scenario) -> Document:
+    """What a document says of additions: their gains, and the settings that the search ignored."""
+    if growth is None:
+        return Document()
     rows = tuple(
         (
             str(number),
@@ -241,7 +227,16 @@ def growth_tables(growth: Growth | None) -> tuple[Table, ...]:
     )
     header = ("round", "added", "d before", "log det", "D-efficiency", "excites", "settings")
     title = f"Manoeuvres added; one improves the design if its d is above {growth.dimension}"
-    return (Table(title=title, header=header, rows=rows),) if rows else ()
+    return Document(
+        facts={
+            "manoeuvres_added": len(growth.rounds),
+            "efficiency_of_grown_dictionary": growth.rounds[-1].efficiency if growth.rounds else 1.0,
+            "candidates_looked_at": growth.evaluated,
+            "efficiency_at_least_among_candidates": growth.efficiency_left,
+        },
+        sections=tabled(Table(title=title, header=header, rows=rows)),
+        notes=growth_notes(case),
+    )
 
 
 def ready(
