@@ -15,8 +15,9 @@ from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.dictionary.build import family
 from expdesign.dictionary.spec import complete_settings
 from expdesign.durations import DurationDesign, build_durations, solve_durations
-from expdesign.export import PlannedTrack, commands_csv, plan_json, planned_track, track_csv
+from expdesign.export.files import commands_csv, plan_json, track_csv
 from expdesign.export.report import ReportContent
+from expdesign.export.routes import PlannedTrack, planned_track
 from expdesign.information import PrimitiveInformation, moments, regressor_rows, score_primitives
 from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.sea_area import LocalFrame, SeaArea, as_multipolygon

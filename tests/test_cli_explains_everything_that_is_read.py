@@ -19,7 +19,7 @@ from expdesign.dictionary import FAMILIES
 from expdesign.durations import CRITERIA
 from expdesign.errors import FileError, InputError
 from expdesign.estimation.methods import METHODS
-from expdesign.export import FORMATS
+from expdesign.export.formats import FORMATS
 from expdesign.indices import OUTCOMES
 from expdesign.plan.values import PlanSettings
 from expdesign.records import COLUMNS

@@ -10,7 +10,7 @@ import pytest
 
 import export_case
 from expdesign.cli import main
-from expdesign.export import FORMATS
+from expdesign.export.formats import FORMATS
 from expdesign.indices import standard_results
 from expdesign.simulation import Conduct, turning_circle, zigzag
 from measured_trials import TUG, TUG_TRUE, quiet, write_run

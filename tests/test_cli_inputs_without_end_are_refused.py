@@ -15,8 +15,10 @@ from lxml import etree
 import export_case as case
 from expdesign.cli import main
 from expdesign.errors import FileError, InputError
-from expdesign.export import build_bridge_route, find_format, write_files
+from expdesign.export.folder import write_files
+from expdesign.export.formats import find_format
 from expdesign.export.formats.check import check_rtz
+from expdesign.export.routes import build_bridge_route
 from expdesign.scenario import load_scenario
 from expdesign.workflows.steps.planned import MOST_RUNS, plan_problem
 from scenario_files import spoil, write_scenario

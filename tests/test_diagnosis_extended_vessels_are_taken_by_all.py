@@ -22,9 +22,9 @@ from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression.tables import model_for, with_depth
 from expdesign.estimation.replay.replay import Integration, simulate_batch
-from expdesign.export import vessel_toml
 from expdesign.export.diagnosis_page import diagnosis_document
 from expdesign.export.diagnosis_results import extended_vessel
+from expdesign.export.files import vessel_toml
 from expdesign.export.pages import document_html
 from expdesign.information import score_primitives
 from expdesign.scenario import load_vessel

@@ -15,7 +15,7 @@ from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.errors import FileError, UnknownName
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Response, Vessel
 from measured_trials import prompt

@@ -15,7 +15,7 @@ from expdesign.cli import main
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import drive_of
 from expdesign.estimation.replay import Stretches, compiled
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.reduction import TIMES, reduced
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands, Record

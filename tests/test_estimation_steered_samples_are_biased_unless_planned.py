@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from expdesign.errors import InputError, NotInformative
-from expdesign.estimation.feedback import feedback_in
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.regression import Regression
-from expdesign.estimation.values import Estimate
+from expdesign.estimation.values import Estimate, feedback_in
 from expdesign.signals import Record
 from expdesign.vessel import Term
 from steered_ship import TRUTH, legs_and_runs, sailed, surge_model

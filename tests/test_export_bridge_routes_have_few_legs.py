@@ -17,9 +17,9 @@ import export_case as case
 from expdesign import workflows
 from expdesign.conventions import METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError
-from expdesign.export import PlannedTrack, Route, Waypoint, build_bridge_route, build_route, find_format, route_files
+from expdesign.export.formats import find_format, route_files
 from expdesign.export.formats.check import check_rtz
-from expdesign.export.routes import read_plan
+from expdesign.export.routes import PlannedTrack, Route, Waypoint, build_bridge_route, build_route, read_plan
 from expdesign.export.routes.chords import WAYPOINT_SPACING, corridor, corridor_in_water, sides_needed
 from expdesign.plan.values import Leg
 from expdesign.signals import Commands, Trajectory

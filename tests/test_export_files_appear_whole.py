@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from expdesign.errors import FileError
-from expdesign.export import write_files
+from expdesign.export.folder import write_files
 
 FILES = {"a.txt": "alpha\n", "b.bin": b"\x00\xff", "c.txt": "\N{GREEK SMALL LETTER GAMMA}"}
 

@@ -20,10 +20,11 @@ from lxml import etree
 
 from expdesign import workflows
 from expdesign.dictionary import build_dictionary
-from expdesign.export import FORMATS, build_bridge_route, build_route, plan_json, planned_track, route_files, track_csv
+from expdesign.export.files import plan_json, track_csv
+from expdesign.export.formats import FORMATS, route_files
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.formats.missions import NAV_WAYPOINT
-from expdesign.export.routes import read_plan
+from expdesign.export.routes import build_bridge_route, build_route, planned_track, read_plan
 from expdesign.export.routes.chords import corridor, sides_needed
 from expdesign.plan.values import Leg, Plan, Verification
 from expdesign.scenario import Scenario, load_scenario

@@ -17,8 +17,9 @@ from shapely.geometry import shape
 import export_case as case
 from expdesign.conventions import KNOTS_PER_MPS, METRES_PER_NAUTICAL_MILE
 from expdesign.errors import InputError, UnknownName
-from expdesign.export import FORMATS, STANDARD, Route, build_route, find_format, route_files
+from expdesign.export.formats import FORMATS, STANDARD, find_format, route_files
 from expdesign.export.formats.geojson import cut_at_antimeridian
+from expdesign.export.routes import Route, build_route
 from sample_files import SAMPLES
 
 DEPARTURE = datetime(2027, 5, 1, 8, 0, tzinfo=UTC)

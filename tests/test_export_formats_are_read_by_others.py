@@ -14,9 +14,10 @@ from lxml import etree
 from shapely.geometry import LinearRing, shape
 
 import export_case as case
-from expdesign.export import FORMATS, Route, build_route, find_format
+from expdesign.export.formats import FORMATS, find_format
 from expdesign.export.formats.check import check_gpx, check_rtz
 from expdesign.export.formats.missions import DO_CHANGE_SPEED, NAV_WAYPOINT
+from expdesign.export.routes import Route, build_route
 from route_readers import PLAN_SCHEMA, READERS
 
 DEPARTURE = datetime(2027, 5, 1, 8, 0, tzinfo=UTC)

@@ -16,7 +16,7 @@ from lxml import html as lxml_html
 import export_case as case
 from expdesign import __version__
 from expdesign.durations import MEAN_SUBTRACTIONS, build_durations, solve_durations
-from expdesign.export import build_route, words
+from expdesign.export import words
 from expdesign.export.pages.figures import new_figure, report_style, round_ticks, svg
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
@@ -24,6 +24,7 @@ from expdesign.export.report.chart import chart, draw_position_ticks, footprints
 from expdesign.export.report.checks import least_charted_depth
 from expdesign.export.report.content import information_rate, primitive_runs, relative_information
 from expdesign.export.report.design import chain, parameter_rows
+from expdesign.export.routes import build_route
 from expdesign.growing.search import GrowRound, Growth
 from expdesign.information.expected import TrialPart, expected_covariance
 from expdesign.simulation import CALM

@@ -8,8 +8,7 @@ import pytest
 import expdesign
 from expdesign import cli
 from expdesign.errors import NotDrawn
-from expdesign.export import write_files
-from expdesign.export.folder import gaps
+from expdesign.export.folder import gaps, write_files
 from expdesign.export.pages.figures import page_figure
 from synthetic_ship import sail, trial, vessel_file, write
 

@@ -14,17 +14,9 @@ import pytest
 
 import export_case as case
 from expdesign.errors import FileError, NoPlan
-from expdesign.export import (
-    commands_csv,
-    dictionary_json,
-    durations_json,
-    plan_json,
-    planned_track,
-    track_csv,
-    write_files,
-)
-from expdesign.export.files import strict_json
-from expdesign.export.routes import read_plan
+from expdesign.export.files import commands_csv, dictionary_json, durations_json, plan_json, strict_json, track_csv
+from expdesign.export.folder import write_files
+from expdesign.export.routes import planned_track, read_plan
 from expdesign.simulation import simulate
 
 

@@ -12,8 +12,7 @@ import shapely
 
 import export_case as case
 from expdesign.errors import InputError, NoPlan
-from expdesign.export import PlannedTrack, Route, build_route
-from expdesign.export.routes import read_plan
+from expdesign.export.routes import PlannedTrack, Route, build_route, read_plan
 from expdesign.export.routes.route import build_fence, fence_polygon
 from expdesign.plan.values import Leg
 from expdesign.sea_area import LocalFrame

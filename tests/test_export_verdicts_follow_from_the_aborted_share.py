@@ -10,8 +10,9 @@ from lxml import html
 
 import export_case as case
 from expdesign.errors import FileError
-from expdesign.export import words, write_files
+from expdesign.export import words
 from expdesign.export.cards import cards_html
+from expdesign.export.folder import write_files
 from expdesign.export.report import page as report_page
 from expdesign.export.report import report_html
 from expdesign.export.routes import read_plan

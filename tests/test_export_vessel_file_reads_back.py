@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from expdesign.errors import FileError, InputError
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.vessel import Vessel
 from vessel_files import KVLCC2, write_vessel

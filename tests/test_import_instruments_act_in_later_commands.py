@@ -12,7 +12,7 @@ import pytest
 from expdesign.cli import main
 from expdesign.cli.commands import app
 from expdesign.errors import FileError
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.importing import Channel, sampled, sensor_keys
 from expdesign.importing.mapping import COG, SOG, Mapping
 from expdesign.scenario import equipped_vessel, load_vessel

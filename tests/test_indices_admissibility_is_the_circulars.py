@@ -7,7 +7,8 @@ import pytest
 
 import export_case as case
 from expdesign.errors import FileError, InputError
-from expdesign.export import plan_json, write_files
+from expdesign.export.files import plan_json
+from expdesign.export.folder import write_files
 from expdesign.export.report.checks import conditions
 from expdesign.export.routes import read_plan
 from expdesign.indices import BEAUFORT_MPS, Conditions, admissibility, beaufort

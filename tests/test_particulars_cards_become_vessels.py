@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.indices import standard_results
 from expdesign.particulars import FACTORS, SCATTER, Card, Hull, Rudder, Stated, Thruster, Trial, nominal
 from expdesign.particulars.fit import Problem, fitted

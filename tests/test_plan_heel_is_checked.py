@@ -9,7 +9,7 @@ import shapely
 
 from design_case import SCENARIOS
 from expdesign.errors import NoPlan
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.plan.values import Leg, SailedTrial
 from expdesign.plan.verify import verify_plan
 from expdesign.scenario import load_vessel

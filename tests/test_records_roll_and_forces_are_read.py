@@ -10,7 +10,7 @@ import pytest
 
 from design_case import SCENARIOS
 from expdesign.errors import FileError
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.export.files.text import record_csv
 from expdesign.records import load_records
 from expdesign.scenario import load_vessel

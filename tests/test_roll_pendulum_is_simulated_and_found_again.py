@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from design_case import SCENARIOS
 from diagnosis_case import vessel_of
 from expdesign.errors import FileError, InputError
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.roll import G_MPS2, PARAMETERS
 from expdesign.scenario import load_vessel
 from expdesign.signals import AUXILIARY, Commands

@@ -19,7 +19,7 @@ from expdesign.dictionary.trim import drift
 from expdesign.errors import InputError
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.replay.replay import Integration, simulate_batch
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.signals import Batch, Commands
 from expdesign.simulation import CALM, simulate, simulate_ensemble

@@ -9,8 +9,8 @@ import pytest
 
 import export_case as case
 from expdesign.cli import main
-from expdesign.export import plan_json, words
-from expdesign.export.files import planned_accuracy
+from expdesign.export import words
+from expdesign.export.files import plan_json, planned_accuracy
 from expdesign.export.result_page import CHANCE, Estimated, PlanResult, ResultContent, result_document, run_rows
 from expdesign.shortest_day import AccuracySettings
 from expdesign.vessel import Sensors

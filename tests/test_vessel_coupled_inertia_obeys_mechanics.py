@@ -15,7 +15,7 @@ from expdesign.diagnosis.motion.simulation import simulate_windows
 from expdesign.diagnosis.vessel_file.reading import extended_model
 from expdesign.errors import FileError, InputError
 from expdesign.estimation.methods import estimate
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.information import estimated_parameters
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands

@@ -56,3 +56,36 @@ def test_no_fast_craft_of_its_prior_runs_away() -> None:
         vessel, run, CALM, centres_m=np.zeros(1), confidence=0.999, rng=np.random.default_rng(3), draws=2000
     )
     assert np.isfinite(room_m).all()
+
+
+def test_a_covariance_given_to_a_model_is_its_prior_and_others_are_known() -> None:
+    model = replace(load_vessel(GUESS).model, parameter_range={})
+    rng = np.random.default_rng(44)
+    names = [model.names[place] for place in (3, 0, 2, 1)]
+    factor = rng.standard_normal((4, 4))
+    factor[2] = 0.0  # one of them is known
+    covariance = factor @ factor.T
+    prior = model.with_covariance(names, covariance)
+    places = [model.names.index(name) for name in names]
+    expected = np.zeros((len(model.names),) * 2)
+    expected[np.ix_(places, places)] = covariance
+    assert prior.parameter_covariance == pytest.approx(expected, abs=1e-12)
+    assert all(one != other and value for (one, other), value in prior.parameter_correlation.items())
+    assert len(prior.parameter_correlation) == 3  # each pair of the three uncertain ones once
+    drawn = prior.drawn_parameters(20_000, rng)
+    spread = np.cov(drawn.T)
+    errors = np.sqrt((np.outer(expected.diagonal(), expected.diagonal()) + expected**2) / len(drawn))
+    assert (np.abs(spread - expected) <= 4.5 * errors + 1e-20).all()
+
+
+@pytest.mark.parametrize("std", [0.06, 2.0])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_range_is_contradicted_three_standard_deviations_outside_of_it(std: float, side: int) -> None:
+    model = one_uncertain(std)
+    value, other = float(model.parameters[model.names.index("X_u")]), model.names[-1]
+    for deviations, contradicted in ((-10.0, False), (0.0, False), (2.99, False), (3.01, True)):
+        end = value + side * deviations * std
+        own = (end, end + 100.0) if side > 0 else (end - 100.0, end)
+        ranged = replace(model, parameter_range={"X_u": own, other: (-1e9, 1e9)})
+        assert ranged.contradicted_ranges == (("X_u",) if contradicted else ())
+        assert list(ranged.with_kept_ranges().parameter_range) == ([] if contradicted else ["X_u"]) + [other]

@@ -169,3 +169,16 @@ def test_structures_are_named_or_custom_never_both():
         with pytest.raises(InputError, match=says):
             structure_terms(structure, terms)
     assert isinstance(structured("surge", np.zeros(4), FORCES), VesselModel)
+
+
+def test_a_model_reads_the_air_and_the_depth_where_a_term_does():
+    for structure in STRUCTURES:
+        terms = structure_terms(structure)
+        model = structured(structure, np.ones(len(terms)), FORCES)
+        assert model.reads_air == any("_q" in term.expression for term in terms)
+        assert not model.reads_depth
+        assert model.read_signals() == {name for one in model.expressions for name in one.signals}
+    assert {structured(name, np.ones(len(structure_terms(name))), FORCES).reads_air for name in STRUCTURES} == {
+        True,
+        False,
+    }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from expdesign import workflows
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_vessel
 from expdesign.signals import Commands
 from expdesign.vessel import Response, Sensors, Vessel

@@ -13,7 +13,7 @@ from expdesign.durations import pool_gains
 from expdesign.estimation.instrumental import Settings
 from expdesign.estimation.methods import estimate
 from expdesign.estimation.solve import Weighting
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.information import regressor_rows
 from expdesign.information.recorded import by_label, recorded_information
 from expdesign.records import load_records, row_labels

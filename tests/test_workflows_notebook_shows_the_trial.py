@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import export_case as case
-from expdesign.export import build_route
+from expdesign.export.routes import build_route
 from expdesign.workflows import notebook
 from expdesign.workflows.notebook import Trial
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from expdesign.errors import InputError, UnknownName
 from expdesign.estimation.excitation import EQUATION_WISE, sample_notes, with_strata
-from expdesign.estimation.feedback import Feedback, feedback_in, feedback_notes
 from expdesign.estimation.instrumental import Settings, instrumental_estimate, least_squares, quick_least_squares
 from expdesign.estimation.output_error import Fitting, minimise_output_error
 from expdesign.estimation.regression import (
@@ -35,7 +34,7 @@ from expdesign.estimation.replay import (
     treatment_of,
 )
 from expdesign.estimation.solve import NullSpace, Refined, Solution
-from expdesign.estimation.values import Estimate, Residuals
+from expdesign.estimation.values import Estimate, Feedback, Residuals, feedback_in, feedback_notes
 from expdesign.progress import Progress, silent
 from expdesign.signals import Record
 from expdesign.vessel import NOT_SUPPORTED, VesselModel

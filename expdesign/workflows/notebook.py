@@ -9,9 +9,11 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.durations import DurationDesign, efficiencies
-from expdesign.export import STANDARD, Route, route_files, write_files
 from expdesign.export.cards import cards_html
+from expdesign.export.folder import write_files
+from expdesign.export.formats import STANDARD, route_files
 from expdesign.export.report import ReportContent, report_html
+from expdesign.export.routes import Route
 from expdesign.information import PrimitiveInformation
 from expdesign.plan.values import Plan
 from expdesign.progress import Progress, silent, within

@@ -12,8 +12,8 @@ from inspect import cleandoc
 from pathlib import Path
 
 from expdesign.errors import InputError
-from expdesign.export import Content, write_files
 from expdesign.export.document import Document
+from expdesign.export.folder import Content, write_files
 from expdesign.interruptions import interruptions_wait
 from expdesign.memory import remembering, user_memory
 from expdesign.processes import local_processes, on_cluster, processors

@@ -32,7 +32,7 @@ import published_models as published
 from expdesign.cli import main as expdesign
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.errors import InputError
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.particulars import Stated, nominal
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import Scenario, load_scenario, load_vessel

@@ -45,7 +45,7 @@ FILES = {
     ),
     "vessel/model": (
         "vessel_regressors_are_the_published_ones", "vessel_priors_keep_to_what_is_known",
-        "vessel_actuators_push_where_they_point",
+        "vessel_actuators_push_where_they_point", "vessel_coupled_inertia_obeys_mechanics",
     ),
     "monitoring/cusum": ("monitoring_alarms_are_rare_and_right",),
 }  # fmt: skip

@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from expdesign.cli import main
 from expdesign.dictionary import Primitive, build_dictionary
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import Scenario, load_dictionary, load_scenario, load_vessel
 from expdesign.simulation import Environment, Variation, draw_weather, measure, simulate
 from expdesign.vessel import Vessel, VesselModel

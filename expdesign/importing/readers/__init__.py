@@ -10,7 +10,7 @@ from pathlib import Path
 
 from expdesign.errors import FileError
 from expdesign.importing.channels import Log, Reader, TooManyNumbers, check_size
-from expdesign.importing.fills import cleaned
+from expdesign.importing.guess import cleaned
 from expdesign.importing.readers.autopilots import is_ardupilot, is_ros, read_ardupilot, read_px4, read_ros
 from expdesign.importing.readers.n2k import is_n2k, is_signalk, read_n2k, read_signalk
 from expdesign.importing.readers.sheets import read_excel, read_matlab, read_matlab73, read_parquet

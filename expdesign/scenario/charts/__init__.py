@@ -1,4 +1,4 @@
 """Area files and the charts that they name."""
 
 from expdesign.scenario.charts.area_file import load_area
-from expdesign.scenario.charts.area_tables import Latitude, Longitude
+from expdesign.scenario.charts.zones import Latitude, Longitude

@@ -8,12 +8,14 @@ import numpy as np
 import shapely
 
 from expdesign.errors import NoPlan
-from expdesign.scenario.charts.area_tables import AreaTable, BoundsTable, NoGoTable
 from expdesign.scenario.charts.geojson_zones import open_geojson
 from expdesign.scenario.charts.zones import (
     KM_PER_DEGREE,
     LARGEST_EXTENT_KM,
+    AreaTable,
+    BoundsTable,
     Box,
+    NoGoTable,
     OpenChart,
     beside,
     far_outside,

@@ -15,9 +15,17 @@ from typing import Any
 import numpy as np
 import shapely
 
-from expdesign.scenario.charts.area_tables import ChartTable
 from expdesign.scenario.charts.geojson import UNNAMED, Feature, continuous_line, feature_polygons, positions_of
-from expdesign.scenario.charts.zones import BUOYS, CLEARANCES, DANGERS, OVERHEAD, SOLID, UNSURVEYED, ChartedObject
+from expdesign.scenario.charts.zones import (
+    BUOYS,
+    CLEARANCES,
+    DANGERS,
+    OVERHEAD,
+    SOLID,
+    UNSURVEYED,
+    ChartedObject,
+    ChartTable,
+)
 from expdesign.scenario.tables import LARGEST, Entry
 
 CLASSES = (*SOLID, *BUOYS, *DANGERS, *OVERHEAD, UNSURVEYED)

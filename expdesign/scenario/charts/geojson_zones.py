@@ -16,12 +16,13 @@ import numpy as np
 import shapely
 
 from expdesign.errors import FileError, InputError, NoPlan
-from expdesign.scenario.charts.area_tables import AreaTable, ChartTable
 from expdesign.scenario.charts.geojson import UNNAMED, Chart, Feature, positions_in, read_features, read_layers
 from expdesign.scenario.charts.geojson_dangers import dangers, kind_of, not_used, taken_for
 from expdesign.scenario.charts.zones import (
+    AreaTable,
     Box,
     ChartedObject,
+    ChartTable,
     ChartZones,
     OpenChart,
     ShipRules,

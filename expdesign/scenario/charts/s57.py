@@ -22,7 +22,6 @@ from pyogrio.errors import DataSourceError
 
 from expdesign.errors import NoPlan
 from expdesign.input_files import check_ends
-from expdesign.scenario.charts.area_tables import AreaTable
 from expdesign.scenario.charts.zones import (
     BUOYS,
     CLEARANCES,
@@ -30,6 +29,7 @@ from expdesign.scenario.charts.zones import (
     OVERHEAD,
     SOLID,
     UNSURVEYED,
+    AreaTable,
     Box,
     ChartedObject,
     ChartZones,

@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from nicegui import events, ui
 
 from expdesign.errors import InputError
-from expdesign.scenario.charts.area_tables import AreaTable
+from expdesign.scenario.charts.zones import AreaTable
 from expdesign.scenario.scenario_file import ScenarioFile
 from expdesign.scenario.tables import Entry, check_table, read_toml
 from expdesign.web import answers

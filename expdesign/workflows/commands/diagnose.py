@@ -16,9 +16,9 @@ from expdesign.diagnosis import diagnose as diagnose_record
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError, NotInformative
 from expdesign.estimation.regression import model_for
-from expdesign.export import Content
 from expdesign.export.diagnosis_page import diagnosis_document
 from expdesign.export.diagnosis_results import diagnosis_json, extended_vessel
+from expdesign.export.folder import Content
 from expdesign.export.roll_changes import RollVerdict
 from expdesign.kinematics import in_stated_time
 from expdesign.progress import Estimated, Progress, silent

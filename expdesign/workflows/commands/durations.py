@@ -12,9 +12,8 @@ from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.dictionary.build import deviating
 from expdesign.durations import DurationProblem, build_fused, efficiencies, solve_durations
 from expdesign.errors import InputError, NotInformative
-from expdesign.export import durations_json
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import strict_json
+from expdesign.export.files import durations_json, strict_json
 from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario

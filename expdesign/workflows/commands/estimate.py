@@ -8,8 +8,9 @@ from expdesign import requests
 from expdesign.assessment import NO_TESTS, EstimateOptions, assess, settled, uses_measured_wind
 from expdesign.errors import InputError
 from expdesign.estimation.methods import methods_for
-from expdesign.export import Content, estimate_json, estimated_vessel
 from expdesign.export.estimate_page import EstimateContent, estimate_document
+from expdesign.export.files import estimate_json, estimated_vessel
+from expdesign.export.folder import Content
 from expdesign.progress import Progress, silent, within
 from expdesign.requests import repeating
 from expdesign.workflows.outcome import Outcome, finished, workers, workflow

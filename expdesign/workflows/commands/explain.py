@@ -80,7 +80,7 @@ def criteria_topic() -> Topic:
 
 def formats_topic() -> Topic:
     """Route formats."""
-    from expdesign.export import FORMATS
+    from expdesign.export.formats import FORMATS
 
     entries = tuple(Explained(name=item.name, meaning=f"{item.summary}; writes {item.file_name}") for item in FORMATS)
     return _list("formats", "Route formats of expdesign export", entries)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export import Content
+from expdesign.export.folder import Content
 from expdesign.export.foresight_page import (
     ForesightContent,
     OperationContent,

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export import Content, vessel_toml
+from expdesign.export.files import vessel_toml
+from expdesign.export.folder import Content
 from expdesign.export.step_trial_content import StepTrialContent, Validated, step_model_json
 from expdesign.export.step_trial_page import step_trial_document
 from expdesign.progress import Progress, silent, within

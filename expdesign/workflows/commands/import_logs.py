@@ -14,7 +14,7 @@ import numpy as np
 from expdesign import requests
 from expdesign.conventions import OUTPUTS, whole_turns
 from expdesign.errors import FileError, InputError
-from expdesign.export import Content, read_plan, write_files
+from expdesign.export.folder import Content, write_files
 from expdesign.export.import_page import (
     ImportContent,
     earlier_files,
@@ -24,6 +24,7 @@ from expdesign.export.import_page import (
     mapping_toml,
 )
 from expdesign.export.pages import document_html
+from expdesign.export.routes import read_plan
 from expdesign.importing import (
     COMPUTER,
     GNSS,

@@ -23,9 +23,8 @@ from expdesign.durations import (
 )
 from expdesign.errors import InputError, NotInformative
 from expdesign.estimation.methods import estimate
-from expdesign.export import durations_json
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import finite, record_csv, recorded_dictionary_json, subsets_json
+from expdesign.export.files import durations_json, finite, record_csv, recorded_dictionary_json, subsets_json
 from expdesign.information import estimated_parameters
 from expdesign.information.recorded import BatchInformation, by_label, recorded_information
 from expdesign.progress import Progress, silent, within

@@ -14,7 +14,7 @@ import numpy as np
 
 from expdesign import __version__, requests
 from expdesign.errors import FileError, InputError, NotInformative
-from expdesign.export import Content, write_files
+from expdesign.export.folder import Content, write_files
 from expdesign.export.monitor_content import Moment, MonitorContent, monitor_json
 from expdesign.export.monitor_page import budget_entries, monitor_document
 from expdesign.export.pages import document_html

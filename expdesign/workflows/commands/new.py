@@ -8,8 +8,8 @@ from typing import Any
 
 from expdesign import requests
 from expdesign.errors import InputError
-from expdesign.export import write_files
 from expdesign.export.document import Document
+from expdesign.export.folder import write_files
 from expdesign.progress import Progress, silent
 from expdesign.scenario import load_scenario
 from expdesign.workflows.outcome import Outcome, workflow

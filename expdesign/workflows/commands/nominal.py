@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from expdesign import requests
-from expdesign.export import Content
+from expdesign.export.folder import Content
 from expdesign.export.nominal_page import NominalContent, nominal_document, nominal_json, nominal_toml
 from expdesign.particulars import nominal as fitted
 from expdesign.progress import Progress, silent

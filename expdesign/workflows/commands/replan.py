@@ -15,9 +15,8 @@ import numpy as np
 from expdesign import requests
 from expdesign.durations import DurationDesign
 from expdesign.errors import NoAnswer
-from expdesign.export import vessel_toml
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import Known, replan_json
+from expdesign.export.files import Known, replan_json, vessel_toml
 from expdesign.export.report.tables import AT_REST, motion
 from expdesign.export.words import place
 from expdesign.information import PrimitiveInformation, estimated_parameters

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import FileError, InputError, NoAnswer, UnknownName
-from expdesign.export import Content, vessel_toml
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import finite, strict_json
+from expdesign.export.files import finite, strict_json, vessel_toml
+from expdesign.export.folder import Content
 from expdesign.export.roll_page import RollContent, roll_document, roll_json, roll_sentences
 from expdesign.loading import Inclining, heel_in_waves, inclining
 from expdesign.progress import Progress, silent

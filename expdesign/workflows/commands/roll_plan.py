@@ -10,7 +10,7 @@ from pathlib import Path
 from expdesign import requests
 from expdesign.durations import Aim, DurationDesign, with_repeats
 from expdesign.errors import FileError, NoAnswer, NoPlan, UnknownName
-from expdesign.export import Content, write_files
+from expdesign.export.folder import Content, write_files
 from expdesign.export.load_page import LoadContent, load_document, load_plan_json, loads_toml, repeats_json
 from expdesign.export.pages import document_html
 from expdesign.information import PrimitiveInformation

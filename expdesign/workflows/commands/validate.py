@@ -12,7 +12,8 @@ import numpy as np
 from expdesign import __version__, requests
 from expdesign.errors import InputError
 from expdesign.estimation.methods import method_named, steady_current_method
-from expdesign.export import Content, vessel_toml
+from expdesign.export.files import vessel_toml
+from expdesign.export.folder import Content
 from expdesign.export.validation_page import ValidationContent, validation_document, validation_json
 from expdesign.information import estimated_parameters
 from expdesign.progress import Progress, silent, within

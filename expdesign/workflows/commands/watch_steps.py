@@ -14,9 +14,9 @@ import numpy as np
 
 from expdesign import __version__, requests
 from expdesign.errors import FileError, NotInformative
-from expdesign.export import write_files
 from expdesign.export.document import Document, tabled
 from expdesign.export.document import Table as TextTable
+from expdesign.export.folder import write_files
 from expdesign.export.step_trial_page import (
     TO_DO_HEADER,
     LiveContent,

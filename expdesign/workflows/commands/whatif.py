@@ -15,7 +15,7 @@ from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign, efficiencies, optimal_shares
 from expdesign.durations.rounding import whole_runs
 from expdesign.errors import FileError, InputError, NoAnswer
-from expdesign.export import Content
+from expdesign.export.folder import Content
 from expdesign.export.whatif_content import Case, WhatIfContent, whatif_json
 from expdesign.export.whatif_page import whatif_document
 from expdesign.information import PrimitiveInformation, estimated_parameters

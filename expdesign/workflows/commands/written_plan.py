@@ -10,13 +10,14 @@ from pydantic import RootModel
 
 from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export import Content, build_bridge_route, build_route, find_format, route_files, write_files
 from expdesign.export.document import Document
 from expdesign.export.files import strict_json
 from expdesign.export.files.text import read_json
+from expdesign.export.folder import Content, write_files
+from expdesign.export.formats import find_format, route_files
 from expdesign.export.formats.check import check_route_file
 from expdesign.export.result_page import Estimated, Indices, PlanResult, ResultContent, result_document
-from expdesign.export.routes import ROUTE_NAME, read_plan
+from expdesign.export.routes import ROUTE_NAME, build_bridge_route, build_route, read_plan
 from expdesign.progress import Progress, silent
 from expdesign.workflows.outcome import Outcome, finished, workflow
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import FileError, NoPlan
-from expdesign.export import Content, write_files
 from expdesign.export.document import Document
+from expdesign.export.folder import Content, write_files
 from expdesign.progress import Progress
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_scenario

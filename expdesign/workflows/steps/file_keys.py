@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from expdesign.scenario.card_file import CardFile
-from expdesign.scenario.charts.area_tables import AreaTable
+from expdesign.scenario.charts.zones import AreaTable
 from expdesign.scenario.dictionaries import DictionaryTable, PrimitiveTable
 from expdesign.scenario.import_files import COLUMNS_BESIDE, InstrumentsFile, MappingFile
 from expdesign.scenario.loads_file import LoadsFile

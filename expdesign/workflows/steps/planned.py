@@ -11,22 +11,13 @@ import numpy as np
 from expdesign.dictionary import Primitive
 from expdesign.durations import DurationDesign
 from expdesign.errors import InputError, NoPlan
-from expdesign.export import (
-    STANDARD,
-    Content,
-    Route,
-    build_bridge_route,
-    commands_csv,
-    durations_json,
-    plan_json,
-    planned_track,
-    route_files,
-    track_csv,
-)
 from expdesign.export.cards import cards_html
 from expdesign.export.document import Document
-from expdesign.export.files import PlannedAccuracy
+from expdesign.export.files import PlannedAccuracy, commands_csv, durations_json, plan_json, track_csv
+from expdesign.export.folder import Content
+from expdesign.export.formats import STANDARD, route_files
 from expdesign.export.report import ReportContent, report_html
+from expdesign.export.routes import Route, build_bridge_route, planned_track
 from expdesign.growing import Growth
 from expdesign.information import PrimitiveInformation
 from expdesign.memory import recalled

@@ -9,9 +9,8 @@ import numpy as np
 
 from expdesign.dictionary import PrimitiveSpec, build_dictionary
 from expdesign.durations import bordered, pool_gains
-from expdesign.export import dictionary_json
 from expdesign.export.document import Document, Table, tabled
-from expdesign.export.files import dictionary_files, growth_json
+from expdesign.export.files import dictionary_files, dictionary_json, growth_json
 from expdesign.growing import GrowSettings, Growth, grow_dictionary
 from expdesign.information import PrimitiveInformation, estimated_parameters, score_primitives
 from expdesign.memory import recalled

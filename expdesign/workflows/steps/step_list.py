@@ -10,7 +10,7 @@ import numpy as np
 
 from expdesign.dictionary import build_dictionary
 from expdesign.errors import FileError, InputError
-from expdesign.export import read_plan
+from expdesign.export.routes import read_plan
 from expdesign.records import read_levels
 from expdesign.scenario import load_dictionary
 from expdesign.step_trials import Controls, levels_of

@@ -52,7 +52,7 @@ from adaptive import SCENARIOS
 from adaptive_monte_carlo import Segment, drawn, separate_runs, shared_out, voyages
 from design_value_page import DesignErrors, StudyTable, design_value_html
 from expdesign.dictionary import Primitive, PrimitiveSpec, build_dictionary, build_primitive
-from expdesign.export import write_files
+from expdesign.export.folder import write_files
 from expdesign.growing import optimum
 from expdesign.information import score_primitives
 from expdesign.processes import in_order

@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from expdesign.dictionary import build_dictionary
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from expdesign.scenario import load_dictionary, load_vessel
 from expdesign.simulation import Environment
 from expdesign.vessel import Sensors, Variation, Vessel, VesselModel, structure_terms

@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from expdesign.cli import main
-from expdesign.export import vessel_toml
+from expdesign.export.files import vessel_toml
 from real_data_cases import POND, vessel_of
 
 Row = dict[str, str]
