@@ -128,7 +128,7 @@ def test_a_route_of_very_many_waypoints_is_checked_in_linear_time() -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from expdesign.export import write_files
+from expdesign.export.folder import write_files
 count = 0
 real = Path.replace
 def replace(path, target):
