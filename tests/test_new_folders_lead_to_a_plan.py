@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from expdesign.cli import main
+from expdesign.errors import NoPlan
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.vessel import UNSTATED_SHARE
 from expdesign.workflows import new, scored
@@ -202,7 +203,7 @@ def test_drawn_ships_of_a_wide_prior_are_driven_and_steered_to_the_side_of_the_n
 
 
 def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A draft is never verified, so that ships which differ half as much would tell nothing."""
+    """A draft is never verified; what comes of ships that differ half as much is told where it is refused."""
     case = load_scenario(new(tmp_path / "trial", kind="asv").files[0])
     tried = []
 
@@ -210,6 +211,12 @@ def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeyp
         tried.append(first)
         plan = SimpleNamespace(verified=False, draft=case.plan.draft)
         return day.Day(information=(), design=None, plan=plan, note="a first trial")
+
+    def refused_once(first: Scenario, *_) -> day.Day:
+        if not tried:
+            tried.append(first)
+            raise NoPlan("no way")
+        return calibrated(first)
 
     monkeypatch.setattr(day, "whole_trial", lambda *_: None)
     monkeypatch.setattr(day, "plan_problem", lambda *_, **__: None)
@@ -221,6 +228,13 @@ def test_the_draft_of_a_first_trial_tries_no_other_prior(tmp_path: Path, monkeyp
         note = day.planned_day(case, (), None).note
         assert len(tried) == (1 if draft else 2)
         assert ("half the standard deviations" in note) is not draft
+        tried = []
+        monkeypatch.setattr(day, "_calibrated", refused_once)
+        with pytest.raises(
+            NoPlan, match=r"parameter_std\) a first trial is drafted" if draft else "do not help either"
+        ):
+            day.planned_day(case, (), None)
+        monkeypatch.setattr(day, "_calibrated", calibrated)
 
 
 def test_half_as_wide_a_prior_has_half_the_deviations_also_where_none_is_stated(tmp_path: Path) -> None:

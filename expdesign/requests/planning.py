@@ -26,16 +26,28 @@ from expdesign.requests.options import (
 
 
 class New(Request):
-    """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship.
+    """Make a folder to start from: scenario, vessel, dictionary and area of a kind of ship, or of the ship of a card.
+
+    With a card the vessel file is that of expdesign nominal, candidates and bay are scaled to her length and speed, and
+    the plan counts how well the card says that each parameter is known.
 
     Example: expdesign new mytrial --kind twin-screw
+    Example: expdesign new mytrial --card card.toml
     """
 
     folder: Annotated[Path, Argument(metavar="NAME", help="The folder to make; also the scenario's name.")]
     kind: Annotated[
-        Literal["azimuth", "propeller-rudder", "twin-screw", "asv"],
-        Option(metavar="K", help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv."),
-    ] = "azimuth"
+        Literal["azimuth", "propeller-rudder", "twin-screw", "asv"] | None,
+        Option(
+            metavar="K",
+            help="The kind of ship: azimuth, propeller-rudder, twin-screw or asv; what the card's thrusters are, or "
+            "azimuth, when not given.",
+        ),
+    ] = None
+    card: Annotated[
+        Path | None,
+        Option(metavar="CARD.toml", help="Particulars and trial values of the ship; see expdesign explain card."),
+    ] = None
 
 
 class Run(Request):

@@ -135,13 +135,14 @@ def _calibrated(case: Scenario, stated: VesselModel | None, seed: int, progress:
 
 
 def _with_narrower_prior(case: Scenario, stated: VesselModel | None, seed: int, progress: Progress) -> str:
-    """Whether a first trial of ships that differ half as much is verified, in words."""
+    """Whether a first trial of ships that differ half as much is verified, or drafted for a draft, in words."""
     try:
-        helps = _calibrated(half_as_wide(case), stated, seed, progress).plan.verified
+        plan = _calibrated(half_as_wide(case), stated, seed, progress).plan
     except NoAnswer:
-        helps = False
-    if helps:
-        return "with half the standard deviations of parameters (model.parameter_std) a first trial is verified"
+        plan = None
+    if plan is not None and (plan.verified or plan.draft):
+        how = "drafted" if plan.draft else "verified"
+        return f"with half the standard deviations of parameters (model.parameter_std) a first trial is {how}"
     return "half the standard deviations of parameters (model.parameter_std), tried as a remedy, do not help either"
 
 
