@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Protocol
 
@@ -20,6 +20,7 @@ COARSE = 1e-2  # acceleration that commands may miss, in those of full thrust: t
 HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not taken to have less effect
 HELM_TILT_RAD = 0.1  # to both sides, by which the effect of thrust that is turned is measured
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
+HOVER_SHARE = 0.3  # of the transit speed, up to which thrusters take over from the helm where a ship is to stop
 KICK_RAD = 0.1  # heading error from which, or from as much yaw rate and sway, steering comes before speed
 
 
@@ -35,6 +36,10 @@ class Demand:
     unexplained: Array  # (n, 3) acceleration that the nominal model does not explain
     near: Array  # (n, m) commands to whose angles azimuths keep
     standing: Array  # (n, m) commands that stand
+
+    def part(self, ships: np.ndarray) -> Demand:
+        """The demand of some ships (k,)."""
+        return Demand(**{item.name: getattr(self, item.name)[ships] for item in fields(self)})
 
 
 class Controller(Protocol):
@@ -254,3 +259,31 @@ class HelmController:
         rows = sorted([(turn.yaw_rate_radps, turn.sway_mps, turn.helm_rad) for turn in self.turns] + [(0.0, 0.0, 0.0)])
         rates, sways, angles = np.array(rows).T
         return rates, sways, angles
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HoverController:
+    """A helm under way; at rest, thrusters that hold place and heading.
+
+    So a ship that stops beside a place, or off its heading, comes there on the spot instead of by another approach.
+    """
+
+    helm: HelmController
+    hover: ForceController
+
+    @property
+    def answer_s(self) -> float:
+        """That of the helm [s]."""
+        return self.helm.answer_s
+
+    def commands(self, demand: Demand) -> Array:
+        """(n, m) desired actuator values: by thrusters for ships whose reference is slow, so that they stop first."""
+        speed = np.hypot(demand.reference_through[:, 0], demand.reference_through[:, 1])
+        slow = speed <= HOVER_SHARE * self.helm.transit_speed_mps
+        if not slow.any():
+            return self.helm.commands(demand)
+        rows = np.empty_like(demand.standing)
+        for ships, controller in ((np.flatnonzero(slow), self.hover), (np.flatnonzero(~slow), self.helm)):
+            if len(ships):
+                rows[ships] = controller.commands(demand.part(ships))
+        return rows

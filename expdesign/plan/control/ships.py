@@ -14,7 +14,7 @@ import numpy as np
 from expdesign.conventions import wrap_angle
 from expdesign.dictionary.trim import drift, trim
 from expdesign.errors import NoPlan
-from expdesign.plan.control.controllers import Controller, ForceController, HelmController
+from expdesign.plan.control.controllers import Controller, ForceController, HelmController, HoverController
 from expdesign.plan.control.helm_capability import (
     LATERAL_MPS2,
     SteadyTurn,
@@ -73,6 +73,11 @@ class Capability(ABC):
     @abstractmethod
     def keeps_station(self) -> bool:
         """Whether the ship can stop, wait and turn on the spot, and need not point where it goes."""
+
+    @property
+    def hovers(self) -> bool:
+        """Whether thrusters hold the ship's place and heading at rest, however it is steered under way."""
+        return self.keeps_station
 
     @abstractmethod
     def run_up_s(self, vessel: Vessel, speed_mps: float) -> float:
@@ -171,21 +176,31 @@ class HelmShip(Capability):
     turns: tuple[SteadyTurn, ...]  # steady turns with the engines at that order
     stopping_m: float  # distance in which the ship stops from there with the engines full astern
     run_up_m: float  # straight before each run: room to settle, and a steady approach
+    thrusters: bool = False  # whether they turn and push her in every direction at rest
 
     @property
     def keeps_station(self) -> bool:
         """No: the rudder needs flow."""
         return False
 
+    @property
+    def hovers(self) -> bool:
+        """By her thrusters."""
+        return self.thrusters
+
     def path_spares_m(self, vessel: Vessel) -> tuple[float, ...]:
         """What keeps the hull clear on arcs."""
         return (arc_spare_m(self, vessel),)
 
     def controller(self, vessel: Vessel) -> Controller:
-        """Courses by the helm, speeds by the engines."""
-        return HelmController(
+        """Courses by the helm, speeds by the engines, places at rest by thrusters that can."""
+        helm = HelmController(
             vessel=vessel, approach=self.approach, turns=self.turns, transit_speed_mps=self.transit_speed_mps
         )
+        if not self.thrusters:
+            return helm
+        hover = ForceController(vessel=vessel, answer_s=helm.answer_s, turn_rate_radps=self.turn_rate_radps)
+        return HoverController(helm=helm, hover=hover)
 
     def run_up_s(self, vessel: Vessel, speed_mps: float) -> float:
         """Some hull lengths."""
@@ -250,8 +265,8 @@ def capability(vessel: Vessel, settings: PlanSettings, *, current_mps: float = 0
             f"needs {transit / yaw:.4g} m or more" + (f"; no helm for legs was found ({no_helm})" if no_helm else ""),
             what="radius",
         )
-    spot = _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit / vessel.length_m) or 0.0
-    agile = pushed_everywhere(vessel.model) and spot > transit / vessel.length_m / 10
+    spot = _spot_rate_radps(vessel, transit)
+    agile = pushed_everywhere(vessel.model) and _turns_on_the_spot(vessel, transit, spot)
     radius = settings.turning_radius_m or max(transit / (USABLE_SHARE * yaw), 1.5 * vessel.length_m)
     rate = min(USABLE_SHARE * yaw, 2.0 * transit / radius)
     turns = "on the spot and sideways" if agile else f"in arcs of {radius:.3g} m"
@@ -327,7 +342,18 @@ def _helm_ship(vessel: Vessel, settings: PlanSettings, current_mps: float) -> He
         turns=turns,
         stopping_m=stopping_distance_m(vessel, transit),
         run_up_m=(SETTLING_HULLS + APPROACH_HULLS) * vessel.length_m,
+        thrusters=not needs_helm(vessel) and _turns_on_the_spot(vessel, transit, _spot_rate_radps(vessel, transit)),
     )
+
+
+def _spot_rate_radps(vessel: Vessel, transit_mps: float) -> float:
+    """Largest steady yaw rate on the spot; 0 where there is none."""
+    return _largest(lambda r: _holds(vessel, (0.0, 0.0, r)), start=1e-4 * transit_mps / vessel.length_m) or 0.0
+
+
+def _turns_on_the_spot(vessel: Vessel, transit_mps: float, spot_radps: float) -> bool:
+    """Whether a yaw rate on the spot is not small beside that of a hull length at transit speed."""
+    return spot_radps > transit_mps / vessel.length_m / 10
 
 
 def _holds(vessel: Vessel, velocity: tuple[float, float, float]) -> bool:

@@ -11,7 +11,13 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
-from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, planned_stretch, run_up, under_way
+from expdesign.plan.monte_carlo.procedure import (
+    ABORT_CAUSES,
+    Tolerances,
+    at_rest,
+    planned_stretch,
+    run_up,
+)
 from expdesign.plan.monte_carlo.return_paths import (
     GoAroundPaths,
     PathFollowers,
@@ -91,7 +97,7 @@ class Guidance:
         self._helm, self._water, self._inputs, self._last = helm, water, inputs, last
         self._arrived_m = water.start_tolerance * ARRIVED_HULLS * helm.vessel.length_m
         self._free = np.array(helm.vessel.turns_freely, dtype=float)
-        self._desired, self._moves, self._within = track[-1], under_way(helm, track[-1]), within
+        self._desired, self._moves, self._within = track[-1], not at_rest(helm, track[-1]), within
         self._reference = Reference(states=np.concatenate([planned.states, runs_up.states]))
         self._first, self._arrival = len(planned.states), len(planned.states) + runs_up.arrival
         length_m = float(np.hypot(*(runs_up.states[0] - track[-1])[:2]))
@@ -170,7 +176,7 @@ class Guidance:
 
     def _passed(self, ships: np.ndarray, states: Array, on: np.ndarray) -> np.ndarray:
         """(k,) whether ships on a reference are as near to the start as this time; those in tolerance begin."""
-        if self._steadies and not self._moves:
+        if self._stops:
             passed = on & self._stopping(ships)
         else:
             early = 1.0 if self._moves and not self._last else 0.0
@@ -196,8 +202,11 @@ class Guidance:
         if self._last:
             there = self._at_goal(states)
             return there | waited | (not self._helm.ship.keeps_station), there
-        if not self._moves:  # a ship that keeps no station begins while she may: at rest she cannot turn to the heading
-            return (used <= (1.0 if self._steadies else STANDSTILL_SHARE)) | ((used <= 1.0) & waited), used <= 1.0
+        if self._stops:  # she begins while she may: at rest she cannot turn to the heading, nor come nearer
+            stopped = at_rest(self._helm, states) & (self._ahead_m(ships, states) <= 0.0)
+            return (used <= 1.0) | (stopped & (self._at[ships] >= self._end[ships])), used <= 1.0
+        if not self._moves:
+            return (used <= STANDSTILL_SHARE) | ((used <= 1.0) & waited), used <= 1.0
         gone_by = (self._at[ships] >= self._most[ships]) | (shares[:, 0] > 1.0)
         return (used <= 1.0) | gone_by, used <= 1.0
 
@@ -251,8 +260,9 @@ class Guidance:
         some = np.flatnonzero(off)
         if len(some):
             clear = self._tree.hold(*self._returns_to_leg(some, states[some, :2]))
-            off[some] = ~clear | ((off_m[some] > good_m) & (not self._last))
-            self._go_around(ships[off], states[off])
+            late = clear & (off_m[some] > good_m) & (not self._last)
+            self._go_around(some[~clear], states[some[~clear]])
+            self._go_around(some[late], states[some[late]], otherwise=TRACKING)
 
     def _straight_to_goal(self, ships: np.ndarray, states: Array) -> None:
         """Ships (k,) with a straight way to the goal in safe water take it: its place alone counts, not the heading.
@@ -284,14 +294,16 @@ class Guidance:
         which, samples = np.nonzero(np.arange(len(thinned)) <= (left > 0.0).sum(axis=1)[:, None])
         return points[which, samples], which
 
-    def _go_around(self, ships: np.ndarray, states: Array) -> None:
-        """Start ships (k,) on return paths to the run-up; those without a path, or go-arounds left, abort."""
-        self.doing[ships] = ABORTED
+    def _go_around(self, ships: np.ndarray, states: Array, *, otherwise: int = ABORTED) -> None:
+        """Start ships (k,) on return paths to the run-up; what those without a path, or go-arounds left, do otherwise.
+
+        A ship that is only too far off may still come near enough by the leg, or find a path at its end.
+        """
+        self.doing[ships] = otherwise
         again = self.go_arounds[ships] < GO_AROUNDS
         ships, states = ships[again], states[again]
         if not len(ships):
             return
-        self.go_arounds[ships] += 1
         sideways = self._helm.ship.keeps_station
         paths = self._tree.find(states[:, :2]) if sideways else [self._round(pose) for pose in states[:, :3]]
         for ship, path in zip(ships.tolist(), paths, strict=True):
@@ -299,8 +311,9 @@ class Guidance:
                 self._abort_cause[ship] = ABORT_CAUSES.index("no go-around path")
             else:
                 self.doing[ship] = RETURNING
+                self.go_arounds[ship] += 1
                 self._followers.start(ship, path)
-        self._await(ships)
+        self._await(ships[self.doing[ships] == RETURNING])
 
     def _round(self, pose: Array) -> Array | None:
         """A path of arcs (k, 2) from a pose (3,) to the run-up, off the shore where there is room; None for none."""
@@ -367,25 +380,31 @@ class Guidance:
         now = self._reference.at(at)
         now[:, :2] += shift
         now[:, 3:] = self._reference.velocity_at(soon)  # velocities respond with a lag: they are demanded ahead of time
-        if self._steadies:
-            now[:, :2] = np.where(self._steadying(ships, beside)[:, None], states[:, :2], now[:, :2])
+        if self._stops:
+            some = self._stopping(ships)
+            course = now[:, 2]
+            ahead = np.stack([np.cos(course), np.sin(course)], axis=1) * self._ahead_m(ships, states)[:, None]
+            now[:, :2] = np.where(some[:, None], states[:, :2] + ahead, now[:, :2])
+        elif self._steadies:
+            now[:, :2] = np.where(self._steadying(ships)[:, None], states[:, :2], now[:, :2])
         return now
 
     @property
     def _steadies(self) -> bool:
         """Whether ships keep their heading near the start and drift with an unknown current there."""
-        return not self._last and not self._helm.ship.keeps_station
+        return self._moves and not self._last and not self._helm.ship.keeps_station
 
-    def _steadying(self, ships: np.ndarray, states: Array) -> np.ndarray:
-        """(k,) whether ships (k,) at states (k, 6) are so near that they begin on the planned heading.
+    @property
+    def _stops(self) -> bool:
+        """Whether ships stop straight ahead to begin at rest.
 
-        Where a run begins at a standstill they stop there: a ship that cannot turn on the spot would circle round a
-        place that she has missed by a little.
+        A ship that cannot turn on the spot would circle round a place that she has missed by a little.
         """
+        return not self._moves and not self._last and not self._helm.ship.hovers
+
+    def _steadying(self, ships: np.ndarray) -> np.ndarray:
+        """(k,) whether ships (k,) are so near a start under way that they keep the planned heading."""
         helm = self._helm
-        if not self._moves:
-            off_m = lengths(states[:, :2] - self._reference.at(self._at[ships])[:, :2])
-            return np.asarray(self._stopping(ships) & (off_m <= self._within.position_m))
         sample_m = float(np.hypot(*self._desired[3:5])) * helm.vessel.sample_time_s
         least_m, most_m = STEADY_HULLS * helm.vessel.length_m, STEADY_ROOM * self._within.position_m
         near = np.clip(most_m, least_m, self._water.start_tolerance * least_m) / sample_m
@@ -395,6 +414,16 @@ class Guidance:
         """(k,) whether ships (k,) are about to stop at the start, by their reference."""
         left_m = lengths(self._reference.at(self._at[ships])[:, :2] - self._desired[:2])
         return np.asarray(left_m <= STEADY_HULLS * self._helm.vessel.length_m)
+
+    def _ahead_m(self, ships: np.ndarray, states: Array) -> Array:
+        """(k,) how far the reference is ahead of ships (k,) at states (k, 6) that are not yet within its tolerance [m].
+
+        Along the heading; nothing where it is astern.
+        """
+        reference = self._reference.at(self._at[ships])
+        off = reference[:, :2] - states[:, :2]
+        ahead = off[:, 0] * np.cos(reference[:, 2]) + off[:, 1] * np.sin(reference[:, 2])
+        return np.asarray(np.where(lengths(off) <= self._within.position_m, 0.0, np.maximum(ahead, 0.0)))
 
     @property
     def _least_step_m(self) -> float:

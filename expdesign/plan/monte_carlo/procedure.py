@@ -133,7 +133,7 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     that begins at rest needs none if the ship keeps station: it stops on the spot.
     """
     desired, sample_s = leg[-1], helm.vessel.sample_time_s
-    moves = under_way(helm, desired)
+    moves = not at_rest(helm, desired)
     if not moves and helm.ship.keeps_station:
         return Stretch(states=np.stack([desired, desired]), arrival=1)
     samples = helm.ship.run_up_s(helm.vessel, float(np.hypot(*desired[3:5]))) / sample_s
@@ -148,10 +148,11 @@ def run_up(helm: Helmsman, water: LegWater, leg: Array, after_m: float) -> Stret
     return Stretch(states=np.concatenate([before, desired[None], more]), arrival=len(before))
 
 
-def under_way(helm: Helmsman, state: Array) -> bool:
-    """Whether a ship at a state (6,) moves over ground."""
-    ship, rest = helm.ship, REST_SHARE
-    return bool(np.hypot(*state[3:5]) > rest * ship.transit_speed_mps or abs(state[5]) > rest * ship.turn_rate_radps)
+def at_rest(helm: Helmsman, states: Array) -> np.ndarray:
+    """(...,) whether ships at states (..., 6) hardly move over ground."""
+    ship, speed_mps = helm.ship, np.hypot(states[..., 3], states[..., 4])
+    still = speed_mps <= REST_SHARE * ship.transit_speed_mps
+    return np.asarray(still & (np.abs(states[..., 5]) <= REST_SHARE * ship.turn_rate_radps))
 
 
 def steady_states(helm: Helmsman, state: Array, samples: np.ndarray) -> Array:
@@ -188,7 +189,7 @@ def slowing(helm: Helmsman, desired: Array, count: int) -> Array:
 
 def _after(helm: Helmsman, state: Array, after_m: float) -> int:
     """Samples in which a ship under way goes some metres, at most a run-up; none for one that stands still."""
-    if not under_way(helm, state):
+    if at_rest(helm, state):
         return 0
     speed, sample_s = float(np.hypot(*state[3:5])) + 1e-9, helm.vessel.sample_time_s
     longest_s = RUN_UP_TIME_CONSTANTS * TRACK_LEAD * helm.answer_s
