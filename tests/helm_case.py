@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -65,3 +66,9 @@ def catamaran() -> Vessel:
         actuators=actuators,
     )
     return Vessel(name="catamaran", length_m=2.0, beam_m=1.1, draught_m=0.2, sample_time_s=0.2, model=model)
+
+
+@cache
+def offshore_vessel() -> Vessel:
+    """45 m, two azimuths astern and a bow tunnel: steered by a helm under way, by thrusters at rest."""
+    return load_vessel(Path(__file__).parent / "data" / "vessels" / "offshore-45m.toml")

@@ -12,12 +12,14 @@ from expdesign.plan.chart.clearance_grid import clearance_field
 from expdesign.plan.chart.visibility_graph import polyline_length
 from expdesign.plan.control import Helmsman
 from expdesign.plan.legs._ompl import dubins_curve
-from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Guidance
+from expdesign.plan.monte_carlo import guidance as guiding
+from expdesign.plan.monte_carlo.guidance import GO_AROUND_ROOM, Approach, Guidance
 from expdesign.plan.monte_carlo.procedure import slowing, tolerances
 from expdesign.plan.monte_carlo.return_paths import GoAroundPaths, PathFollowers
 from expdesign.plan.runs import Fleet, Truths
 from expdesign.simulation import CALM
-from helm_case import coaster, open_water
+from expdesign.vessel import Vessel
+from helm_case import coaster, offshore_vessel, open_water
 from plan_case import area
 
 RADIUS, SPACING = 40.0, 5.0
@@ -138,27 +140,79 @@ def test_go_arounds_keep_off_the_shore_where_there_is_room(room, turns_north):
     assert path[:, 0].min() >= shore + water.leg_margin_m + GO_AROUND_ROOM * radius - 1.0
 
 
-def test_a_ship_that_comes_near_enough_to_a_standing_start_stops_there_instead_of_circling_round_it():
-    vessel, water, count = coaster(), open_water(coaster()), 24
+def stopped(vessel: Vessel, offset: tuple[float, float], *, spare_m: float, heading_rad: float = 0.0) -> Approach:
+    """24 drawn ships on a leg to a standing start, some hull lengths north and east of where it begins."""
+    water, count = open_water(vessel), 24
     ship, rng, length = water.ship, np.random.default_rng(5), vessel.length_m
     helm = Helmsman(vessel=vessel, environment=CALM, ship=ship)
-    desired = np.zeros(6)
-    leg = np.vstack([slowing(helm, desired, 600), desired])
-    within = tolerances(water, spare_m=4.0 * length)
+    most_s = 40.0 * length / ship.transit_speed_mps
+    leg = np.vstack([slowing(helm, np.zeros(6), round(most_s / vessel.sample_time_s)), np.zeros(6)])
     drawn = vessel.model.parameters * (1.0 + 0.1 * rng.uniform(-1, 1, (count, len(vessel.model.parameters))))
     current = rng.normal(0.0, 0.1, (count, 2))
     truths = Truths(parameters=drawn, current_to=current, wind_to=np.zeros((count, 2)))
-    fleet = Fleet(vessel, CALM, truths, state=leg[0], standing=ship.approach.inputs, rng=rng)
+    state = leg[0] + np.array([offset[0] * length, offset[1] * length, heading_rad, 0.0, 0.0, 0.0])
+    fleet = Fleet(vessel, CALM, truths, state=state, standing=ship.approach.inputs, rng=rng)
     guidance = Guidance(
         helm,
         water,
         leg,
-        within=within,
+        within=tolerances(water, spare_m=spare_m),
         sailing=np.ones(count, bool),
         inputs=np.zeros(len(vessel.limits)),
         last=False,
     )
-    found = guidance.sail(fleet, np.zeros((count, 3)))
+    return guidance.sail(fleet, np.zeros((count, 3)))
+
+
+def test_a_ship_that_comes_near_enough_to_a_standing_start_stops_there_instead_of_circling_round_it():
+    found = stopped(coaster(), (0.0, 0.0), spare_m=4.0 * coaster().length_m)
     assert found.begun.all()
     assert not found.go_arounds.any()
     assert np.abs(found.poses[..., 2]).max() < 1.0
+
+
+def test_a_ship_that_misses_a_standing_start_stops_beside_it_and_is_then_said_to_go_around(monkeypatch):
+    """She neither comes nearer at rest, nor circles round the place until her time is over."""
+    monkeypatch.setattr(guiding, "GO_AROUNDS", 0)
+    found = stopped(coaster(), (0.0, 1.5), spare_m=0.0)
+    assert 0 < found.begun.sum() < len(found.begun)
+    assert np.abs(found.poses[..., 2]).max() < 1.0
+    assert found.samples.max() < 1.5 * found.samples.min()
+
+
+def test_thrusters_bring_a_ship_that_stops_beside_a_standing_start_to_it_on_the_spot():
+    ship = open_water(offshore_vessel()).ship
+    assert ship.hovers
+    assert not ship.keeps_station
+    found = stopped(offshore_vessel(), (0.5, 1.0), spare_m=0.0, heading_rad=0.2)
+    assert found.begun.all()
+    assert not found.go_arounds.any()
+    assert np.abs(found.poses[..., 2]).max() < 1.0
+
+
+def test_a_ship_too_far_ahead_for_her_leg_and_without_a_way_round_sails_it_all_the_same():
+    vessel = coaster()
+    water, length = open_water(vessel), vessel.length_m
+    ship, radius = water.ship, water.ship.turning_radius_m
+    helm = Helmsman(vessel=vessel, environment=CALM, ship=ship)
+    leg = np.tile([0.0, 0.0, np.pi / 2, *ship.approach.velocity], (100, 1))
+    leg[:, 1] = np.arange(100) * vessel.sample_time_s * ship.transit_speed_mps
+    channel = area(shapely.box(-40 * length, -0.8 * radius, 40 * length, 0.8 * radius))
+    narrow = replace(water, area=channel, field=clearance_field(channel, resolution_m=length / 4))
+    parameters = vessel.model.parameters[None]
+    truths = Truths(parameters=parameters, current_to=np.zeros((1, 2)), wind_to=np.zeros((1, 2)))
+    state = leg[0] + np.array([0.0, 0.4 * leg[-1, 1], 0.0, 0.0, 0.0, 0.0])
+    fleet = Fleet(vessel, CALM, truths, state=state, standing=ship.approach.inputs, rng=np.random.default_rng(5))
+    guidance = Guidance(
+        helm,
+        narrow,
+        leg,
+        within=tolerances(narrow),
+        sailing=np.ones(1, bool),
+        inputs=ship.approach.inputs,
+        last=False,
+    )
+    assert guidance._round(state[:3]) is None
+    found = guidance.sail(fleet, np.zeros((1, 3)))
+    assert found.begun.all()
+    assert not found.go_arounds.any()

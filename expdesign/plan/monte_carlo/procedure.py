@@ -7,11 +7,11 @@ The procedure behind a plan's risk estimate, the same in run cards, report and d
    for that, a ship that keeps station follows a parallel leg, as far beside it as `PARALLEL_SHARE` of the start
    tolerance of the position.
 3. At the planned start of the next run it begins the run if position, heading, speed and yaw rate are within
-   `Tolerances`. From a standstill, a ship that keeps station waits until it uses little of them. Another ship cannot
-   turn to the heading at rest: it keeps the heading as it stops, and begins as soon as it is within them.
-4. Otherwise it goes around: by the shortest path in safe water to the beginning of a run-up, then up to the start
-   again, steady on the planned heading and speed; `GO_AROUNDS` times at most. Then the trial is aborted, as it is where
-   this takes longer than the whole planned trial.
+   `Tolerances`. At a standstill, a ship whose thrusters hold it there comes nearer until it uses few of them. Another
+   ship cannot: it stops straight ahead, and begins as soon as it is within them.
+4. Otherwise it goes around, as it does where it cannot return to a leg: by the shortest path in safe water to the
+   beginning of a run-up, then up to the start again, steady on the planned heading and speed; `GO_AROUNDS` times at
+   most. Then the trial is aborted, as it is where this takes longer than the whole planned trial.
 """
 
 from __future__ import annotations
