@@ -199,6 +199,27 @@ def test_velocities_from_the_pose_are_of_the_reference_point():
     np.testing.assert_allclose(seen.pose, other.pose[1 : 1 + len(seen)], atol=1e-9)
 
 
+@pytest.mark.parametrize("missing", [1, 2, 3])
+def test_first_rows_without_a_position_change_no_velocity_after_them(missing: int):
+    faulty = ship(position_forward_m=5.0, heading_bias_rad=0.1)
+    whole = from_pose(sailed(faulty))
+    assert whole.pose is not None
+    begun_late = replace(whole, pose=np.where(np.arange(len(whole))[:, None] < missing, np.nan, whole.pose))
+    full, late = (reduced(Record(batches=(one,)), faulty).batches[0] for one in (whole, begun_late))
+    known = np.isfinite(late.velocity).all(axis=1)
+    assert len(late) - known.sum() <= missing + 2
+    np.testing.assert_array_equal(late.velocity[known], full.velocity[-len(late) :][known])
+
+
+def test_velocities_from_a_pose_that_stands_are_not_derived_anew():
+    """They may have been derived otherwise, by a filter for example."""
+    stated = ship(yaw_rate_scale=1.1, wind_forward_m=8.0)
+    batch = from_pose(sailed(ship()))
+    filtered = replace(batch, velocity=0.9 * batch.velocity)
+    (seen,) = reduced(Record(batches=(filtered,)), stated).batches
+    np.testing.assert_array_equal(seen.velocity, filtered.velocity)
+
+
 def test_inputs_are_averaged_as_velocities_from_the_pose_are():
     """Otherwise the response to inputs seems weaker than it is."""
     batch = from_pose(sailed(ship(), commands=tug_commands(2000)))

@@ -22,6 +22,7 @@ from expdesign.simulation import (
     simulate_ensemble,
     simulate_many,
 )
+from expdesign.simulation.actuation import mapped
 from expdesign.vessel import IDEAL, Response, Sensors, Vessel
 
 SHIP = replace(vessel("azimuth-30m-true"), sensors=Sensors())
@@ -97,6 +98,28 @@ def test_orders_are_told_from_recorded_positions(noise: float):
         read = np.round(read / rounding) * rounding
         assert not keeps_to(0.05, orders, sample_time_s=step_s)
         assert keeps_to(0.05, read, sample_time_s=step_s)
+
+
+def test_a_jump_by_itself_is_an_order_and_an_actuator_a_little_faster_than_stated_goes_on():
+    """Steps are in units of what the actuator can do in a sample; none is a multiple of another."""
+    still = [0.0] * 20
+    for steps, position in (
+        ([0.613, 1.0, 0.7], True), ([1.3], False), ([0.17, 1.3, 0.21], False), ([0.9, 1.3, 1.37, 1.33, 0.8], True),
+        ([0.9, 1.6, 1.67, 1.63, 0.8], False),
+    ):  # fmt: skip
+        for sign in (1.0, -1.0):
+            signal = 0.3 + sign * 0.05 * 0.5 * np.cumsum([*still, *steps, *still])
+            assert keeps_to(0.05, signal, sample_time_s=0.5) is position, steps
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 2.0])
+@pytest.mark.parametrize("last", [1, 2])
+def test_the_mean_over_a_step_of_no_length_is_its_limit(lag_s: float, last: int):
+    def means(length_s: float) -> np.ndarray:
+        pieces = [[(1, 0.4)], [(2, 0.3)], [(3 - last, 0.0), (last, length_s)]]
+        return mapped(Response(lag_s=lag_s), 0, pieces).means
+
+    np.testing.assert_allclose(means(0.0), means(1e-9), atol=1e-8)
 
 
 @pytest.mark.parametrize("delay", [0.3, 1.0, 2.75])

@@ -111,12 +111,9 @@ def _arrivals(values: Array, delay: float, interval: float) -> Array | None:
     count = len(values)
     step = np.diff(values, axis=0)
     changes = np.flatnonzero(np.any(np.isfinite(step) & (step != 0), axis=1)) + 1
-    best, most = delay % interval, -1
-    for phase in (delay % interval, *np.unique(np.mod(changes[:PHASES], interval))):
-        matched = int(_explained(changes, phase, interval).sum())
-        if matched > most:
-            best, most = float(phase), matched
-    if most < HELD_SHARE * len(changes):
+    phases = (delay % interval, *np.unique(np.mod(changes[:PHASES], interval)).tolist())
+    best = max(phases, key=lambda phase: int(_explained(changes, phase, interval).sum()))
+    if _explained(changes, best, interval).sum() < HELD_SHARE * len(changes):
         return None
     arrivals = best + interval * np.arange(-1, int(count / interval) + 2)
     places = np.ceil(arrivals - ON_TIME)

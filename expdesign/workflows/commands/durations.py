@@ -18,7 +18,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.rehearsal import Alone, estimates_alone
 from expdesign.scenario import Scenario
 from expdesign.workflows.outcome import Outcome, shared, workflow
-from expdesign.workflows.steps.case import loaded, noted, written
+from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import aim_of, constraints_of, design_document, designed
 from expdesign.workflows.steps.scored import (
     actuation_remarks,
@@ -50,7 +50,7 @@ def score(request: requests.Score, *, progress: Progress = silent) -> Outcome:
     told = actuation_remarks(case.vessel, [item.primitive.commands for item in information], "candidate")
     told += speed_remarks(case.vessel, [item.primitive.trajectory for item in information], "candidate")
     document = Document(facts=facts, findings=(*case.remarks, *told), sections=tabled(table))
-    return written(request, case, score_files(case, information), noted(case, document), progress)
+    return written(request, case, score_files(case, information), document, progress)
 
 
 # The duration problem of a scenario from covariances of simulated trials, (7.59)-(7.63).
@@ -181,7 +181,7 @@ def durations(request: requests.Durations, *, progress: Progress = silent) -> Ou
         **growth_files(case, growth),
     }
     document = growth_document(growth, case) + design_document(design, compared)
-    return written(request, case, files, noted(case, document), progress)
+    return written(request, case, files, document, progress)
 
 
 def _from_covariances(request: requests.Durations, case: Scenario, progress: Progress) -> Outcome:
@@ -194,4 +194,4 @@ def _from_covariances(request: requests.Durations, case: Scenario, progress: Pro
     alone = [item.primitive.name for item in tried if not item.informative]
     facts = {"trials_of_each": trials, **({"not_informative_on_their_own": alone} if alone else {})}
     document = Document(facts=facts, sections=tabled(covariance_table(tried))) + design_document(design, compared)
-    return written(request, case, files, noted(case, document), progress)
+    return written(request, case, files, document, progress)

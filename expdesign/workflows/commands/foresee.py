@@ -7,7 +7,6 @@ from pathlib import Path
 
 from expdesign import requests
 from expdesign.errors import FileError, InputError
-from expdesign.export.folder import Content
 from expdesign.export.foresight_page import (
     ForesightContent,
     OperationContent,
@@ -24,7 +23,7 @@ from expdesign.progress import Progress, silent, within
 from expdesign.scenario import Scenario
 from expdesign.simulation import Environment
 from expdesign.workflows.outcome import Outcome, shared, workflow
-from expdesign.workflows.steps.case import loaded, noted, written
+from expdesign.workflows.steps.case import loaded, written
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.scored import ready
 
@@ -61,11 +60,8 @@ def foresee(request: requests.Foresee, *, progress: Progress = silent) -> Outcom
         found=found,
     )
     progress("writing the page", 0.95)
-    document = noted(case, foresight_document(content))
-    files: dict[str, Content] = {
-        "foresee.json": foresight_json(content),
-    }
-    return written(request, case, files, document, progress, page="foresee.html")
+    files = {"foresee.json": foresight_json(content)}
+    return written(request, case, files, foresight_document(content), progress, page="foresee.html")
 
 
 def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> Outcome:
@@ -75,16 +71,9 @@ def _operation(request: requests.Foresee, voyages: int, progress: Progress) -> O
         found = foresee_operation(
             case.vessel, case.environment, voyages=voyages, seed=request.seed, progress=within(progress, 0.02, 0.97)
         )
-    content = OperationContent(
-        scenario=case.name,
-        vessel=case.vessel.name,
-        found=found,
-    )
-    document = noted(case, operation_document(content))
-    files: dict[str, Content] = {
-        "operation.json": operation_json(content),
-    }
-    return written(request, case, files, document, progress, page="operation.html")
+    content = OperationContent(scenario=case.name, vessel=case.vessel.name, found=found)
+    files = {"operation.json": operation_json(content)}
+    return written(request, case, files, operation_document(content), progress, page="operation.html")
 
 
 def _trial(

@@ -12,7 +12,7 @@ from expdesign.progress import Progress, in_phases, silent, within
 from expdesign.requests import repeating
 from expdesign.scenario import Scenario, load_repeats
 from expdesign.workflows.outcome import Outcome, shared, workflow
-from expdesign.workflows.steps.case import drafted, loaded, noted, written
+from expdesign.workflows.steps.case import drafted, loaded, written
 from expdesign.workflows.steps.day import Day, compared_criteria, day_document, day_files, planned_day
 from expdesign.workflows.steps.design_problem import designed
 from expdesign.workflows.steps.planned import (
@@ -60,7 +60,7 @@ def _plan(request: requests.Plan, case: Scenario, progress: Progress) -> Outcome
     )
     files = {**plan_files(case, day.plan, accuracy), **day_files(case, day)}
     document = plan_document(case, day.plan) + day_document(day)
-    return written(request, case, files, noted(case, document), progress)
+    return written(request, case, files, document, progress)
 
 
 WORK = (0.05, 0.08, 0.02, 0.68, 0.17)
@@ -105,4 +105,4 @@ def _run(request: requests.Run, case: Scenario, progress: Progress) -> Outcome:
     content = replace(content, compared=compared, route=route, day=day.shortest)
     files = {**trial_files(case, growth, content, route, progress=writing), **day_files(case, day)}
     document = growth_document(growth, case) + day_document(day) + plan_document(case, day.plan)
-    return written(request, case, files, noted(case, document), progress)
+    return written(request, case, files, document, progress)

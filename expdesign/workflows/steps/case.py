@@ -35,7 +35,7 @@ def loaded(scenario: Path, progress: Progress, *, vessel: Path | None = None) ->
     return load_scenario(scenario, vessel=vessel)
 
 
-def noted(case: Scenario, document: Document) -> Document:
+def _noted(case: Scenario, document: Document) -> Document:
     """The document with what is to be heard about the scenario, its vessel, its chart and the data before the trial."""
     roll = () if case.vessel.pendulum is None or "heel_max_deg" in document.facts else (NOT_ACTING_BACK,)
     before = measured(case.design.prior_data, case.vessel).doubts if case.design.prior_data else ()
@@ -54,9 +54,12 @@ def written(
     *,
     page: str = "",
 ) -> Outcome:
-    """Write files into the folder asked for, or runs/<scenario>. A plan takes an earlier draft away."""
+    """Write files into the folder asked for, or runs/<scenario>, and say what is to be heard of the scenario.
+
+    A plan takes an earlier draft away.
+    """
     usual = Path("runs") / case.name
-    outcome = finished(request, usual, files, document, progress, page=page)
+    outcome = finished(request, usual, files, _noted(case, document), progress, page=page)
     if left := _undeleted(request.out or usual) if PLAN in files else ():
         note = f"The earlier draft cannot be deleted and is of no use: {', '.join(left)}."
         return replace(outcome, document=outcome.document + Document(notes=(note,)))
