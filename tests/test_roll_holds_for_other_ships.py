@@ -101,7 +101,7 @@ def test_nothing_to_be_trusted_is_said_first() -> None:
     blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
     content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="")
     assert headline(content) == "the rudder seems to answer roll"
-    assert roll_sentences(content)[0] == f"None of these estimates is to be trusted: {headline(content)}."
+    assert next(roll_sentences(content)) == f"None of these estimates is to be trusted: {headline(content)}."
     assert all("none to be trusted" in row[3] for row in parameter_rows(content) if row[3] != "given")
     assert set(one.effects) <= set(EFFECTS)
 
@@ -111,7 +111,7 @@ def test_what_an_unknown_tilt_moves_is_not_trusted_and_the_rest_is() -> None:
     blank = LowPass(taps=np.ones(1), every=1, roll_hz=0.1, passed=1.0, bandwidth_hz=5.0, step_s=STEP_S)
     content = RollContent(estimate=one, report=null_space(one), filter=blank, notes=(), command="")
     assert one.trusted
-    texts = roll_sentences(content)
+    texts = tuple(roll_sentences(content))
     moved = "d, K_r, K_vd, K_delta, damping by the square"
     assert any(text.startswith(f"{moved} are not to be trusted") for text in texts)
     assert not any("estimated beside d" in text for text in texts)

@@ -91,12 +91,8 @@ def runs_text(added: AddedRuns) -> str:
     return f"{runs} ({words.duration(added.time_s)})"
 
 
-def conclusions(found: Foresight) -> tuple[str, ...]:
+def conclusions(found: Foresight) -> Iterator[str]:
     """What follows for the trial, in sentences."""
-    return tuple(_sentences_content(found))
-
-
-def _sentences_content(found: Foresight) -> Iterator[str]:
     least = [item for item in found.weakest if item.sized]
     seen = [item for item in least if item.found >= found.wanted_power]
     yield (
@@ -238,7 +234,7 @@ def foresight_document(content: ForesightContent) -> Document:
         title=content.scenario,
         name=f"What a diagnosis of {content.scenario} would find",
         about=f"{content.vessel}: {content.source}, {words.duration(found.duration_s)}.",
-        findings=conclusions(found),
+        findings=tuple(conclusions(found)),
         facts={"diagnosed_s": found.duration_s, "causes_tested": len(found.weakest)},
         values={
             "trial": content.source,
@@ -355,12 +351,8 @@ def _row(item: Detectability) -> tuple[str, ...]:
     )
 
 
-def operation_sentences(found: OperationForesight) -> tuple[str, ...]:
+def operation_sentences(found: OperationForesight) -> Iterator[str]:
     """What follows, in sentences."""
-    return tuple(_sentences_operation(found))
-
-
-def _sentences_operation(found: OperationForesight) -> Iterator[str]:
     low, high = interval(found.false_alarms, found.nominal)
     yield (
         f"Of {words.counted(found.nominal, 'voyage')} of {words.duration(found.voyage_s)} without a change, "
@@ -405,7 +397,7 @@ def operation_json(content: OperationContent) -> str:
     return strict_json(
         {
             "vessel": content.vessel,
-            "sentences": operation_sentences(found),
+            "sentences": list(operation_sentences(found)),
             "voyage_s": found.voyage_s,
             "reference_s": found.reference_s,
             "voyages_without_change": found.nominal,
@@ -426,7 +418,7 @@ def operation_document(content: OperationContent) -> Document:
         title=content.vessel,
         name=f"What a watch over {content.vessel} would find",
         about=f"Simulated voyages of {words.duration(found.voyage_s)}, in the weather of {content.scenario}.",
-        findings=operation_sentences(found),
+        findings=tuple(operation_sentences(found)),
         facts={"voyages_without_change": found.nominal, "false_alarms": found.false_alarms},
         sections=(
             section(

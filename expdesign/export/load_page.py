@@ -86,12 +86,8 @@ def step_rows(content: LoadContent) -> list[tuple[str, ...]]:
     ]  # fmt: skip
 
 
-def load_sentences(content: LoadContent) -> tuple[str, ...]:
+def load_sentences(content: LoadContent) -> Iterator[str]:
     """The findings."""
-    return tuple(_sentences(content))
-
-
-def _sentences(content: LoadContent) -> Iterator[str]:
     plan = content.plan
     count, total = len(content.options), sum(content.time_s(case) for case in range(len(content.options)))
     yield (
@@ -206,7 +202,7 @@ def load_document(content: LoadContent) -> Document:
         name="Loads and manoeuvres of a roll trial",
         about=f"{ship(vessel)}. Known loads change how she rolls; from the change follow her inertia, damping, "
         "righting moment and the weight of an unknown load.",
-        findings=load_sentences(content),
+        findings=tuple(load_sentences(content)),
         facts={
             "runs": int(plan.repeats.sum()),
             "efficiency": plan.chosen.efficiency,

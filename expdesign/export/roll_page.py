@@ -98,12 +98,8 @@ def cure_rows(content: RollContent) -> list[tuple[str, ...]]:
     return [(one.what, str(count - one.rank), f"{one.smallest:.1e}") for one in content.report.cures]
 
 
-def roll_sentences(content: RollContent) -> tuple[str, ...]:
+def roll_sentences(content: RollContent) -> Iterator[str]:
     """The findings."""
-    return tuple(_sentences(content))
-
-
-def _sentences(content: RollContent) -> Iterator[str]:
     estimate, report, body = content.estimate, content.report, content.estimate.problem.body
     if not estimate.trusted:
         yield f"None of these estimates is to be trusted: {headline(content)}."
@@ -359,7 +355,7 @@ def roll_document(content: RollContent) -> Document:
         name="Roll and loading",
         about=EQUATION,
         mark=None if estimate.trusted else Mark(text=f"None to be trusted: {headline(content)}", good=False),
-        findings=roll_sentences(content),
+        findings=tuple(roll_sentences(content)),
         facts={"parameters_sought": len(report.free), "of_these_determined": report.rank},
         values={
             "trusted": "all" if estimate.trusted else f"none: {headline(content)}",

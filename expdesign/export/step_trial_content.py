@@ -69,11 +69,6 @@ def to_repeat(content: StepTrialContent) -> tuple[StepSample, ...]:
     )
 
 
-def sentences(content: StepTrialContent) -> tuple[str, ...]:
-    """The findings."""
-    return tuple(_sentences(content))
-
-
 def command_units(content: StepTrialContent) -> tuple[str, str]:
     """Units of throttle and rudder, "" for forces in the unit of a model."""
     controls = content.trial.controls
@@ -86,7 +81,8 @@ def unit_of(signal: str) -> str:
     return column_name(signal).removeprefix(signal).removeprefix("_")
 
 
-def _sentences(content: StepTrialContent) -> Iterator[str]:
+def sentences(content: StepTrialContent) -> Iterator[str]:
+    """The findings."""
     trial = content.trial
     ahead = [one for one in trial.samples if not one.hold.astern]
     asked = sum(one.hold.channel is not None for one in ahead)
@@ -268,7 +264,7 @@ def step_model_json(content: StepTrialContent) -> str:
     trial, model = content.trial, content.trial.model
     return strict_json(
         {
-            "remarks": sentences(content),
+            "remarks": list(sentences(content)),
             "throttle": list(trial.controls.throttle),
             "rudder": list(trial.controls.rudder) or "differential",
             "rudder_sign": trial.rudder_sign,

@@ -295,7 +295,7 @@ def step_trial_document(content: StepTrialContent) -> Document:
         title=content.nominal.name if content.nominal else trial.batches[0].name,
         name="Step trial",
         about=EQUATION.format(through),
-        findings=sentences(content),
+        findings=tuple(sentences(content)),
         facts={
             "throttle": trial.controls.words[0],
             "rudder": trial.controls.words[1],
