@@ -33,7 +33,7 @@ WIND_S = 7200.0  # correlation time of winds [s]
 STRONGER = 4.0  # variance that winds may have later, in that of the reference
 SEARCHED_STRETCHES = 600  # of a reference, from which the variation of the force is learnt
 # iterations of that search, least relative gain of the likelihood in one, and the step of its slopes, in powers of two
-SEARCH_ITERATIONS, SEARCH_GAIN, SEARCH_STEP = 15, 1e-4, 0.01
+SEARCH_ITERATIONS, SEARCH_GAIN, SEARCH_STEP = 30, 1e-5, 0.01
 MOST_QUICK = 6.0  # largest variance of the quick part in that of independent stretches, in powers of two
 
 LEAST_VARIANCE = 1e-14

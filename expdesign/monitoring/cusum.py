@@ -31,6 +31,7 @@ WEATHER_LIMIT = 1.7  # surprise of a stretch, in that of the reference, beyond w
 # is believed; in between, weather that begins and a change that lasts look alike
 TOLD_APART = (7, 20)
 WEATHER_ODDS = 5.0  # logarithm of how much more often the weather changes than the ship does, a hundred times or so
+FALLEN = 3.0  # by which a sum below its peak is of something that is over, as a squall is
 SIZED = 2.5  # standard errors of its size, those of the reference among them, that a change has to have
 SURELY = 0.95  # of how much scores scatter by chance
 ALIKE = 0.3  # share of a change's weights from which another sees the same weather
@@ -217,7 +218,7 @@ def _noticed(
         alike = calibration.weights @ calibration.weights[one] > ALIKE * (calibration.weights[one] ** 2).sum()
         rougher, scattered = _rougher_by(state, place, calibration), _scattered(state, place, calibration)
         few, many = TOLD_APART
-        if state.ratios[place] <= rules.limit * scattered:
+        if state.ratios[place] <= max(rules.limit * scattered, state.peaks[place] - FALLEN):
             doubtful |= alike
         elif rougher > 0.0 and state.sums.stretches[place] >= many:
             explained |= alike
@@ -312,10 +313,11 @@ def _summed(state: State, one: Judged, before: State, begin_s: float, calibratio
     fresh = (sign * one.score[number] - size / 2 * one.information[number, number]) * size / inflation
     late = fresh > ratios
     ratios = np.maximum(ratios, fresh)
+    peaks = np.where(late | (state.ratios == 0.0), ratios, np.maximum(state.peaks, ratios))
     ended = (ratios <= 0.0) | ~np.tile(calibration.watched, 2)
     ratios = np.where(ended, 0.0, ratios)
     place = int(np.argmax(ratios))
     step = Step(time_s=state.until_s, statistic=float(ratios[place]), change=place % m)
     if (late & ~ended).any():
         sums = sums.first(late & ~ended, one, begin_s, before)
-    return replace(state, ratios=ratios, sums=sums.again(ended, state)), step
+    return replace(state, ratios=ratios, peaks=peaks, sums=sums.again(ended, state)), step

@@ -44,6 +44,7 @@ def restored_state(table: dict[str, Any]) -> State:
         heading=float(table["heading"]),
         known=Known(**_arrays(table["known"])),
         ratios=_array(table["ratios"]),
+        peaks=_array(table["peaks"]),
         sums=Sums(**_arrays(table["sums"])),
         shift=_array(table["shift"]),
         before=_array(table["before"]),

@@ -198,6 +198,7 @@ class State:
     until_s: float  # end of the last stretch that was looked at [s]
     known: Known  # of the unmeasured force and the load, then
     ratios: Array  # (2 m,) sums of log-likelihood ratios, of increases and then of decreases
+    peaks: Array  # (2 m,) the largest of each since it began
     sums: Sums  # since they began, 2 m of them
     shift: Array  # (m,) changes of the ship that were found, in sizes; before: the same before the last alarm
     before: Array
@@ -237,6 +238,7 @@ class State:
             rough=rough,
             rougher=rougher,
             ratios=np.zeros(2 * m),
+            peaks=np.zeros(2 * m),
             sums=Sums.begun(2 * m, m, known, time_s, rougher),
             shift=np.zeros(m),
             before=np.zeros(m),
