@@ -1,5 +1,9 @@
 """Parameters re-estimated from few runs may simulate worse than those of the file; causes stand beside the better."""
 
+import importlib
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,6 +14,7 @@ from expdesign.diagnosis.fit.held_out import HeldOut, prediction_gain, predictio
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.forward_selection import fit_nuisance
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from held_out_cases import errors
 
 BIAS_RAD = 0.08
 
@@ -32,6 +37,23 @@ def test_a_fault_is_found_beside_parameters_that_the_file_knows_better():
             np.testing.assert_array_equal(found.extended.model.parameter_std, vessel.model.parameter_std)
     # the file's parameters have to be better for certain, as they are with seeds 1 and 6 of 1, 4 and 6
     assert beside >= 1
+
+
+@pytest.mark.parametrize(("on_other_runs", "written"), [(60.0, True), (50.0, False), (45.0, False)])
+def test_parameters_alone_are_written_if_runs_that_none_was_fitted_to_gain(monkeypatch, on_other_runs, written):
+    """Parts of the same runs say that they gain ten points in all cases."""
+    selecting = importlib.import_module("expdesign.diagnosis.diagnose")
+    monkeypatch.setattr(selecting, "within_stated_std", lambda _fit: True)
+    stated, fitted = (
+        replace(errors(50.0 + gain), on_other_runs=lambda fit=fit: errors(fit))
+        for gain, fit in ((0.0, 50.0), (10.0, on_other_runs))
+    )
+    chosen = SimpleNamespace(
+        before=stated, as_stated=stated, held=[fitted], kept=SimpleNamespace(first=None),
+        validation=SimpleNamespace(of=lambda _fit: fitted),
+    )  # fmt: skip
+    ship = SimpleNamespace(model=SimpleNamespace(outputs=("u", "v", "r")))
+    assert bool(selecting._gains_within_std(chosen, ship, 0)) is written
 
 
 def held_out(ship, windows):

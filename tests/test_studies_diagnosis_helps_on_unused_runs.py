@@ -80,3 +80,14 @@ def test_what_zigzags_show_of_a_rudder_does_not_spoil_turns() -> None:
     row = fault(data, "pond", untouched, 0, 1011)
     assert [cause for cause, *_ in row["findings"]] == ["actuator_slew"]
     assert (np.array(row["unseen"]) > -0.02).all()
+
+
+@pytest.mark.outside
+@pytest.mark.slow
+def test_a_current_is_named_that_parameters_would_take_the_place_of() -> None:
+    """Two numbers beside the file, or 26 that parts of the same three runs flatter, and other runs do not."""
+    data = outside(POND.folder).parent
+    place = [item.name for item in FAULTS].index("current 0.07 m/s")
+    row = fault(data, "pond", place, 0, 1011)
+    assert row["named"] == "first"
+    assert row["off"] < 2.5

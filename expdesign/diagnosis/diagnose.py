@@ -55,6 +55,7 @@ from expdesign.diagnosis.judgement import (
     LITTLE_FIT,
     errors_as_judged,
     found_by_predictions,
+    gains_on_other_runs,
     harmless_beside_the_file,
     harms,
     losses_without,
@@ -166,7 +167,9 @@ def select_causes(
             by_predictions = None  # where much is explained, predictions confirm what likelihoods found, and no more
         if compared and little and not by_predictions and not kept.steps and found.first.keys:
             stated = compare_predictions(ship.with_known_parameters(), short, seed, progress)
-            by_predictions = stated and found_by_predictions(kept, stated, data, ship, seed, compared.without)
+            apart = validation.of(found.first).on_other_runs
+            rival = compared.without if apart is None else apart()  # by parts of runs they flatter themselves
+            by_predictions = stated and found_by_predictions(kept, stated, data, ship, seed, rival)
         if compared and kept.steps and not by_predictions:
             kept, compared = with_alternatives(kept, compared, seed), None
         kept, held = by_predictions or (kept, held)
@@ -315,9 +318,14 @@ def diagnose(
 
 
 def _gains_within_std(chosen: Selected, ship: ExtendedModel, seed: int) -> tuple[ErrorReduction, ...]:
-    """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear."""
+    """What uncertain parameters gain within their standard deviations on held-out units; none where that is unclear.
+
+    It has to show in runs that none of them was fitted to, too: parts of the same runs share weather and manoeuvres.
+    """
     gain, (low, _) = held_out_gain(chosen.before, chosen.held[0], seed)
     if not within_stated_std(chosen.kept.first) or not (gain > LEAST_GAIN_WITHIN_STD and low > 0):
+        return ()
+    if not gains_on_other_runs([chosen.as_stated, chosen.validation.of(chosen.kept.first)], seed):
         return ()
     reductions = error_reductions_of(ship.model.outputs, chosen.before, chosen.held[0], seed)
     return reductions if any(item.is_certain for item in reductions) else ()

@@ -342,7 +342,7 @@ def worth_writing(
     if known is not None and not harms(ship, known.last.ship, record):
         beside = _ahead([as_stated, *(validation.of(step.chosen.fit) for step in known.steps)])
         parameters = [validation.of(one.last) for one in (known, kept)]
-        if all(improves_held_out(known, beside, seed, windows)) and not _gains_on_other_runs(parameters, seed):
+        if all(improves_held_out(known, beside, seed, windows)) and not gains_on_other_runs(parameters, seed):
             rng = np.random.default_rng(seed)
             return with_runs_counted(known, open_candidates(known.last, windows), rng), beside
     stated, alone, written = _ahead([as_stated, *map(validation.of, (kept.first, kept.last))])
@@ -350,7 +350,7 @@ def worth_writing(
     return (kept, held) if gains else (kept.with_steps(()), held[:1])
 
 
-def _gains_on_other_runs(held: Sequence[HeldOut], seed: int) -> bool:
+def gains_on_other_runs(held: Sequence[HeldOut], seed: int) -> bool:
     """Whether the second of two models predicts runs that it was not fitted to better, for certain."""
     return _gains_for_certain([item.on_other_runs() for item in held if item.on_other_runs is not None], seed)
 
