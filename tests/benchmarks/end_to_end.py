@@ -1,7 +1,7 @@
 """Published ships from particulars to a diagnosis: planned, sailed by their published models, estimated and diagnosed.
 
 Of each ship her particulars, one circle and one speed are known. Her candidates and her bay are those of
-`expdesign new`, scaled to her length and speed, without the crash stop: most published models know no engine astern.
+`expdesign new --card`, without the crash stop: most published models know no engine astern.
 The runs that the plan chooses are sailed by the published model, which has another structure than the vessel file, and
 measured with noise. The vessel that `estimate` then finds predicts
 circles and zig-zags with intervals; they are compared with those of the published model.
@@ -18,7 +18,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import re
 import tempfile
 import time
 from collections.abc import Iterable
@@ -33,19 +32,20 @@ from expdesign.cli import main as expdesign
 from expdesign.dictionary import Primitive, build_dictionary
 from expdesign.errors import InputError
 from expdesign.export.files import vessel_toml
-from expdesign.particulars import Stated, nominal
+from expdesign.export.folder import write_files
+from expdesign.particulars import Stated
+from expdesign.particulars.forces import design_speed
 from expdesign.particulars.trials import Fleet
 from expdesign.scenario import Scenario, load_scenario, load_vessel
 from expdesign.simulation import steady_ahead
 from expdesign.vessel import Sensors, Vessel, VesselModel
-from expdesign.workflows import new
+from expdesign.workflows.commands.new import BLOCK, kind_of, of_card
 from particulars import MODELS, case, known_of
 
 SHIPS = MODELS | {
     "kcs-model": lambda: published.froude(published.kcs(), 1.0 / 75.5),
     "esso-osaka": lambda: published.froude(published.esso_osaka(), 325.0 / 3.0),
 }
-TEMPLATE_M, TEMPLATE_MPS = 80.0, 6.5  # length and top speed of the ship that the template is of
 DRAWS = 300
 METHODS = ("ls", "iv", "oe")
 STEPS = 10  # of the published model in a sample
@@ -66,34 +66,26 @@ class Outcome:
 
 
 def folder_of(name: str, folder: Path) -> Scenario:
-    """The files of `new`, scaled to the ship, with her nominal vessel."""
-    truth = SHIPS[name]()
-    one = case(name, truth)
-    found = nominal(replace(one.card, stated=known_of(one))).vessel
-    size, swift = found.length_m / TEMPLATE_M, truth.speed_mps / TEMPLATE_MPS
-    sample_s = max(0.1, round(size / swift, 1))
+    """What `new --card` makes of the ship, measured by sensors of her size, without what takes engines astern."""
+    one = case(name, SHIPS[name]())
+    card = replace(one.card, stated=known_of(one))
+    write_files(folder, of_card(name, kind_of(card), card, command="").texts)
+    found, swift = load_vessel(folder / "vessel.toml"), design_speed(card)
     noise = Sensors(
-        position_m=0.01 * size * TEMPLATE_M / 2, heading_rad=0.003, velocity_mps=0.01 * swift * TEMPLATE_MPS / 2,
-        yaw_rate_radps=0.001 * swift * TEMPLATE_MPS / found.length_m,
+        position_m=0.005 * found.length_m, heading_rad=0.003, velocity_mps=0.005 * swift,
+        yaw_rate_radps=0.0005 * swift / found.length_m,
     )  # fmt: skip
-    new(folder, kind="propeller-rudder")
+    sample_s = max(0.1, round(0.08 * found.length_m / swift, 1))
     found = replace(found, sample_time_s=sample_s, model=replace(found.model, sample_time_s=sample_s), sensors=noise)
     (folder / "vessel.toml").write_text(vessel_toml(found), "utf-8")
     ahead = replace(found, model=ahead_only(found.model))
     (folder / "vessel-ahead.toml").write_text(vessel_toml(ahead), "utf-8")
-    listed = (folder / "dictionary.toml").read_text("utf-8").split("[[primitives]]")
-    (folder / "dictionary.toml").write_text("[[primitives]]".join(one for one in listed if "stop" not in one), "utf-8")
+    listed = (folder / "dictionary.toml").read_text("utf-8").split(BLOCK)
+    (folder / "dictionary.toml").write_text(BLOCK.join(one for one in listed if '"stop"' not in one), "utf-8")
     astern = sorted({*found.model.names} - {*ahead.model.names})
     task = (folder / "scenario.toml").read_text("utf-8")
-    task = task.replace("[design]", f'[design]\nprior = "parameter_std"\nfixed_parameters = {json.dumps(astern)}')
+    task = task.replace("[design]", f"[design]\nfixed_parameters = {json.dumps(astern)}")
     (folder / "scenario.toml").write_text(task, "utf-8")
-    scaled(folder / "dictionary.toml", {"speed_mps": swift, "from_speed_mps": swift, "_s": size / swift})
-    scaled(folder / "scenario.toml", {"_m": size, "_mps": swift, "total_s": size / swift})
-    outline = json.loads((folder / "area.geojson").read_text("utf-8"))
-    for feature in outline["features"]:
-        for ring in feature["geometry"]["coordinates"]:
-            ring[:] = [[m + size * (x - m) for x, m in zip(place, (11.0, 58.0), strict=True)] for place in ring]
-    (folder / "area.geojson").write_text(json.dumps(outline), "utf-8")
     return load_scenario(folder / "scenario.toml")
 
 
@@ -108,17 +100,6 @@ def ahead_only(model: VesselModel) -> VesselModel:
         parameter_correlation={pair: value for pair, value in pairs if names.issuperset(pair)},
         parameter_range={name: ends for name, ends in model.parameter_range.items() if name in names},
     )  # fmt: skip
-
-
-def scaled(path: Path, factors: dict[str, float]) -> None:
-    """Numbers of keys that end so, in a file, times factors; the first ending that fits counts."""
-
-    def number(match: re.Match[str]) -> str:
-        factor = next((by for end, by in factors.items() if match[1].endswith(end)), 1.0)
-        numbers = re.sub(r"-?\d+\.\d+", lambda one: repr(float(one[0]) * factor), match[2])
-        return f"{match[1]} = {numbers}"
-
-    path.write_text(re.sub(r"(\w+) = ([-\d.\[][-\d., \]]*)", number, path.read_text("utf-8")), "utf-8")
 
 
 def sailed(model: published.Model, vessel: Vessel, run: Primitive, rng: np.random.Generator) -> dict[str, np.ndarray]:
@@ -217,15 +198,20 @@ def outcome(
         data.append(folder / f"{run.name}.csv")
         np.savetxt(data[-1], np.array(list(columns.values())).T, "%.9g", ",", header=",".join(columns), comments="")
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
-    known = ["--prior", "parameter_std", "--method", *methods]
-    told = expdesign(["estimate", *common, *known, "--out", str(folder / "estimate")])
     error = before = math.nan
     inside = np.array([], dtype=bool)
-    if told == 0:
+    for prior in (
+        "none",
+        "parameter_std",
+    ):  # the data alone, or what the card says beside them where these say too little
+        asked = ["--prior", prior, "--method", *methods, "--out", str(folder / "estimate")]
+        if expdesign(["estimate", *common, *asked]) != 0:
+            continue
         before = float(np.median(np.abs(deviations(files.vessel, one.values)[0])))
         with suppress(InputError):  # hardly any ship that the estimate draws brakes, or steers to the right side
             errors, inside = deviations(load_vessel(folder / "estimate" / "vessel-estimated.toml"), one.values)
             error = float(np.median(np.abs(errors)))
+            break
     said = "not asked for"
     if diagnosed:
         status = expdesign(["diagnose", *common, "--out", str(folder / "diagnosis")])
