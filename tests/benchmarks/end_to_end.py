@@ -200,10 +200,8 @@ def outcome(
     common = [*map(str, data), "--vessel", str(folder / "vessel-ahead.toml"), "--quiet"]
     error = before = math.nan
     inside = np.array([], dtype=bool)
-    for prior in (
-        "none",
-        "parameter_std",
-    ):  # the data alone, or what the card says beside them where these say too little
+    # the data alone, or what the card says beside them where these say too little
+    for prior in ("none", "parameter_std"):
         asked = ["--prior", prior, "--method", *methods, "--out", str(folder / "estimate")]
         if expdesign(["estimate", *common, *asked]) != 0:
             continue
