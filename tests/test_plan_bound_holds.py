@@ -11,7 +11,13 @@ import shapely
 
 from expdesign.plan import PlanSettings
 from expdesign.plan.bounds.displacement import Displacement, Headway, displacement_of, exit_motion
-from expdesign.plan.bounds.repositioning import _grown, least_losses, reposition_bound_s, time_to_sail_s
+from expdesign.plan.bounds.repositioning import (
+    _grown,
+    cheapest_orders,
+    least_losses,
+    reposition_bound_s,
+    time_to_sail_s,
+)
 from expdesign.plan.control.acceleration_limits import LegEnd, SpeedChanges, least_loss, leg_end
 from expdesign.plan.control.ships import capability
 from expdesign.plan.legs import LegTask
@@ -221,11 +227,11 @@ def test_a_planted_plan_costs_no_less_than_the_bound(seed):
     assert bound <= time_to_sail_s(area(water), margin, none, repeats, (np.zeros(2), here), headway, 0.5)
 
 
-def without_runs_s(current_mps: float, under_way: UnderWay | None = None) -> float:
-    """The bound in open water, with the current or against it."""
+def without_runs_s(current_mps: float, under_way: UnderWay | None = None, water: shapely.Geometry = OPEN) -> float:
+    """The bound in open water, or in other, with the current or against it."""
     return reposition_bound_s(
         ship(),
-        area(OPEN),
+        area(water),
         Environment(current_to=np.array([0.0, current_mps])),
         clearance_m=20.0,
         primitives=(),
@@ -235,6 +241,33 @@ def without_runs_s(current_mps: float, under_way: UnderWay | None = None) -> flo
         yaw_rate_radps=0.1,
         under_way=under_way,
     )
+
+
+def test_a_channel_that_holds_the_hull_and_its_clearance_may_be_sailed():
+    """Amidships keep the clearance and half the beam: 20 m and 4.5 m."""
+    for half_m, open_ in ((20.0 + 0.7 * ship().beam_m, True), (20.0 + 0.2 * ship().beam_m, False)):
+        channel = shapely.box(-30, -half_m, 30, half_m)
+        bound_s = without_runs_s(0.0, water=OPEN.difference(shapely.box(-30, -500, 30, 500)).union(channel))
+        straight_s = 400 / leg_speed_mps(1.3, ())
+        assert (bound_s == pytest.approx(straight_s, rel=1e-3)) is open_
+        assert bound_s > straight_s * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("start", [-200.0, -14.0, -13.0, -12.0, -11.0])  # all but the first too near to the wall
+def test_a_world_elsewhere_has_the_same_bound(start: float):
+    water, ends = OPEN.difference(WALL), (np.array([0.0, start, 0.0]), ENDS[1])
+    shift = np.array([3000.0, -7000.0])  # north, east
+    moved = shapely.transform(water, lambda places: places + shift[::-1])
+    found = to_sail(moved, {}, {}, ends=tuple(end + np.r_[shift, 0.0] for end in ends))
+    assert found == pytest.approx(to_sail(water, {}, {}, ends=ends), rel=1e-6)
+    assert found >= 200 - start - 1e-6  # whatever leads an end outside the water into it, the straight line is shorter
+
+
+def test_orders_are_enumerated_up_to_a_number_of_combinations():
+    assert cheapest_orders(np.ones((3, 3)), np.zeros(3), [27] * 3) is None  # 21 952
+    table = cheapest_orders(np.ones((3, 3)), np.zeros(3), [9] * 3)
+    assert table is not None
+    assert table[-1] == pytest.approx(27.0)  # one for every run that remains
 
 
 @pytest.mark.parametrize("current", [0.2, -0.2])
@@ -252,7 +285,7 @@ def test_what_is_lost_by_stopping_is_lost_through_water():
 
     speed = leg_speed_mps(1.3, (np.array([1.3, 0.0]),))
     lost_m = speed * bound_s(0.0) - 400
-    assert lost_m > 0
+    assert lost_m > 1.0  # not rounding: from rest to rest, over no way at all, nothing need be lost
     for current in (0.1, 0.3):
         assert bound_s(current) == pytest.approx((400 + lost_m) / (speed + current), rel=1e-9)
 

@@ -148,12 +148,11 @@ def time_to_sail_s(
         )
         more = _grown(water, grown_m) if grown_m else water
         simple = simplified(more, grow=True, tolerance_m=tolerance_m + 0.002 * grown_m)
-        path_s = build_visibility_graph(simple).least_cost(start, goal, headway.seconds)
-        if not np.isfinite(path_s):  # the ends are not connected: there is no plan to bound
-            continue
-        # an end outside the water is connected to it by a line that the true path need not follow
-        straight_s = float(headway.seconds(goal - start))
-        best = max(best, (path_s if _holds_ends(simple, ends) else straight_s) - displaced_s)
+        path_s = float(headway.seconds(goal - start))
+        if _holds_ends(simple, ends):  # nothing more is known of the way of an end outside the water
+            path_s = build_visibility_graph(simple).least_cost(start, goal, headway.seconds)
+        if np.isfinite(path_s):  # or else the ends are not connected, and there is no plan to bound
+            best = max(best, path_s - displaced_s)
     return float(best) if np.isfinite(best) else 0.0
 
 
