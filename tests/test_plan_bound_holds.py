@@ -10,7 +10,13 @@ import pytest
 import shapely
 
 from expdesign.plan import PlanSettings
-from expdesign.plan.bounds.displacement import Displacement, Headway, displacement_of, exit_motion
+from expdesign.plan.bounds.displacement import (
+    Displacement,
+    Headway,
+    _deviation_adrift_m,
+    displacement_of,
+    exit_motion,
+)
 from expdesign.plan.bounds.repositioning import (
     _grown,
     cheapest_orders,
@@ -115,6 +121,16 @@ def test_no_point_of_a_drifting_runs_chord_exceeds_its_deviation():
             track = arc[:, :2] @ np.array([[c, s], [-s, c]]) + current * run.trajectory.time_s[:, None]
             chord = track[0] + np.linspace(0, 1, 400)[:, None] * (track[-1] - track[0])
             assert shapely.distance(shapely.points(chord), shapely.linestrings(track)).max() <= told
+
+
+def test_the_deviation_of_a_track_that_does_not_drift_is_that_of_its_chord_wherever_it_lies():
+    turn = np.radians(120.0) * np.linspace(0, 1, 400)
+    arc = np.column_stack([40 * np.sin(turn), 40 * (1 - np.cos(turn))])
+    sagitta, length = 40 * (1 - np.cos(np.radians(60.0))), 80 * np.sin(np.radians(60.0))
+    for shift in (np.zeros(2), np.array([300.0, -70.0])):
+        told = _deviation_adrift_m(arc + shift, 0.0)
+        assert sagitta <= told <= 1.001 * sagitta + length / 400
+        assert _deviation_adrift_m(arc + shift, 5.0) >= told  # a drift sets the chord no nearer
 
 
 def windy(share: float = 1.0):

@@ -32,7 +32,7 @@ FILES = {
         "durations_nuisance_parameters_are_identifiable_or_merged",
     ),
     "plan/bounds/repositioning": ("plan_bound_holds",),
-    "plan/bounds/displacement": ("plan_bound_holds",),
+    "plan/bounds/displacement": ("plan_bound_holds", "plan_bound_branches_on_obstacle_corners"),
     "plan/bounds/branch_and_bound": ("plan_bound_branches_on_obstacle_corners",),
     "plan/verify": (
         "plan_verification_catches_what_is_wrong", "plan_heel_is_checked",
