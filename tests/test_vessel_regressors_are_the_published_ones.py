@@ -178,6 +178,10 @@ def test_a_model_reads_the_air_and_the_depth_where_a_term_does():
         assert model.reads_air == any("_q" in term.expression for term in terms)
         assert not model.reads_depth
         assert model.read_signals() == {name for one in model.expressions for name in one.signals}
+        silent = model.with_parameters(np.zeros(len(terms)))
+        assert silent.read_signals() == set()
+        unsure = replace(silent, parameter_std=np.eye(len(terms))[0])
+        assert unsure.read_signals() == set(model.expressions[0].signals)
     assert {structured(name, np.ones(len(structure_terms(name))), FORCES).reads_air for name in STRUCTURES} == {
         True,
         False,
