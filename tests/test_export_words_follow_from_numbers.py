@@ -58,10 +58,13 @@ def test_times_are_counted_with_their_fractions():
 
 
 @given(st.floats(1e6, 4e9), st.booleans())
-def test_times_since_1970_are_dates_and_others_hours(time_s: float, late: bool) -> None:
+def test_times_since_1970_are_dates_and_others_those_of_a_clock(time_s: float, late: bool) -> None:
     time_s = time_s if late else time_s / 1e3
     told = words.when(time_s)
     assert bool(re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", told)) == (time_s >= words.SINCE_1970_S)
+    if time_s < words.SINCE_1970_S:
+        hours, minutes, seconds = map(int, told.split(":"))
+        assert abs(3600 * hours + 60 * minutes + seconds - time_s) <= 0.5
 
 
 @given(numbers, numbers)

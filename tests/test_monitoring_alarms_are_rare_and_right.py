@@ -25,6 +25,7 @@ from expdesign.monitoring import (
     Step,
     calibrate,
     calls_of,
+    cusum,
     restored_calibration,
     restored_state,
     saved,
@@ -125,6 +126,24 @@ def test_stretches_unlike_the_reference_are_not_judged(calibration: Calibration)
     state, alarms, _ = watched(calibration, grams_from(columns), limit)
     assert state.left_out_s == 30 * STRETCH_S
     assert not alarms
+
+
+def test_what_is_over_before_it_is_told_from_weather_is_no_change(
+    calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a squall: the sum falls from its peak, and one of a change that lasts does not."""
+    change, limit = np.array([0.9, 0.0, 0.0, 0.0]), threshold(CHANGES, 1e4)
+    lasting = [drawn_columns(60, seed=seed, change=change, since=30) for seed in range(21, 29)]
+    over = [columns.copy() for columns in lasting]
+    for columns in over:
+        columns[35:, :, -1] -= columns[35:, :, :CHANGES] @ change
+
+    def alarms(voyages: list[np.ndarray]) -> int:
+        return sum(bool(watched(calibration, grams_from(columns), limit)[1]) for columns in voyages)
+
+    assert (alarms(lasting), alarms(over)) == (8, 0)
+    monkeypatch.setattr(cusum, "FALLEN", np.inf)
+    assert alarms(over) >= 4
 
 
 @pytest.mark.thorough

@@ -40,17 +40,17 @@ def duration(seconds: float) -> str:
 
 
 def hours(time_s: float) -> str:
-    """A time in words."""
+    """A time in words, as `duration` below a hundred hours, then in days or years."""
     days = time_s / HOUR / 24.0
     if time_s < 100 * HOUR:
-        return f"{time_s / HOUR:.2f} h"
+        return duration(time_s)
     return f"{days:.1f} d" if days < 1000.0 else f"{days / 365.25:.3g} years"
 
 
 def when(time_s: float) -> str:
-    """A time of the data's clock: since its beginning, or the date where it counts from 1970."""
+    """A time of the data's clock: h:mm:ss since its beginning, or the date where it counts from 1970."""
     if time_s < SINCE_1970_S:
-        return hours(time_s)
+        return clock(time_s)
     return f"{datetime.fromtimestamp(time_s, tz=UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
