@@ -284,6 +284,21 @@ def test_from_a_wide_prior_by_a_first_trial_to_the_whole_plan(
     assert json.loads(Path("rest/plan.json").read_text("utf-8"))["verified"] is True
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["azimuth", "twin-screw", "asv"])
+def test_a_wide_prior_of_each_kind_has_a_verified_trial(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """31 to 61 s of processor each."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "wide", "--kind", kind, "--quiet"]) == 0
+    model = load_vessel("wide/vessel.toml").model
+    stated = dict(zip(model.names, (0.4 * np.abs(model.parameters)).tolist(), strict=True))
+    _with_values(Path("wide/vessel.toml"), "parameter_std", stated)
+    assert main(["run", "wide/scenario.toml", "--out", "first", "--quiet"]) == 0
+    assert json.loads(Path("first/plan.json").read_text("utf-8"))["verified"] is True
+
+
 def test_the_note_on_a_first_trial_counts_the_runs_that_it_slows(tmp_path: Path) -> None:
     asked = load_scenario(new(tmp_path / "trial", kind="asv").files[0]).dictionary
     slower = [
