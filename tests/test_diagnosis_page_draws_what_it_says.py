@@ -15,7 +15,7 @@ from expdesign.diagnosis.vessel_file.reading import extended_model, public_name
 from expdesign.export import diagnosis_figures as diagnosis_figures
 from expdesign.export.diagnosis_figures import has_sign, is_force, suspected, suspected_force
 from expdesign.export.diagnosis_page import diagnosis_document
-from expdesign.export.diagnosis_results import diagnosis_json
+from expdesign.export.diagnosis_results import diagnosis_json, extended_vessel
 from expdesign.export.pages import document_html
 
 ALONE = ("u", "v", "r", "n1", "a1", "n2", "a2", "u_q", "v_q", "heading", "time", "run")
@@ -32,6 +32,14 @@ def finding(keys: tuple[str, ...], cause: str = "parameters", estimates: tuple[E
         error_reductions=(), gain=1.0, gain_interval=(0.5, 1.5), not_distinguishable_from=(),
         would_tell_apart=None, explanation="made up", likelihood_gain=30.0, keys=keys,
     )  # fmt: skip
+
+
+def test_a_model_that_was_not_extended_is_not_called_so(clean):
+    """On the page and in the vessel file; a diagnosis with something to write says the opposite."""
+    extended = replace(clean, after=replace(clean.before))
+    for found, begin, there in ((clean, "# Kept as it was by a diagnosis", True), (extended, "# Extended", False)):
+        assert extended_vessel(found, command="").startswith(begin)
+        assert ("Nothing was found to extend the model by" in document_html(diagnosis_document(found))) is there
 
 
 def test_slopes_of_straight_errors_are_exact_whatever_is_missing():

@@ -187,6 +187,12 @@ def diagnosis_notes(found: Diagnosis) -> tuple[str, ...]:
 
 def _accuracy(found: Diagnosis) -> Section:
     astray = has_diverged(found.before) or has_diverged(found.after)
+    held_out = (
+        "Nothing was found to extend the model by, so both columns are of the vessel file."
+        if found.after is found.before
+        else "This table uses the data that the extended model was fitted to. The gains below use "
+        f"{found.unit} held out of the fit."
+    )
     return section(
         "Accuracy of the simulation",
         f"{ABOUT_FITS} {ASTRAY}" if astray else ABOUT_FITS,
@@ -196,8 +202,7 @@ def _accuracy(found: Diagnosis) -> Section:
             rows=accuracy_rows(found),
         ),
         "Each run is simulated from its first measured state with the measured inputs. Measurement noise counts as "
-        "misfit. This table uses the data that the extended model was fitted to. The gains below use "
-        f"{found.unit} held out of the fit.",
+        f"misfit. {held_out}",
         Figure(draw=partial(growth_figure, found), caption=GROWTH),
     )
 
