@@ -65,7 +65,7 @@ def test_report_cards_files_and_terminal_agree_on_the_verdict(tmp_path, share: f
     head = html.fromstring(report).find_class("verdict")[0]
     assert ("yes" in head.get("class")) is within
     assert ("verified" in head.text_content()) is within
-    for told in (report, cards, json.dumps(file, ensure_ascii=False), " ".join(document.notes)):
+    for told in (report, cards, json.dumps(file, ensure_ascii=False), json.dumps(document.facts, ensure_ascii=False)):
         plain = " ".join(told.split())
         assert (SAID.format(100 * share) in plain) is not within
     rule = f"than the whole planned trial, {words.duration(plan.day.planned_s)}."  # as drawn trials are aborted
