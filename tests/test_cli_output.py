@@ -358,3 +358,8 @@ def test_the_module_is_the_console_script() -> None:
 def test_what_nobody_knows_has_no_unit() -> None:
     rows = dict(fact_rows({"day_median_s": float("nan"), "bound_s": None, "day_s": 60.0}))
     assert rows == {"day median": "-", "bound": "-", "day": "60 s"}
+
+
+def test_a_fact_in_hours_is_told_in_hours_and_minutes() -> None:
+    rows = dict(fact_rows({"judged_h": 1.9792, "left_out_h": float("nan")}))
+    assert rows == {"judged": "1\N{NO-BREAK SPACE}h\N{NO-BREAK SPACE}59\N{NO-BREAK SPACE}min", "left out": "-"}

@@ -14,6 +14,8 @@ from typing import Literal
 
 from markupsafe import Markup
 
+from expdesign.export.words import HOUR, hours
+
 UNITS = {
     "s": "s",
     "m": "m",
@@ -210,6 +212,8 @@ def fact_rows(facts: Mapping[str, object], prefix: str = "") -> Iterator[tuple[s
         label = f"{prefix}{(stem if unit else key).replace('_', ' ')}"
         if isinstance(value, Mapping):
             yield from fact_rows(value, f"{label}, ")
+        elif unit == "h" and isinstance(value, float) and math.isfinite(value):
+            yield label, hours(value * HOUR)
         else:
             text = fact_text(value)
             yield label, text if text == "-" else f"{text} {unit}".rstrip()

@@ -312,7 +312,9 @@ def monitor_rows(content: MonitorContent) -> list[tuple[str, ...]]:
             (
                 change.words,
                 change.in_words(change.size).lstrip("+-"),
-                hours(delay_s(content, number)) if watched else "not watched: the reference has too little information",
+                hours(60.0 * np.ceil(delay_s(content, number) / 60.0))
+                if watched
+                else "not watched: the reference has too little information",
                 since,
                 ", ".join(alike(content, number)) if watched else "",
             )

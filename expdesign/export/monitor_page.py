@@ -192,7 +192,7 @@ def monitor_document(content: MonitorContent) -> Document:
         title=content.vessel,
         name=f"{content.vessel} in operation",
         about=f"Judged in stretches of {content.calibration.stretch_s:g} s: {hours(state.judged_s)} judged, and "
-        f"{hours(state.left_out_s)} not, as they are not like the reference. Reference: "
+        f"{hours(state.left_out_s) if state.left_out_s else 'none'} left out as unlike the reference. Reference: "
         f"{content.calibration.stretches} stretches.",
         findings=sentences(content),
         facts={"judged_h": state.judged_s / HOUR, "alarms": alarms},
