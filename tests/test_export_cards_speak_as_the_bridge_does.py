@@ -58,10 +58,13 @@ def test_a_zigzag_switched_by_heading_is_ordered_by_heading(helm_rad: float, sid
     assert "by heading" not in told["turning_circle_helm"]
 
 
-def test_names_show_angles_in_degrees_and_nothing_else_changes() -> None:
-    settings = {"helm_rad": 0.34906585039886592, "duration_s": 60.0, "heading_rad": 0.2}
+def test_names_show_settings_as_people_say_them_and_nothing_else_changes() -> None:
+    settings = {"helm_rad": -0.34906585039886592, "duration_s": 60.0, "heading_rad": 0.2}
     for name, said in (
-        ("turn-helm-0.349065850399-duration-60", "turn-helm-20\N{DEGREE SIGN}-duration-60"),
+        (
+            "turn-helm--0.349065850399-duration-60",
+            f"turn, helm {words.MINUS}20\N{DEGREE SIGN}, duration 60{words.NB}s",
+        ),
         ("turn-0.2", "turn-0.2"),
     ):
         assert words.names([(name, "turn", settings)]) == {name: said}
@@ -69,8 +72,8 @@ def test_names_show_angles_in_degrees_and_nothing_else_changes() -> None:
 
 def test_names_show_speeds_in_knots_and_two_names_are_never_shown_alike() -> None:
     of = [(f"circle-speed-{speed:.12g}", "circle", {"speed_mps": speed}) for speed in (5.0, 5.001, 2.5)]
-    assert words.names(of[:1]) == {"circle-speed-5": f"circle-speed-9.7{words.NB}kn"}
-    assert list(words.names(of).values()) == ["circle-speed-5", "circle-speed-5.001", f"circle-speed-4.9{words.NB}kn"]
+    assert words.names(of[:1]) == {"circle-speed-5": f"circle, speed 9.7{words.NB}kn"}
+    assert list(words.names(of).values()) == ["circle-speed-5", "circle-speed-5.001", f"circle, speed 4.9{words.NB}kn"]
 
 
 def test_what_a_search_added_is_called_by_its_family_and_a_letter() -> None:

@@ -177,6 +177,7 @@ IN_NAMES = {
     "rad": ("\N{DEGREE SIGN}", math.degrees(1.0)),
     "radps": ("\N{DEGREE SIGN}/s", math.degrees(1.0)),
     "mps": (f"{NB}kn", KNOTS_PER_MPS),
+    "s": (f"{NB}s", 1.0),
 }
 """Ending of a setting's name -> unit that people read in the name of a manoeuvre, and factor to it."""
 ADDED = re.compile(r"added-\d+-.+")
@@ -192,7 +193,7 @@ def names(primitives: Iterable[tuple[str, str, Mapping[str, float]]]) -> dict[st
     """Name in the files -> name as people say it; the same where two would be said alike.
 
     What a search added is called by its family and a letter, such as Zig-zag B; other names have angles in degrees and
-    speeds in knots, such as circle-speed-4 kn-helm-35\N{DEGREE SIGN}.
+    speeds in knots, such as circle, speed 4 kn, helm 35\N{DEGREE SIGN}.
 
     Args:
         primitives: name, family and settings of each, in order.
@@ -222,5 +223,5 @@ def _in_degrees_and_knots(name: str, settings: Mapping[str, float]) -> str:
         stem, number_text = stem.replace("_", "-"), f"{value:.12g}"
         if unit and f"-{stem}-{number_text}-" in f"{name}-":
             size = number(value * factor, 1) if ending == "mps" else significant(value * factor)
-            name = f"{name}-".replace(f"-{stem}-{number_text}-", f"-{stem}-{size}{unit}-")[:-1]
+            name = f"{name}-".replace(f"-{stem}-{number_text}-", f", {stem.replace('-', ' ')} {size}{unit}-")[:-1]
     return name

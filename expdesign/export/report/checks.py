@@ -30,8 +30,10 @@ def procedure_sentences(plan: Plan) -> list[str]:
         "Run: give the orders on the card without correcting for the motion of the ship.",
         "After the run: return to the planned leg and follow it under control. If the leg is too short to correct the "
         "deviation, a ship that keeps station sails parallel to it, up to half of the start gate's distance beside it. "
-        "If that is not enough, or the path is not in safe water, make a go-around at once.",
-        f"Start gate: begin the next run if {within}.",
+        "If that is not enough, or the path is not in safe water, make a go-around at once. If there is room for none, "
+        "but the leg is clear, follow the leg.",
+        f"Start gate: begin the next run if {within}. At a start from rest, stop on the planned heading. A ship that "
+        "thrusters hold there waits until she is well within; any other begins as soon as she is within.",
         "Go-around, if not: take the shortest path in safe water to a point behind the start. Approach the start again "
         f"on the planned heading at the planned speed. After {words.counted(risk.go_arounds, 'go-around')}, abort the "
         f"trial; also where one start takes longer to reach than the whole planned trial, {words.duration(planned_s)}.",
