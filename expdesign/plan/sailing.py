@@ -29,6 +29,7 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
 
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedStretch:
     """A leg with its commands (k, m) and states (k + 1, 6), and what found its path."""
@@ -100,6 +101,7 @@ class Timeline:
 
 
 TRIES_FROM_A_RUN = 2  # runs tried after one before it is placed elsewhere itself
+RUN_LEG_S = 12.0  # work budget of a leg to a run [s]: another place is worth more than a long search for it
 FAILURE_S = 2.0  # least cost of a failed placement [s]
 CLOCK_BUDGETS = 5.0  # time budgets by the clock after which a search that is stuck ends, whatever its counted work
 
@@ -401,6 +403,7 @@ class _Voyage:
         self, start: Array, start_inputs: Array, given: Array, end: Array, end_inputs: Array, *, stretches: int
     ) -> LegTask:
         """A leg to be found so many stretches after those sailed."""
+        home = np.array_equal(end, self._stop[0])
         return LegTask(
             start=start,
             end=end,
@@ -408,7 +411,7 @@ class _Voyage:
             end_inputs=end_inputs,
             seed=self.problem.seed + len(self.line.stretches) + stretches + 1,
             before=self.water.remembered(given),
-            budget=WorkBudget(most_s=LEG_S),
+            budget=WorkBudget(most_s=LEG_S if home else RUN_LEG_S),
         )
 
     @property
