@@ -29,7 +29,6 @@ from expdesign.signals import Commands, Trajectory
 from expdesign.values import Array
 
 
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SailedStretch:
     """A leg with its commands (k, m) and states (k + 1, 6), and what found its path."""
