@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from expdesign.plan.legs import LegTask
-from expdesign.plan.verify import FINE_SUBSTEPS
+from expdesign.plan.resimulation import FINE_SUBSTEPS
 from expdesign.signals import Commands
 from expdesign.simulation import CALM, delivered_at_samples, simulate
 from expdesign.vessel import Response

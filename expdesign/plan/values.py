@@ -175,6 +175,8 @@ class Verification:
     reproduction_error_m: float  # largest distance between the track and the re-simulated commands [m]
     limit_excess: float  # largest violation of an actuator limit or rate, relative to its range
     problems: tuple[str, ...]  # one sentence for each failed check; empty when the plan passes
+    # after which the re-simulation begins anew on the track, as small errors grow without bound; None where it does not
+    stretch_s: float | None = None
     # largest roll angle of the re-simulated commands, in still water; None without [roll]
     heel_max_rad: float | None = None
 

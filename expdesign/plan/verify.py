@@ -20,16 +20,14 @@ from expdesign.errors import NotInformative
 from expdesign.information import moments, regressor_rows
 from expdesign.information.disturbed import beside_current, bordered_by_current, current_rows
 from expdesign.information.expected import TrialPart, expected_covariance
+from expdesign.plan.resimulation import resimulated
 from expdesign.plan.values import Leg, SailedTrial, UnderWay, Verification
 from expdesign.sea_area import SeaArea
 from expdesign.signals import AUXILIARY, Commands, Trajectory
-from expdesign.simulation import Environment, delivered, simulate, to_body
-from expdesign.simulation.run import SUBSTEPS
+from expdesign.simulation import Environment, delivered, to_body
 from expdesign.values import Array
 from expdesign.vessel import NUMPY, Vessel
 from expdesign.vessel.vessel import hull_polygons
-
-FINE_SUBSTEPS = 10 * SUBSTEPS  # integrator steps per sample of the re-simulation: ten times as many as in planning
 
 ENTRY_TOLERANCE = 0.02  # largest deviation of a run's entry velocity, relative to the vessel's speed in the plan
 # share by which legs may exceed their stated speed, or that of their faster end: plans limit it at some samples
@@ -66,14 +64,8 @@ def verify_plan(
     """
     commands, trajectory, legs = sailed.commands, sailed.trajectory, sailed.legs
     misfit = _legs_problems(commands, legs, primitives)
-    again = simulate(
-        vessel,
-        commands,
-        pose=trajectory.pose[0],
-        velocity=trajectory.velocity[0],
-        environment=environment,
-        substeps=FINE_SUBSTEPS,
-    )
+    anew = resimulated(vessel, environment, sailed, transit_mps=transit_mps)
+    again = anew.motion
     clearance = np.minimum(*(hull_clearance(area, track, vessel.hull_b) for track in (trajectory, again)))
     worst = int(np.argmin(clearance))
     standing = np.zeros(len(vessel.limits)) if under_way is None else under_way.inputs
@@ -81,7 +73,7 @@ def verify_plan(
     begin = None if under_way is None else under_way.velocity
     heel = _heel(again)
     problems = [
-        *_motion_problems(vessel, trajectory, again),
+        *anew.problems(vessel.length_m),
         *_end_problems(vessel, environment, trajectory, (start, goal), begin),
         *_end_problems(vessel, environment, again, (start, goal), begin, "re-simulated "),
         *_if(
@@ -102,7 +94,8 @@ def verify_plan(
     return Verification(
         clearance_min_m=float(clearance[worst]),
         clearance_time_s=worst * commands.sample_time_s,
-        reproduction_error_m=float(np.hypot(*(again.pose - trajectory.pose)[:, :2].T).max()),
+        reproduction_error_m=float(anew.off_m.max()),
+        stretch_s=None if anew.stretch is None else anew.stretch * commands.sample_time_s,
         limit_excess=excess,
         problems=tuple(problems),
         heel_max_rad=None if heel is None else float(heel.max()),
@@ -162,25 +155,6 @@ def _pieces(line: shapely.Geometry) -> np.ndarray:
     """A closed boundary as its segments."""
     points = shapely.get_coordinates(line)
     return np.asarray(shapely.linestrings(np.stack([points[:-1], points[1:]], axis=1)))
-
-
-def _motion_problems(vessel: Vessel, trajectory: Trajectory, again: Trajectory) -> list[str]:
-    """Where the track is not the motion that the commands give."""
-    apart, speed = np.abs(again.pose - trajectory.pose), np.abs(again.velocity).max(axis=0) + 1e-9
-    found = (
-        ("m", np.hypot(*apart[:, :2].T), vessel.length_m / 30),
-        ("rad of heading", apart[:, 2], 0.02),
-        ("of the largest speed", (np.abs(again.velocity - trajectory.velocity) / speed).max(axis=1), 0.02),
-    )
-    problems = []
-    for what, off, allowed in found:
-        worst = int(np.argmax(off))
-        if not off[worst] <= allowed:
-            problems.append(
-                f"the re-simulated commands are {off[worst]:.3g} {what} off the track at "
-                f"{worst * trajectory.sample_time_s:.0f} s, allowed {allowed:.3g}"
-            )
-    return problems
 
 
 def _end_problems(

@@ -181,6 +181,7 @@ def plan_json(
             "verification": {
                 "clearance_time_s": check.clearance_time_s,
                 "reproduction_error_m": check.reproduction_error_m,
+                **({} if check.stretch_s is None else {"stretch_s": check.stretch_s}),
                 "limit_excess": check.limit_excess,
                 "problems": list(check.problems),
             },

@@ -127,7 +127,8 @@ def checks(content: ReportContent) -> list[Check]:
             passed=found.clearance_min_m >= content.clearance_m,
         ),
         Check(
-            what="Largest distance between the planned track and the independent simulation",
+            what="Largest distance between the planned track and the independent simulation"
+            + (f", begun anew every {words.duration(found.stretch_s)}" if found.stretch_s else ""),
             found="less than 1 mm" if found.reproduction_error_m < 1e-3 else words.distance(found.reproduction_error_m),
             required="",
             passed=None,

@@ -122,6 +122,18 @@ def trial_remarks(case: Scenario, plan: Plan) -> tuple[str, ...]:
         *leg_remarks(case),
         *(actuation_remarks(case.vessel, sailed, "run of this plan") if sailed else ()),
         *speed_remarks(case.vessel, [plan.trajectory], "run or leg of this plan"),
+        *_unstable_remarks(plan),
+    )
+
+
+def _unstable_remarks(plan: Plan) -> tuple[str, ...]:
+    """What a ship whose commands alone do not lead along the track asks for."""
+    stretch_s = plan.verification.stretch_s
+    if stretch_s is None:
+        return ()
+    return (
+        "the ship is unstable on her course, so that small errors grow: commands of legs alone do not lead along the "
+        f"track, she has to be steered; they are verified over stretches of {stretch_s:.0f} s, each begun on the track",
     )
 
 
