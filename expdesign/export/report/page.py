@@ -124,7 +124,7 @@ def summary(content: ReportContent) -> list[str]:
         *([day] if (day := day_sentence(plan)) else []),
         verdict,
         *depths,
-        *([f"Not used, or taken as certain: {'; '.join(content.remarks)}."] if content.remarks else []),
+        *([f"Worth knowing: {'; '.join(content.remarks)}."] if content.remarks else []),
         _design_sentence(content),
     ]
 

@@ -11,13 +11,7 @@ import shapely
 from expdesign.conventions import whole_turns
 from expdesign.plan.control import CATCH_UP, TRACK_LEAD, Helmsman, Reference, lengths
 from expdesign.plan.legs import LegWater, nearest_turns
-from expdesign.plan.monte_carlo.procedure import (
-    ABORT_CAUSES,
-    Tolerances,
-    at_rest,
-    planned_stretch,
-    run_up,
-)
+from expdesign.plan.monte_carlo.procedure import ABORT_CAUSES, Tolerances, at_rest, planned_stretch, run_up
 from expdesign.plan.monte_carlo.return_paths import (
     GoAroundPaths,
     PathFollowers,
