@@ -1,5 +1,7 @@
 """Where too many drawn trials leave the water, the planner replans with more room, or names the place in its refusal.
 
+Where too many are aborted, it plans once more with more room for the run that they could not begin.
+
 The strait is as wide as the ship needs where she points along it. In an unknown current she has to point
 aside to go straight, and her bow comes nearer to the rocks than a plan can tell.
 """
@@ -117,3 +119,35 @@ def test_where_runs_have_the_same_room_the_confidence_named_accepts_the_first_pl
     assert named is not None, text
     plan_trial(replace(case, settings=replace(case.settings, confidence=float(named[1]))))
     assert attempts[-1].left == attempts[0].left
+
+
+@pytest.mark.parametrize(
+    ("shares", "worst", "rooms", "taken"),
+    [
+        ((0.3, 0.02), 0, [1.0, solve.WIDENING], 0.02),  # of the first plan, of the second
+        ((0.3, 0.4), 0, [1.0, solve.WIDENING], 0.3),
+        ((0.05,), 0, [1.0], 0.05),  # few enough
+        ((0.3,), 2, [1.0], 0.3),  # the goal has no room to be widened
+    ],
+)
+def test_where_too_many_trials_are_aborted_their_run_gets_more_room_once(monkeypatch, shares, worst, rooms, taken):
+    rooms_m, risks, sail_all, drawn_risk = [], list(shares), solve.sail_all, solve.drawn_risk
+
+    def sailed(problem, room, *others, **known):
+        rooms_m.append(float(np.mean(room.space.footprints[0].room_m)))
+        return sail_all(problem, room, *others, **known)
+
+    def drawn(*others, **known):
+        risk, trials = drawn_risk(*others, **known)
+        aborted = np.zeros_like(trials.aborted)
+        aborted[worst, :10] = True
+        return replace(risk, aborted=risks.pop(0), reasons=("somewhere",)), replace(trials, aborted=aborted)
+
+    monkeypatch.setattr(solve, "sail_all", sailed)
+    monkeypatch.setattr(solve, "drawn_risk", drawn)
+    monkeypatch.setattr(solve, "_plan", lambda problem, sailed, **rest: SimpleNamespace(**rest))
+    monkeypatch.setattr(solve, "_bound_s", lambda *_: 0.0)
+    calm = replace(problem((0.0, 60.0)), environment=Environment())
+    assert plan_trial(calm).risk.aborted == taken
+    np.testing.assert_allclose(np.array(rooms_m) / rooms_m[0], rooms)
+    assert not risks

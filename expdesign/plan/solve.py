@@ -117,10 +117,7 @@ def with_more_room(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: t
     """
     worst, space = legs[worst_leg(trials)], room.space
     if worst.kind == "primitive":
-        widened = tuple(
-            replace(run, room_m=WIDENING * run.room_m) if run.name == worst.name else run for run in space.footprints
-        )
-        return replace(room, space=replace(space, footprints=widened))
+        return _wider(room, worst.name)
     clearance_m = room.water.clearance_m + (WIDENING - 1.0) * problem.vessel.length_m
     water = replace(room.water, clearance_m=clearance_m)
     try:
@@ -128,6 +125,13 @@ def with_more_room(problem: PlanProblem, room: PlanRoom, trials: Trials, legs: t
     except NoPlan:
         raise NoPlan("there is no path to the goal with more clearance") from None
     return PlanRoom(water=water, space=replace(found, footprints=space.footprints, tried=space.tried))
+
+
+def _wider(room: PlanRoom, name: str) -> PlanRoom:
+    """More room for the runs of a name."""
+    runs = room.space.footprints
+    widened = tuple(replace(run, room_m=WIDENING * run.room_m) if run.name == name else run for run in runs)
+    return replace(room, space=replace(room.space, footprints=widened))
 
 
 def replanning_progress(progress: Progress, attempt: int) -> Progress:
@@ -207,7 +211,10 @@ def _planned(whole: PlanProblem, area: SeaArea, ship: Capability, progress: Prog
 
 
 def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
-    """A draft's plan, verified with all of the water; made anew with more room where drawn trials leave it."""
+    """A draft's plan, verified with all of the water; made anew with more room where drawn trials leave it.
+
+    Where too many are aborted, it is made anew once, and the plan with fewer of these is taken.
+    """
     problem, water, room = replace(whole, area=draft.area), draft.water, draft.room
     if problem.settings.draft:
         phases_of(problem, room.space.planner, progress).trials("verifying", 0.0)
@@ -230,7 +237,9 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         verification = next(checks)
         failed = failed_chance_constraint(risk, trials, sailed.legs, problem.area, confidence=confidence)
         if not failed:
-            return _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
+            plan = _plan(whole, sailed, verification=verification, risk=risk, bound_s=next(checks))
+            other = None if attempt or not risk.note else _begun_by_more(whole, draft, trials, budget, progress)
+            return plan if other is None or _aborted(other) >= _aborted(plan) else other
         budget.sailed(trials.samples_sailed)
         spent_s = budget.spent_s - before_s
         made.append(Refused(sailed=sailed, risk=risk, trials=trials, failed=failed, water=room.water, spent_s=spent_s))
@@ -241,6 +250,34 @@ def _checked(whole: PlanProblem, draft: Draft, progress: Progress) -> Plan:
         except NoPlan as error:
             raise too_risky(problem, draft.room, made, f"; {error.obstacle}") from None
     raise too_risky(problem, draft.room, made)
+
+
+def _begun_by_more(
+    whole: PlanProblem, draft: Draft, trials: Trials, budget: WorkBudget, progress: Progress
+) -> Plan | None:
+    """A draft's plan made anew with more room for the run before which most trials are aborted, or None.
+
+    The more room a run has, the farther from its planned start it may begin.
+    """
+    worst = draft.sailed.legs[int(trials.aborted.mean(axis=1).argmax())].name
+    if worst not in whole.repeats:  # the goal
+        return None
+    problem, water, reported = replace(whole, area=draft.area), draft.water, replanning_progress(progress, 1)
+    budget.sailed(trials.samples_sailed)
+    try:
+        sailed = sail_all(problem, _wider(draft.room, worst), reported, stated=water, budget=budget)
+        verification = verified(whole, water, sailed)
+    except NoPlan:
+        return None
+    risk, again = drawn_risk(problem, water, sailed, attempt=1, progress=reported)
+    if failed_chance_constraint(risk, again, sailed.legs, problem.area, confidence=problem.settings.confidence):
+        return None
+    return _plan(whole, sailed, verification=verification, risk=risk, bound_s=_bound_s(whole, water, sailed))
+
+
+def _aborted(plan: Plan) -> float:
+    """Share of drawn trials that are aborted; none where none were drawn."""
+    return 0.0 if plan.risk is None else plan.risk.aborted
 
 
 def _budget(problem: PlanProblem) -> WorkBudget:
