@@ -276,7 +276,8 @@ def test_runge_kutta_gives_the_parameters_of_the_motion_and_euler_those_of_its_m
 def test_thinner_samples_on_the_way_do_not_change_where_the_search_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     data = trials(TRUE)
     found = estimate(data, NOMINAL, method="oe")
-    monkeypatch.setattr(minimise, "TUNING", replace(minimise.TUNING, rough_samples=300, rough_step_s=3.0))
+    monkeypatch.setattr(minimise, "ROUGH_SAMPLES", 300)
+    monkeypatch.setattr(minimise, "ROUGH_STEP_S", 3.0)
     thinned = []
     build = minimise.build_problem
     monkeypatch.setattr(minimise, "build_problem", lambda *args: thinned.append(args[3].every) or build(*args))
