@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from expdesign.plan.resimulation import Resimulation, resimulated
+from expdesign.plan.resimulation import OFF_RAD, Resimulation, _in_stretches, resimulated
 from expdesign.plan.values import Leg, SailedTrial
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import CALM, integrate_motion, simulate
@@ -109,3 +109,19 @@ def test_errors_that_grow_slowly_add_up_from_stretch_to_stretch(thrust):
     assert found.off_m[-1] > allowed
     assert found.problems(vessel.length_m)
     assert found.off_m[45] < allowed
+
+
+@pytest.mark.parametrize("angle_rad", [1e-4, -1e-4])
+def test_a_course_that_drifts_slowly_is_found_by_where_it_leads(angle_rad):
+    """Headings and places are within what is allowed in every stretch, and headings in their sum."""
+    vessel = ship(unstable=False)
+    trial = steered(vessel)
+    values = trial.commands.values.copy()
+    values[:, [name.startswith("a") for name in vessel.model.inputs]] += angle_rad
+    track = simulate(vessel, replace(trial.commands, values=values), velocity=START)
+    found = anew(vessel, replace(trial, trajectory=track))
+    apart = Resimulation(
+        track=track, motion=_in_stretches(vessel, CALM, replace(trial, trajectory=track), 45), stretch=45
+    )
+    assert apart.off_rad.max() < OFF_RAD
+    assert found.problems(vessel.length_m)

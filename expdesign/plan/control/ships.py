@@ -176,17 +176,12 @@ class HelmShip(Capability):
     turns: tuple[SteadyTurn, ...]  # steady turns with the engines at that order
     stopping_m: float  # distance in which the ship stops from there with the engines full astern
     run_up_m: float  # straight before each run: room to settle, and a steady approach
-    thrusters: bool = False  # whether they turn and push her in every direction at rest
+    hovers: bool = False
 
     @property
     def keeps_station(self) -> bool:
         """No: the rudder needs flow."""
         return False
-
-    @property
-    def hovers(self) -> bool:
-        """By her thrusters."""
-        return self.thrusters
 
     def path_spares_m(self, vessel: Vessel) -> tuple[float, ...]:
         """What keeps the hull clear on arcs."""
@@ -197,7 +192,7 @@ class HelmShip(Capability):
         helm = HelmController(
             vessel=vessel, approach=self.approach, turns=self.turns, transit_speed_mps=self.transit_speed_mps
         )
-        if not self.thrusters:
+        if not self.hovers:
             return helm
         hover = ForceController(vessel=vessel, answer_s=helm.answer_s, turn_rate_radps=self.turn_rate_radps)
         return HoverController(helm=helm, hover=hover)
@@ -342,7 +337,7 @@ def _helm_ship(vessel: Vessel, settings: PlanSettings, current_mps: float) -> He
         turns=turns,
         stopping_m=stopping_distance_m(vessel, transit),
         run_up_m=(SETTLING_HULLS + APPROACH_HULLS) * vessel.length_m,
-        thrusters=not needs_helm(vessel) and _turns_on_the_spot(vessel, transit, _spot_rate_radps(vessel, transit)),
+        hovers=not needs_helm(vessel) and _turns_on_the_spot(vessel, transit, _spot_rate_radps(vessel, transit)),
     )
 
 
