@@ -79,6 +79,7 @@ from expdesign.diagnosis.select import (
     leading_candidates,
     select_forward,
     suspected_tests,
+    with_honest_errors,
 )
 from expdesign.diagnosis.values import Diagnosis, ErrorReduction, Finding, Lead, Unexplained
 from expdesign.diagnosis.vessel_file import extend, extended_model
@@ -178,7 +179,7 @@ def select_causes(
     kept, held = without_harm(rest.kept, rest.held, ship, data[1])
     return Selected(
         found=found,
-        kept=kept,
+        kept=with_honest_errors(kept),
         as_stated=as_stated,
         held=held,
         re_estimated=re_estimated,

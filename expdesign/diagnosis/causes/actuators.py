@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, rounded
+from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, from_zero, rounded
 from expdesign.diagnosis.model import (
     ADVANCE_LOSS,
     ANGLE_STEMS,
@@ -59,7 +59,7 @@ def _explain_lag(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
         f"The error occurs after each change of command and decays. {key.split(':')[1].capitalize()} inputs lag behind "
-        f"their commands with a time constant of {rounded(value, std)} s."
+        f"their commands with a time constant of {from_zero(value, std)} s."
     )
 
 
@@ -79,14 +79,13 @@ def _slewing(situation: Situation) -> tuple[Candidate, ...]:
 
 def _explain_slew(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
-    if value <= 0:
-        return (
-            f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs follow them at once."
-        )
-    return (
-        f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs move at "
-        f"{rounded(1.0 / value, std / value**2)} per second, another slew rate than stated."
-    )
+    begin = f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs "
+    slowest = value + 2.0 * std
+    if not slowest > 0.0:
+        return f"{begin}follow them at once."
+    if value <= 2.0 * std:
+        return f"{begin}follow them at once, or at {1.0 / slowest:.2g} per second or more, faster than stated."
+    return f"{begin}move at {rounded(1.0 / value, std / value**2)} per second, another slew rate than stated."
 
 
 ACTUATOR_SLEW = Cause(
@@ -153,7 +152,7 @@ def _explain_delay(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     return (
         f"The error occurs for a fixed time after each change of command. The dead time of {key.split(':')[1]} inputs "
-        f"is {rounded(value, std)} s."
+        f"is {from_zero(value, std)} s."
     )
 
 

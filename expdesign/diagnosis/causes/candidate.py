@@ -84,6 +84,12 @@ def rounded(value: float, std: float) -> str:
     return f"{value:.{decimals}f} {PLUS_MINUS} {std:.{decimals}f}"
 
 
+def from_zero(value: float, std: float) -> str:
+    """A size that cannot be below zero: of one that may be zero, how large it is at most."""
+    most = value + 2.0 * std
+    return rounded(value, std) if value > 2.0 * std else f"at most {most:.2g}"
+
+
 def listed(values: Values, unit: str = "") -> str:
     """Every estimate with the last part of its key."""
     return ", ".join(f"{key.split(':')[-1]} {rounded(value, std)}{unit}" for key, (value, std) in values.items())

@@ -10,6 +10,7 @@ from expdesign.diagnosis.select.backward_elimination import (
 )
 from expdesign.diagnosis.select.fitted_candidate import FittedCandidate, Rival
 from expdesign.diagnosis.select.forward_selection import fit_nuisance, select_forward
+from expdesign.diagnosis.select.kinks import with_honest_errors
 from expdesign.diagnosis.select.score_tests import ScoreTest, candidate_disturbances, score_tests
 from expdesign.diagnosis.select.selection import (
     Selection,
