@@ -90,8 +90,10 @@ def test_a_size_that_may_be_zero_is_told_as_a_limit():
     assert from_zero(0.1, 0.2) == "at most 0.5"
     assert from_zero(1.0, 0.2) == "1.00 \N{PLUS-MINUS SIGN} 0.20"
     slew = next(cause for cause in CAUSES if cause.name == "actuator_slew")
-    words = [slew.explain({"slew:rudder": pair}, None) for pair in ((0.0, 0.0), (0.0, 0.5), (2.0, 0.1))]  # type: ignore[arg-type]
+    pairs = ((0.0, 0.0), (0.0, 0.5), (2.0, 0.1), (0.0, np.inf))
+    words = [slew.explain({"slew:rudder": pair}, None) for pair in pairs]  # type: ignore[arg-type]
     assert [text.partition("inputs ")[2].partition(",")[0].rstrip(".") for text in words] == [
         "follow them at once", "follow them at once", "move at 0.500 \N{PLUS-MINUS SIGN} 0.025 per second",
+        "follow them at once",
     ]  # fmt: skip
     assert "1 per second or more" in words[1]

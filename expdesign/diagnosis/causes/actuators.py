@@ -6,7 +6,16 @@ import math
 
 import numpy as np
 
-from expdesign.diagnosis.causes.candidate import Candidate, Cause, Situation, Values, first, from_zero, rounded
+from expdesign.diagnosis.causes.candidate import (
+    Candidate,
+    Cause,
+    Situation,
+    Values,
+    first,
+    from_zero,
+    may_be_zero,
+    rounded,
+)
 from expdesign.diagnosis.model import (
     ADVANCE_LOSS,
     ANGLE_STEMS,
@@ -80,11 +89,11 @@ def _slewing(situation: Situation) -> tuple[Candidate, ...]:
 def _explain_slew(values: Values, _ship: ExtendedModel) -> str:
     key, value, std = first(values)
     begin = f"The error occurs during changes of command. {key.split(':')[1].capitalize()} inputs "
-    slowest = value + 2.0 * std
-    if not slowest > 0.0:
+    if may_be_zero(value, std) and value + 2.0 * std > 0.0:
+        least = 1.0 / (value + 2.0 * std)
+        return f"{begin}follow them at once, or at {least:.2g} per second or more, faster than stated."
+    if value <= 0.0:
         return f"{begin}follow them at once."
-    if value <= 2.0 * std:
-        return f"{begin}follow them at once, or at {1.0 / slowest:.2g} per second or more, faster than stated."
     return f"{begin}move at {rounded(1.0 / value, std / value**2)} per second, another slew rate than stated."
 
 

@@ -86,8 +86,12 @@ def rounded(value: float, std: float) -> str:
 
 def from_zero(value: float, std: float) -> str:
     """A size that cannot be below zero: of one that may be zero, how large it is at most."""
-    most = value + 2.0 * std
-    return rounded(value, std) if value > 2.0 * std else f"at most {most:.2g}"
+    return f"at most {value + 2.0 * std:.2g}" if may_be_zero(value, std) else rounded(value, std)
+
+
+def may_be_zero(value: float, std: float) -> bool:
+    """Whether two standard errors reach zero."""
+    return math.isfinite(std) and value <= 2.0 * std
 
 
 def listed(values: Values, unit: str = "") -> str:
