@@ -16,6 +16,7 @@ from expdesign.diagnosis.fit.gauss_newton import fit
 from expdesign.diagnosis.motion.simulation import initial_states
 from expdesign.diagnosis.select.kinks import FROM_ZERO, with_profiled_error
 from expdesign.diagnosis.vessel_file.reading import extended_model
+from expdesign.diagnosis.vessel_file.writing import extend
 from expdesign.vessel.quantities import EFFECTS
 
 WEATHER = sea.Weather(current_std=0.01, wind_std=0.2)
@@ -97,3 +98,20 @@ def test_a_size_that_may_be_zero_is_told_as_a_limit():
         "follow them at once",
     ]  # fmt: skip
     assert "1 per second or more" in words[1]
+
+
+@pytest.mark.parametrize("slew", [0.0, 1e-6, 2.0])
+def test_a_rudder_found_to_follow_at_once_is_written_without_a_rate(slew):
+    """Nor with the standard deviation of one: a vessel refuses that."""
+    ship = vessel_of("coaster")
+    actuators = tuple(
+        replace(one, responses=tuple(replace(own, rate=0.05) for own in one.responses)) if one.kind == "rudder" else one
+        for one in ship.actuators
+    )
+    stated = replace(ship, model=replace(ship.model, actuators=actuators), std={"rudder1_rate": 0.01})
+    record = hidden_record("coaster", seed=1, batches=1, samples=20)
+    found = extended_model(stated, record).with_effects({"slew:rudder": slew})
+    written, _ = extend(stated, found, {"slew:rudder": 0.4})
+    rate = written.actuators[1].responses[0].rate
+    assert rate == (0.5 if slew > 1.0 else np.inf)
+    assert written.std == ({"rudder1_rate": pytest.approx(0.4 / slew**2)} if slew > 1.0 else {})

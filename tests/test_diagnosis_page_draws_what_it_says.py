@@ -39,7 +39,9 @@ def test_a_model_that_was_not_extended_is_not_called_so(clean):
     extended = replace(clean, after=replace(clean.before))
     for found, begin, there in ((clean, "# Kept as it was by a diagnosis", True), (extended, "# Extended", False)):
         assert extended_vessel(found, command="").startswith(begin)
-        assert ("Nothing was found to extend the model by" in document_html(diagnosis_document(found))) is there
+        page = document_html(diagnosis_document(found))
+        assert ("Nothing was found to extend the model by" in page) is there
+        assert ("extended model" in page.partition("<h2>Method")[0]) is not there  # no second, equal column or line
 
 
 def test_slopes_of_straight_errors_are_exact_whatever_is_missing():

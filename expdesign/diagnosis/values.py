@@ -111,3 +111,8 @@ class Diagnosis:
     step_residuals: tuple[Residuals, ...]  # per finding, of the same model as in `errors`
     notes: tuple[str, ...]  # quantities not measured, causes left out or not tested
     screened: tuple[tuple[str, float], ...]  # (cause, smallest adjusted p-value) of the round that found nothing more
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether anything was changed in the model in use, by findings or within its standard deviations."""
+        return self.after is not self.before

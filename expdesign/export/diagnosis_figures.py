@@ -194,7 +194,7 @@ def window_figure(found: Diagnosis, index: int) -> str:
             (found.simulated_before, VERMILION, "model in use"),
             (found.simulated_after, BLUE, "extended model"),
         ):
-            if name == "model in use" or found.findings:
+            if name == "model in use" or found.is_extended:
                 values = np.asarray(
                     np.where(np.isfinite(measured), factor * shown[index, :, column], np.nan), dtype=float
                 )
@@ -217,7 +217,7 @@ def growth_figure(found: Diagnosis) -> str:
         label, factor = AXES[output]
         axes.plot(found.before.horizons_s, factor * found.before.growth[:, index], "o-", color=VERMILION,
                   label="model in use", markersize=3.5)  # fmt: skip
-        if found.findings:
+        if found.is_extended:
             axes.plot(found.after.horizons_s, factor * found.after.growth[:, index], "s-", color=BLUE,
                       label="extended model", markersize=3.5)  # fmt: skip
         axes.set_xscale("log")

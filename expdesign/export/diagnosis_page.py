@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from expdesign.conventions import plus_minus
 from expdesign.diagnosis import Diagnosis, Finding
-from expdesign.diagnosis.accuracy import mean_residual
+from expdesign.diagnosis.accuracy import Accuracy, mean_residual
 from expdesign.diagnosis.causes import CAUSES
 from expdesign.diagnosis.conclusions import DIVERGED_FIT, accuracy_in_words, alternatives, has_diverged, manoeuvre
 from expdesign.diagnosis.select import SELECTION_TUNING
@@ -104,14 +104,7 @@ def estimate_words(name: str, cause: str) -> str:
 NO_NUMBER = "\N{EN DASH}"
 
 
-FITS = (
-    "Output",
-    *(
-        f"{what}\n{model}"
-        for model in ("model in use", "extended model")
-        for what in ("Fit", "RMS error", "Mean error")
-    ),
-)
+MEASURES = ("Fit", "RMS error", "Mean error")
 ABOUT_FITS = (
     "The fit is 100\N{NO-BREAK SPACE}% for a perfect simulation. It is 0\N{NO-BREAK SPACE}% for one that is as good as "
     "the mean of the measured velocity, and negative for a worse one. u is the surge speed ahead, v the sway speed to "
@@ -171,7 +164,7 @@ def diagnosis_document(found: Diagnosis, roll: RollVerdict | None = None) -> Doc
             section("Missing acceleration", *_missing(found)),
             *(_finding(found, index) for index in range(many)),
             *([section("Roll", ROLL)] if rolls else []),
-            section("Before and after", *_stretches(found)),
+            section("Before and after" if found.is_extended else "Measured and simulated", *_stretches(found)),
             _tested(found),
             section("Method", METHOD.format(found.unit)),
         ),
@@ -188,8 +181,8 @@ def diagnosis_notes(found: Diagnosis) -> tuple[str, ...]:
 def _accuracy(found: Diagnosis) -> Section:
     astray = has_diverged(found.before) or has_diverged(found.after)
     held_out = (
-        "Nothing was found to extend the model by, so both columns are of the vessel file."
-        if found.after is found.before
+        "Nothing was found to extend the model by."
+        if not found.is_extended
         else "This table uses the data that the extended model was fitted to. The gains below use "
         f"{found.unit} held out of the fit."
     )
@@ -197,14 +190,20 @@ def _accuracy(found: Diagnosis) -> Section:
         "Accuracy of the simulation",
         f"{ABOUT_FITS} {ASTRAY}" if astray else ABOUT_FITS,
         Table(
-            title="Simulation of the vessel file against the data, and after what was found",
-            header=FITS,
+            title="Simulation of the vessel file against the data"
+            + (", and after what was found" if found.is_extended else ""),
+            header=("Output", *(f"{what}\n{model}" for model in models(found) for what in MEASURES)),
             rows=accuracy_rows(found),
         ),
         "Each run is simulated from its first measured state with the measured inputs. Measurement noise counts as "
         f"misfit. {held_out}",
         Figure(draw=partial(growth_figure, found), caption=GROWTH),
     )
+
+
+def models(found: Diagnosis) -> dict[str, Accuracy]:
+    """The models whose accuracy there is to tell, by name: the extended one where there is one."""
+    return {"model in use": found.before} | ({"extended model": found.after} if found.is_extended else {})
 
 
 def _missing(found: Diagnosis) -> Iterator[Block]:
@@ -290,7 +289,7 @@ def accuracy_rows(found: Diagnosis) -> list[tuple[str, ...]]:
     for index, name in enumerate(found.before.outputs):
         unit, factor = ("\N{DEGREE SIGN}/s", float(np.degrees(1.0))) if name == "r" else ("m/s", 1.0)
         cells = [f"{name} [{unit}]"]
-        for item in (found.before, found.after):
+        for item in models(found).values():
             if not float(item.fit[index]) >= DIVERGED_FIT:
                 cells += [_fit(float(item.fit[index])), NO_NUMBER, NO_NUMBER]
                 continue

@@ -120,7 +120,7 @@ def cause_rows(found: Diagnosis) -> list[tuple[str, ...]]:
 
 def extended_vessel(found: Diagnosis, *, command: str, roll: RollVerdict | None = None) -> str:
     """The vessel file with all findings."""
-    begin = "Kept as it was" if found.after is found.before and roll is None else "Extended"
+    begin = "Kept as it was" if not found.is_extended and roll is None else "Extended"
     comments = [f"{begin} by a diagnosis: {found.verdict}", *(item.explanation for item in found.findings)]
     comments += roll_sentences(roll)
     return vessel_toml(with_roll(found.extended, roll), comments=[*comments, *found.notes, f"Made by: {command}"])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from expdesign.diagnosis.model import (
+    LEAST_RESPONSE,
     RESPONSES,
     ExtendedModel,
     ahead_force_text,
@@ -25,7 +26,7 @@ from expdesign.diagnosis.model import (
 )
 from expdesign.diagnosis.vessel_file.reading import found_std, with_std
 from expdesign.values import Array
-from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel, std_keys
+from expdesign.vessel import Actuator, Response, Roll, Sensors, Term, Vessel, VesselModel, response_values, std_keys
 from expdesign.vessel.quantities import NOT_NEGATIVE, rows_of
 from expdesign.vessel.structures import SHOAL, Expression
 
@@ -314,10 +315,16 @@ def extend(
             sensors=_sensors(vessel.sensors, ship),
             environment=weather,
             pendulum=None if model.roll is not None else vessel.pendulum,
-            std=found_std(vessel, ship, std, std_keys(actuators)),
+            std=found_std(vessel, ship, std, _may_be_unsure(actuators)),
         ),
         (*missing, *more),
     )
+
+
+def _may_be_unsure(actuators: tuple[Actuator, ...]) -> tuple[str, ...]:
+    """Keys of `Vessel.std`, without those of slew rates that have no limit."""
+    values = response_values(actuators)
+    return tuple(name for name in std_keys(actuators) if math.isfinite(values.get(name, 0.0)))
 
 
 def _correlated(model: VesselModel, keys: Sequence[str], covariance: Array) -> VesselModel:
@@ -363,7 +370,8 @@ def _actuators(actuators: tuple[Actuator, ...], ship: ExtendedModel) -> tuple[tu
 
 def _changed(response: Response, effects: Mapping[str, float]) -> Response:
     """A response with other effects; those that played no role in the data stay as they are stated."""
-    return replace(response, **{RESPONSES[kind]: response_effect(kind, value) for kind, value in effects.items()})
+    found = {kind: value if abs(value) > LEAST_RESPONSE else 0.0 for kind, value in effects.items()}
+    return replace(response, **{RESPONSES[kind]: response_effect(kind, value) for kind, value in found.items()})
 
 
 def _sensors(sensors: Sensors, ship: ExtendedModel) -> Sensors:
