@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -72,3 +73,13 @@ def catamaran() -> Vessel:
 def offshore_vessel() -> Vessel:
     """45 m, two azimuths astern and a bow tunnel: steered by a helm under way, by thrusters at rest."""
     return load_vessel(Path(__file__).parent / "data" / "vessels" / "offshore-45m.toml")
+
+
+@cache
+def ahead_only(vessel: Vessel) -> Vessel:
+    """The same ship with azimuths whose propellers do not reverse."""
+    actuators = tuple(
+        replace(one, limits=(replace(one.limits[0], low=0.0), *one.limits[1:])) if one.kind == "azimuth" else one
+        for one in vessel.actuators
+    )
+    return replace(vessel, name=f"{vessel.name}-ahead", model=replace(vessel.model, actuators=actuators))

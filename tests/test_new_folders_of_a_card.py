@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -83,3 +84,14 @@ def test_a_card_that_is_none_is_refused_before_a_folder_is_made(tmp_path: Path, 
     assert main(["new", str(tmp_path / "trial"), "--card", str(tmp_path / "none.toml"), "--quiet"]) == 2
     assert "none.toml" in capsys.readouterr().err
     assert not (tmp_path / "trial").exists()
+
+
+@pytest.mark.slow
+def test_the_card_of_a_ship_whose_thrusters_do_not_reverse_leads_to_a_verified_trial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """80 s of processor."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "osv", "--card", str(CARDS["offshore-45m"]), "--quiet"]) == 0
+    assert main(["run", "osv/scenario.toml", "--out", "plan", "--quiet"]) == 0
+    assert json.loads(Path("plan/plan.json").read_text("utf-8"))["verified"] is True

@@ -18,11 +18,17 @@ from expdesign.simulation import (
     zigzag,
 )
 from expdesign.vessel import Response
+from helm_case import ahead_only
 from measured_trials import MODEL_SHIP_TRUE, TUG_TRUE
 from nomoto_ship import GAIN, LAG, nomoto_ship
 
 TEN, TWENTY = math.radians(10), math.radians(20)
-SHIPS = {"rudder": nomoto_ship(), "azimuth": TUG_TRUE, "force": MODEL_SHIP_TRUE}
+SHIPS = {
+    "rudder": nomoto_ship(),
+    "azimuth": TUG_TRUE,
+    "azimuth ahead only": ahead_only(TUG_TRUE),
+    "force": MODEL_SHIP_TRUE,
+}
 TRIALS = {
     "circle": turning_circle,
     "zigzag": lambda ship, **how: zigzag(ship, heading_rad=TWENTY, helm_rad=TWENTY, **how),

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
+from expdesign.conventions import wrap_angle
 from expdesign.indices.criteria import ZIGZAG_DEVIATION_RAD, Circle, Execute, Stop, ZigZag
 from expdesign.signals import Commands, Trajectory
 from expdesign.simulation import Helm
@@ -138,6 +139,12 @@ def steered_run(vessel: Vessel, commands: Commands, motion: Trajectory, *, name:
 def orders(helm: Helm, names: tuple[str, ...], values: Array) -> dict[str, Array]:
     """`helm_rad` and `drive` (k,) of recorded actuator signals (k, m); zero without such signals."""
     column = {name: values[:, index] for index, name in enumerate(names)}
+    for one in helm.vessel.actuators:
+        if one.kind == "azimuth" and set(one.signals) <= column.keys():  # turned round, it pushes astern
+            thrust_name, angle_name = one.signals
+            astern = np.cos(column[angle_name]) < 0.0
+            column[thrust_name] = np.where(astern, -column[thrust_name], column[thrust_name])
+            column[angle_name] = np.where(astern, wrap_angle(column[angle_name] - np.pi), column[angle_name])
     thrust = [column[a.signals[0]] for a in helm.vessel.actuators if KINDS[a.kind][0] == "n" and a.signals[0] in column]
     if "tau_x" in column:
         thrust = [column["tau_x"]]

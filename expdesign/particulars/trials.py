@@ -146,13 +146,13 @@ class Fleet:
         }
 
     def _stop(self, trial: Trial) -> Results:
-        drive, speed = self._approach(trial)
-        rate = self._helm.drive_rate
+        lever, speed = self._approach(trial)
+        rate, goal = self._helm.lever_rate, self._helm.lever(-trial.order)
 
         def orders(_state: Array, step_s: float) -> Array:
-            nonlocal drive
-            before, drive = drive, _toward(drive, -trial.order, rate * step_s)
-            return self._helm.rows((before + drive) / 2, self._zero)
+            nonlocal lever
+            before, lever = lever, _toward(lever, goal, rate * step_s)
+            return self._helm.moved_rows((before + lever) / 2, self._zero)
 
         rest = 0.0 if trial.order else 0.2 * trial.speed_mps
         times, states = self._sail(

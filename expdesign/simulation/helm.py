@@ -4,6 +4,9 @@ The helm turns all rudders together. A vessel without rudders steers with the co
 those abaft amidships, or all where none is. A vessel known only by generalised forces steers as if one thruster at its
 stern, half a length abaft amidships, gave all of its thrust. One with fixed propellers on both sides and nothing else
 to steer with lets them turn at different speeds.
+
+Azimuth thrusters whose propellers do not reverse go astern as a mate lets them: the engines stop, the thrusters turn
+half round, each by its own side, and the engines go on.
 """
 
 from __future__ import annotations
@@ -26,6 +29,9 @@ SERVICE_SHARE = 0.85 ** (1 / 3)
 """Propeller speed at 85 % of the largest power, as a share of the largest, as power goes with its cube."""
 FASTEST_MPS = 60.0
 HARD_OVER_RAD = math.radians(35.0)
+HALF_TURN = math.pi
+AT_ONCE = 1e6
+"""Change of the engine order per second that counts as one at once."""
 STEADY = 1e-9
 """Share of its speed that a steady vessel may gain or lose in a second."""
 
@@ -74,7 +80,8 @@ class Helm:
         """Commands in the model's order.
 
         Args:
-            drive: engine order from -1, full astern, to 1, full ahead: the share of each actuator's limit.
+            drive: engine order from -1, full astern, to 1, full ahead: the share of each actuator's limit. Thrusters
+                that turn round for orders astern stand there.
             angle_rad: helm, in the sense of the actuators' own angles; where propellers steer, its sine is added to the
                 engine orders to port and taken from those to starboard, as far as there is any left.
         """
@@ -82,16 +89,107 @@ class Helm:
 
     def rows(self, drive: Array, angle_rad: Array) -> Array:
         """(..., m) inputs for orders (...,) and angles (...,)."""
-        return np.stack(np.broadcast_arrays(*self._row(drive, angle_rad, NUMPY), drive + angle_rad)[:-1], axis=-1)
+        return _stacked(self._row(drive, angle_rad, NUMPY), drive + angle_rad)
 
-    def _row(self, drive: Any, angle_rad: Any, ops: Operators) -> list[Any]:
+    def moved_rows(self, lever: Array, angle_rad: Array) -> Array:
+        """(..., m) inputs for levers (...,) and angles (...,), also while orders change; see `lever`."""
+        return _stacked(self._moved(lever, angle_rad, NUMPY), lever + angle_rad)
+
+    def moved(self, lever: float, angle_rad: float) -> list[float]:
+        """Commands in the model's order for a lever, also while orders change; see `lever`."""
+        return self._moved(lever, angle_rad, SCALAR)
+
+    def _moved(self, lever: Any, angle_rad: Any, ops: Operators) -> list[Any]:
+        way, astern = self._lever_round, lever + self._lever_round
+        share = (ops.abs(lever) - ops.abs(astern) + way) / (2 * way) if way else lever < 0.0
+        drive = (lever + ops.abs(lever)) / 2 + (astern - ops.abs(astern)) / 2
+        return self._row(drive, angle_rad, ops, round_share=share)
+
+    def lever(self, drive: Any) -> Any:
+        """Engine order as a lever whose way from ahead to astern takes in the time in which thrusters turn round.
+
+        It moves by `lever_rate` per second: ahead it is the order; between 0 and `-_lever_round` thrusters turn.
+        """
+        return drive - self._lever_round * (drive < 0.0)
+
+    def followed(self, drive: Array, angle_rad: Array, steps_s: Array, *, before: float) -> Array:
+        """(k, m) commands after steps (k,) of time to orders (k,) and angles (k,), thrusters turning as they can.
+
+        Where none turns round they are the `rows` of the orders, whose rates are left to others.
+
+        Args:
+            drive, angle_rad, steps_s: see above.
+            before: engine order that stands before the first step, ahead.
+        """
+        if not self.turning_round or not (drive < 0.0).any():
+            return self.rows(drive, angle_rad)
+        levers, lever = [], before
+        for goal, reach in zip(self.lever(drive).tolist(), (self.lever_rate * steps_s).tolist(), strict=True):
+            lever += min(max(goal - lever, -reach), reach)
+            levers.append(lever)
+        return self.moved_rows(np.array(levers), angle_rad)
+
+    @cached_property
+    def lever_rate(self) -> float:
+        """Largest change of the lever per second."""
+        return min(self.drive_rate, AT_ONCE) if self.turning_round else self.drive_rate
+
+    @cached_property
+    def _lever_round(self) -> float:
+        """Way of the lever on which thrusters turn round; 0 where none does, or they do at once."""
+        slowest = min((one.responses[1].rate for one in self.turning_round), default=math.inf)
+        return self.lever_rate * HALF_TURN / slowest if self.turning_round else 0.0
+
+    @cached_property
+    def turning_round(self) -> dict[Actuator, float]:
+        """The azimuth thrusters that turn round for orders astern, with the angle by which they do [rad]."""
+        found: dict[Actuator, float] = {}
+        for one in self.vessel.actuators:
+            if one.kind == "azimuth" and not one.limits[0].low < 0.0:
+                own = math.copysign(HALF_TURN, one.starboard_m)
+                ways = [way for way in (own, -own) if one.limits[1].low <= way <= one.limits[1].high]
+                if ways:
+                    found[one] = ways[0]
+        return found
+
+    def stands_astern(self, inputs: Array) -> np.ndarray:
+        """(n,) whether thrusters that turn round for orders astern stand there in commands (n, m)."""
+        stands = [np.cos(inputs[:, self._columns[one][1]]) < 0.0 for one in self.turning_round]
+        return np.asarray(np.any(stands, axis=0)) if stands else np.zeros(len(inputs), dtype=bool)
+
+    def turned_back(self, inputs: Array) -> Array:
+        """Commands (n, m) with thrusters that stand astern turned back as they came."""
+        rows, astern = inputs.copy(), self.stands_astern(inputs)
+        for one, way in self.turning_round.items():
+            rows[astern, self._columns[one][1]] -= way
+        return rows
+
+    def idle_in_turns(self, rows: Array, standing: Array) -> Array:
+        """Commands (n, m) without the thrust of thrusters more than a quarter turn off where they stand (n, m)."""
+        rows = rows.copy()
+        for one in self.turning_round:
+            thrust, angle = self._columns[one]
+            rows[np.cos(rows[:, angle] - standing[:, angle]) < 0.0, thrust] = 0.0
+        return rows
+
+    @cached_property
+    def _columns(self) -> dict[Actuator, tuple[int, ...]]:
+        """Columns of each actuator's signals in commands."""
+        names = self.vessel.model.inputs
+        return {one: tuple(names.index(name) for name in one.signals) for one in self.vessel.actuators}
+
+    def _row(self, drive: Any, angle_rad: Any, ops: Operators, *, round_share: Any = None) -> list[Any]:
+        """Commands; thrusters are turned round by a share of their way, or all of it where the order is astern."""
         row: list[Any] = []
         steering, by_propellers = self.steering, self.means == "propeller"
+        share = drive < 0.0 if round_share is None else round_share
         for actuator in self.vessel.actuators:
             turned, order = angle_rad if actuator in steering else 0.0, drive
             if by_propellers and actuator in steering:
                 desired = drive - float(np.sign(actuator.starboard_m)) * ops.sin(turned)
                 order = (ops.abs(desired + 1.0) - ops.abs(desired - 1.0)) / 2  # no more than there is to either side
+            if actuator in self.turning_round:
+                turned, order = turned + share * self.turning_round[actuator], ops.abs(order)
             thrust = 0.0 if actuator.kind in ("tunnel", "rudder") else _share(actuator.limits[0], order, ops)
             side = thrust * ops.sin(turned)
             row += {
@@ -109,8 +207,9 @@ class Helm:
     def drives(self, inputs: Array) -> Array:
         """(n,) engine orders of commands (n, m) whose thrust is turned: those of the first actuator that steers."""
         actuator = self.steering[0]
-        column, limit = self.vessel.model.inputs.index(actuator.signals[0]), actuator.limits[0]
-        thrust = inputs[:, column]
+        limit, thrust = actuator.limits[0], inputs[:, self._columns[actuator][0]]
+        if actuator in self.turning_round:
+            return np.asarray(np.where(self.stands_astern(inputs), -1.0, 1.0) * thrust / max(limit.high, 1e-300))
         return np.asarray(thrust / np.where(thrust < 0.0, -min(limit.low, -1e-300), max(limit.high, 1e-300)))
 
     @property
@@ -235,6 +334,11 @@ def service_speed(vessel: Vessel) -> float:
         f"vessel {vessel.name!r}: the model has no steady speed below {FASTEST_MPS:g} m/s at 85 % power: "
         f"du/dt is {gain(first):.3g} m/s2 at rest; give the approach speed"
     )
+
+
+def _stacked(row: list[Any], like: Array) -> Array:
+    """(..., m) commands, each the same for all or of the shape (...,) of an array."""
+    return np.stack(np.broadcast_arrays(*row, like)[:-1], axis=-1)
 
 
 def _share(limit: Limit, drive: Any, ops: Operators = SCALAR) -> Any:

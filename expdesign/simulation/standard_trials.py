@@ -59,31 +59,32 @@ class _Orders:
     """Where engine order and helm stand; they move towards a stage's with their largest rates."""
 
     helm: Helm  # turns them into commands
-    # drive, angle_rad: at the beginning of the sample
-    drive: float
+    # lever, angle_rad: at the beginning of the sample; see `Helm.lever`
+    lever: float
     angle_rad: float
     step_s: float  # time between samples
 
     def toward(self, old: Stage, new: Stage, share: float) -> tuple[list[float], _Orders]:
         """The mean command of a sample in which `new` follows `old` after a share of it, and the orders at its end."""
-        drives, angles = [], []
-        drive, angle = self.drive, self.angle_rad
+        levers, angles = [], []
+        lever, angle = self.lever, self.angle_rad
         for stage, part in ((old, share), (new, 1 - share)):
             time_s = part * self.step_s
             if time_s > 0:
-                mean, drive = map(float, moved(drive, stage.drive, self.helm.drive_rate * time_s))
-                drives.append(mean * part)
+                most = self.helm.lever_rate * time_s
+                mean, lever = map(float, moved(lever, self.helm.lever(stage.drive), most))
+                levers.append(mean * part)
                 mean, angle = map(float, moved(angle, stage.angle_rad, self.helm.angle_rate(stage.drive) * time_s))
                 angles.append(mean * part)
-        end = _Orders(helm=self.helm, drive=drive, angle_rad=angle, step_s=self.step_s)
-        return self.helm.inputs(sum(drives), sum(angles)), end
+        end = _Orders(helm=self.helm, lever=lever, angle_rad=angle, step_s=self.step_s)
+        return self.helm.moved(sum(levers), sum(angles)), end
 
 
 def sail(approach: Approach, stages: Iterable[Stage], conduct: Conduct, what: str) -> Trial:
     """Run the stages after the approach, sample by sample, each until nothing of it is left."""
     vessel = approach.helm.vessel
     step_s = conduct.sample_time_s or vessel.sample_time_s
-    orders = _Orders(helm=approach.helm, drive=approach.drive, angle_rad=approach.angle_rad, step_s=step_s)
+    orders = _Orders(helm=approach.helm, lever=approach.drive, angle_rad=approach.angle_rad, step_s=step_s)
     lead_s = step_s * math.ceil(conduct.approach_s / step_s - 1e-9)
     ahead = Stage(angle_rad=approach.angle_rad, drive=approach.drive, left=lambda time, _: lead_s - time)
     waiting = [ahead, *stages] if lead_s else list(stages)
@@ -300,7 +301,8 @@ def stopping(vessel: Vessel, *, astern: float = 1.0, conduct: Conduct = AT_SERVI
         raise InputError(f"stopping: astern is {astern:g}, expected 0 to 1")
     approach = steady_ahead(vessel, conduct.speed_mps)
     for actuator in vessel.actuators:
-        if astern and actuator.kind in ("propeller", "azimuth", "force") and not actuator.limits[0].low < 0:
+        drives = actuator.kind in ("propeller", "azimuth", "force") and actuator not in approach.helm.turning_round
+        if astern and drives and not actuator.limits[0].low < 0:
             raise InputError(
                 f"stopping: {actuator.signals[0]} of vessel {vessel.name!r} cannot go astern: its lower limit is "
                 f"{actuator.limits[0].low:g}, expected less than 0"

@@ -58,6 +58,10 @@ def ordered(approach: Approach, drive: Array, helm_rad: Array) -> Excitation:
     angles = approach.angle_rad + approach.starboard * helm_rad
     for angle in (float(angles.min()), float(angles.max())):
         approach.helm.check(approach.drive, angle)
+    if approach.helm.turning_round and (drive < 0.0).any():
+        steps_s = np.full(len(drive), approach.helm.vessel.sample_time_s)
+        rows = approach.helm.followed(drive, angles, steps_s, before=approach.drive)
+        return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=rows)
     pairs, place = np.unique(np.stack([drive, angles], axis=1), axis=0, return_inverse=True)
     rows = np.array([approach.helm.inputs(*pair) for pair in pairs.tolist()])
     return Excitation(velocity=approach.velocity, inputs=approach.inputs, commands=rows[place.ravel()])

@@ -21,6 +21,8 @@ HELM_SLOWEST = 0.3  # speed, in transit speeds, below which the helm is not take
 HELM_TILT_RAD = 0.1  # to both sides, by which the effect of thrust that is turned is measured
 HELM_FARTHEST_RAD = 1.0  # change of course that the helm answers to at most
 HOVER_SHARE = 0.3  # of the transit speed, up to which thrusters take over from the helm where a ship is to stop
+ROUND_FROM = 0.5  # engine order from which thrusters that do not reverse are turned round
+STOPPED_ASTERN = 1e-6  # engine order of stopped engines whose thrusters stand astern
 KICK_RAD = 0.1  # heading error from which, or from as much yaw rate and sway, steering comes before speed
 
 
@@ -114,8 +116,22 @@ class HelmController:
         drive = self._drive(speed, moving, angle, unexplained[:, 0])
         if self.approach.helm.turns_thrust:
             drive = self._kicked(drive, np.where(speed > 0.0, np.abs(missing), 0.0), moving)
-        rows = self.approach.helm.rows(drive, angle)
-        return np.asarray(rows + whole_turns(demand.standing - rows) * self.vessel.turns_freely)  # by the shortest turn
+        helm = self.approach.helm
+        rows = helm.rows(self._as_thrusters_stand(drive, demand.standing), angle)
+        rows += whole_turns(demand.standing - rows) * self.vessel.turns_freely  # by the shortest turn
+        return helm.idle_in_turns(rows, demand.standing)
+
+    def _as_thrusters_stand(self, drive: Array, standing: Array) -> Array:
+        """(n,) engine orders that let thrusters stand as they are where little would be gained by turning them round.
+
+        They turn for a good part of full power only; until then the engines stop.
+        """
+        if not self.approach.helm.turning_round:
+            return drive
+        astern = self.approach.helm.stands_astern(standing)
+        stay = np.where(astern, drive < ROUND_FROM, drive > -ROUND_FROM)
+        stopped = np.where(astern, np.minimum(drive, -STOPPED_ASTERN), np.maximum(drive, 0.0))
+        return np.asarray(np.where(stay, stopped, drive))
 
     def _pointed(self, demand: Demand) -> tuple[Array, Array]:
         """(n,) surge speeds and headings of ships that go where they point.

@@ -34,9 +34,9 @@ from expdesign.plan.legs.water import (
     nearest_turns,
     through_water,
 )
-from expdesign.simulation import to_body
+from expdesign.simulation import Helm, to_body
 from expdesign.values import Array, seal
-from expdesign.vessel import NUMPY, within_limits
+from expdesign.vessel import NUMPY, Vessel, within_limits
 
 SLOW_SHARE = 0.3  # transit speeds below which a helm-steered ship is about to accelerate from rest or to stop
 # shares tried of `straight_off_hulls`, of the hull lengths to settle before a run-up, and of the stopping distance
@@ -333,7 +333,7 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
     """The leg along a path (j, 3) in a share of the room beside it."""
     states, inputs, places, duration_s = _guess(task, water, ship, check, path)
     turned = whole_turns(states[-1, 2] - task.end[2])
-    inputs[0], inputs[-1] = task.start_inputs, nearest_turns(water.vessel, task.end_inputs, inputs[-1])
+    inputs[0], inputs[-1] = task.start_inputs, _last_inputs(task, water.vessel, ship.approach.helm, inputs[-1])
     wide = leg_problem(
         task,
         water,
@@ -346,6 +346,16 @@ def _problem(task: LegTask, water: LegWater, ship: HelmShip, check: Recovery, pa
         node_s=HELM_NODE * water.vessel.length_m / ship.transit_speed_mps,
     )
     return replace(wide, room_port_m=share * wide.room_port_m, room_starboard_m=share * wide.room_starboard_m)
+
+
+def _last_inputs(task: LegTask, vessel: Vessel, helm: Helm, guessed: Array) -> Array:
+    """(m,) commands at a leg's end, azimuths by the shortest turn from where they stood before they turned round.
+
+    Where engines are stopped for good, thrusters stay where they stopped the ship.
+    """
+    standing = helm.turned_back(guessed[None])[0]
+    last = nearest_turns(vessel, task.end_inputs, standing)
+    return last if task.end_inputs[~vessel.angles].any() else last + (guessed - standing)
 
 
 def _guess(
@@ -383,7 +393,8 @@ def _steady_along(start: Array, end: Array, ship: HelmShip, path: Array) -> tupl
         [path[:, :2], path[:, 2] - drift, speed * np.cos(drift), speed * np.sin(drift), bend * speed]
     )
     orders = _engine_orders(ship, speed, np.gradient(speed, time_s))
-    inputs = approach.helm.rows(orders, approach.angle_rad + approach.starboard * helm)
+    steps_s, angles = np.diff(time_s, prepend=0.0), approach.angle_rad + approach.starboard * helm
+    inputs = approach.helm.followed(orders, angles, steps_s, before=max(float(orders[0]), 0.0))
     return time_s, states, inputs, path[:, 2]
 
 
