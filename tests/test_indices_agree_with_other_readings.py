@@ -73,6 +73,16 @@ def test_a_recorded_stop_is_found_and_other_runs_give_the_reason_for_no_trial() 
     found = measured_trial(ship, as_batch(ship, commands, motion))
     assert isinstance(found, Stop)
     assert found.track_reach_m == pytest.approx(expected.track_reach_m, rel=0.01)
+    assert any(remark.startswith("no current is taken out of track reach") for remark in found.remarks)
+    record = as_batch(ship, commands, motion)
+    for share, stopped in ((0.01, True), (0.1, False)):  # of the approach speed, where the logger was switched off
+        last = int(np.flatnonzero(record.velocity[:, 0] > share * 7.0)[-1])
+        cut = measured_trial(ship, record.cut(slice(last + 1)))
+        assert isinstance(cut, Stop) == stopped
+        if isinstance(cut, Stop):
+            assert cut.track_reach_m == pytest.approx(found.track_reach_m, rel=0.01)
+        elif isinstance(cut, NotStandard):
+            assert f"makes {record.velocity[last, 0]:.2g} m/s ahead where the record ends" in cut.reason
     ahead = zigzag(ship, heading_rad=TEN, helm_rad=TEN, conduct=Conduct(speed_mps=7.0, approach_s=90, duration_s=80))
     straight = measured_trial(ship, as_batch(ship, *ahead))
     assert isinstance(straight, NotStandard)

@@ -202,6 +202,41 @@ def test_a_circle_that_begins_with_the_helm_over_gives_its_steady_diameter_alone
     assert "the helm stays at 3.5 deg" in measured_trial(SHIP, record(straight, 1.0)).reason
 
 
+def in_current(batch: Batch, north_mps: float, east_mps: float) -> Batch:
+    """The record of the same ship in water that moves over ground."""
+    assert batch.pose is not None
+    flow, heading = np.array([north_mps, east_mps]), batch.pose[:, 2]
+    pose, velocity = np.array(batch.pose), np.array(batch.velocity)
+    pose[:, :2] += batch.time_s[:, np.newaxis] * flow
+    c, s = np.cos(heading), np.sin(heading)
+    velocity[:, :2] += np.stack([c * flow[0] + s * flow[1], c * flow[1] - s * flow[0]], axis=1)
+    return replace(batch, pose=pose, velocity=velocity)
+
+
+@pytest.mark.parametrize("seconds", [90.0, 130.0, 150.0])
+def test_a_current_that_a_circle_is_too_short_to_show_is_told_with_what_it_does(seconds: float) -> None:
+    calm = record(sailed(FULL, math.inf, seconds=seconds)[0], 0.5)
+    flow = (0.3, -0.4)
+    still, moving = measured_trial(SHIP, calm), measured_trial(SHIP, in_current(calm, *flow))
+    assert isinstance(still, Circle)
+    assert isinstance(moving, Circle)
+    told = [remark for remark in moving.remarks if remark.startswith("no current is taken out of advance")]
+    assert bool(told) == (moving.current_north_mps is None)
+    if not told:
+        assert (moving.current_north_mps, moving.current_east_mps) == pytest.approx(flow, abs=0.02)
+        return
+    assert still.remarks == moving.remarks  # in still water nobody knows it either
+    shift = float(told[0].split()[-2]) * math.hypot(*flow) / 0.1
+    for one, other in (
+        (still.advance_m, moving.advance_m),
+        (still.tactical_diameter_m, moving.tactical_diameter_m),
+    ):
+        if one is not None and other is not None:
+            assert abs(one - other) < 1.05 * shift
+    if still.tactical_diameter_m is not None and moving.tactical_diameter_m is not None:
+        assert abs(still.tactical_diameter_m - moving.tactical_diameter_m) > 0.3 * shift
+
+
 def test_helm_let_go_ends_a_trial_and_a_second_trial_is_refused() -> None:
     rows, orders = sailed(TWENTY, TWENTY, seconds=190.0)
     cut = np.array(rows)

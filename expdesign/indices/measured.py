@@ -29,6 +29,8 @@ TOUCHED = 0.1  # share of the longest stretch of held helm below which a shorter
 LEAST_MOVE = 0.2  # share of its final angle by which the helm moves with the first order at least
 STEADY_APPROACH = 0.05  # change of speed, by the speed, over the last ship length of a steady approach at most
 CURRENT = 0.02  # uniform current, by the approach speed, that is told when it is removed
+AT_REST = 0.02  # surge speed at the end of a record, by the approach speed, up to which the ship has stopped
+TOLD_CURRENT_MPS = 0.1  # current by which is told what one that nobody removed does to distances
 
 
 LEAST_HELM_RAD = math.radians(2.0)
@@ -74,10 +76,14 @@ def measured_trial(vessel: Vessel, batch: Batch, *, reference_forward_m: float =
     if astern is None:
         return NotStandard(name=batch.name, reason=f"{helm}, and the engines are not ordered to stop")
     approach = _approach(run, astern)
-    found = read_stop(run, order_s=astern, course_rad=approach.course_rad, speed_mps=approach.speed_mps)
+    found = read_stop(
+        run, order_s=astern, course_rad=approach.course_rad, speed_mps=approach.speed_mps,
+        rest_mps=AT_REST * approach.speed_mps,
+    )  # fmt: skip
     if found is None or approach.speed_mps < _slow(run):
-        return NotStandard(name=batch.name, reason=f"{helm}, and the ship keeps its headway")
-    return replace(found, remarks=approach.remarks)
+        last = f"makes {run.velocity[-1, 0]:.2g} m/s ahead where the record ends"
+        return NotStandard(name=batch.name, reason=f"{helm}, and the ship {last}")
+    return replace(found, remarks=(*approach.remarks, _over_ground("track reach and head reach", found.time_s)))
 
 
 def _steered_run(vessel: Vessel, batch: Batch, forward_m: float) -> SteeredRun:
@@ -209,7 +215,9 @@ def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
         circle = read_circle(
             run, order_s=times[0], course_rad=course, side=side, helm_rad=size, speed_mps=speed, current=True
         )
-        return replace(circle, remarks=(*remarks, *_removed(circle)))
+        half = run.first_turned(side * math.pi, since_s=times[0], course_rad=course)
+        half_turn_s = (float(run.time_s[-1]) if half is None else half) - times[0]
+        return replace(circle, remarks=(*remarks, *_removed(circle, half_turn_s)))
     if reason := _unlike(held):
         return NotStandard(name=run.name, reason=reason)
     found = read_zigzag(run, orders_s=times, course_rad=course, side=side, helm_rad=_size(held), speed_mps=speed)
@@ -219,8 +227,24 @@ def _steered(vessel: Vessel, run: SteeredRun, held: tuple[_Held, ...]) -> Found:
     return replace(found, remarks=remarks)
 
 
-def _removed(circle: Circle) -> tuple[str, ...]:
-    """A remark on the current that was taken out, where it matters."""
+def _over_ground(distances: str, time_s: float) -> str:
+    """A remark on distances over ground: what a current that is not known does to them in this time."""
+    shift = TOLD_CURRENT_MPS * time_s
+    return (
+        f"no current is taken out of {distances}, for which a circle of 540 deg is needed: "
+        f"{TOLD_CURRENT_MPS:g} m/s of it changes them by up to {shift:.2g} m"
+    )
+
+
+def _removed(circle: Circle, half_turn_s: float) -> tuple[str, ...]:
+    """A remark on the current that was taken out, where it matters, or that it was not.
+
+    Args:
+        circle: as measured.
+        half_turn_s: time from the order to 180 degrees of turn, or to the end of the record [s].
+    """
+    if circle.current_north_mps is None:
+        return (_over_ground("advance, transfer and tactical diameter", half_turn_s),)
     flow = math.hypot(circle.current_north_mps or 0.0, circle.current_east_mps or 0.0)
     if flow <= CURRENT * (circle.speed_mps or math.inf):
         return ()

@@ -305,14 +305,27 @@ def read_zigzag(
     )
 
 
-def read_stop(run: SteeredRun, *, order_s: float, course_rad: float, speed_mps: float) -> Stop | None:
-    """A stopping trial, or None when the ship keeps headway."""
-    gone = np.flatnonzero((run.velocity[:, 0] <= 0) & (run.time_s > order_s))
-    if not len(gone) or gone[0] == 0:
-        return None
-    index = int(gone[0])
+def read_stop(
+    run: SteeredRun, *, order_s: float, course_rad: float, speed_mps: float, rest_mps: float = 0.0
+) -> Stop | None:
+    """A stopping trial, or None when the ship keeps headway.
+
+    Args:
+        run: with one order astern.
+        order_s: time of the order.
+        course_rad: heading of the approach.
+        speed_mps: approach speed.
+        rest_mps: surge speed up to which a ship counts as stopped where its record ends before it moves astern.
+    """
     surge = run.velocity[:, 0]
-    end = crossing(lambda t: float(np.interp(t, run.time_s, surge)), run.time_s[index - 1], run.time_s[index])
+    gone = np.flatnonzero((surge <= 0) & (run.time_s > order_s))
+    if len(gone) and gone[0] > 0:
+        index = int(gone[0])
+        end = crossing(lambda t: float(np.interp(t, run.time_s, surge)), run.time_s[index - 1], run.time_s[index])
+    elif run.time_s[-1] > order_s and 0 < surge[-1] <= rest_mps:
+        end = float(run.time_s[-1])
+    else:
+        return None
     start, last = run.at(order_s), run.at(end)
     c, s = math.cos(course_rad), math.sin(course_rad)
     north, east = last[:2] - start[:2]
