@@ -277,8 +277,10 @@ def test_headings_that_count_counter_clockwise_are_refused(tmp_path: Path, ship:
             log["heading_rad"] = heading
             with pytest.raises(
                 FileError, match=f"heading_rad: counts counter-clockwise{whence}, as the positions show"
-            ):
+            ) as caught:
                 read(tmp_path, log, ship, POSE)
+            # north for east is the same mistake
+            assert ("north_m and east_m are exchanged" in str(caught.value)) == bool(whence)
 
 
 FIELD = {

@@ -166,6 +166,32 @@ def test_milliseconds_show_in_the_turning_when_the_sample_time_is_possible(tmp_p
     assert str(caught.value) == f"{path}: {found}; expected units, signs and axes as in the column names"
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("minutes", 1 / 60), ("hours", 1 / 3600)])
+@pytest.mark.parametrize("outputs", [("u_mps", "v_mps", "r_radps"), ("u_mps", "v_mps"), ("r_radps",), ()])
+@pytest.mark.parametrize("where", [geographic, dict])
+def test_longer_units_of_time_show_in_the_motion_whatever_is_measured(
+    tmp_path: Path, where: Callable[[Data], Data], outputs: tuple[str, ...], unit: str, factor: float
+) -> None:
+    data = motion()
+    velocities = {"u_mps", "v_mps", "r_radps"}
+    kept = {name: values for name, values in data.items() if name not in velocities or name in outputs}
+    path = write_trial(tmp_path / "trial.csv", where(kept | {"time_s": factor * data["time_s"]}))
+    with pytest.raises(FileError) as caught:
+        load_records(path)
+    named = f"if time_s is in {unit}; expected units" in str(caught.value)
+    assert named or ("at most 60 m/s; are time_s and" in str(caught.value) and "r_radps" not in outputs)
+    assert named == bool(outputs)
+
+
+@pytest.mark.parametrize("factor", [100.0, 1000.0])
+def test_positions_in_smaller_units_move_too_fast_for_a_ship(tmp_path: Path, factor: float) -> None:
+    data = {name: values for name, values in motion().items() if name not in ("u_mps", "v_mps", "r_radps")}
+    shorter = {name: factor * data[name] for name in ("north_m", "east_m")}
+    path = write_trial(tmp_path / "trial.csv", data | shorter)
+    with pytest.raises(FileError, match="jumps|the position moves at .* m/s over ground, expected at most 60 m/s"):
+        load_records(path)
+
+
 def test_an_unknown_factor_is_noted(tmp_path: Path) -> None:
     data = motion()
     path = write_trial(tmp_path / "trial.csv", data | {"r_radps": 2 * data["r_radps"]})

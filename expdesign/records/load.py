@@ -44,6 +44,7 @@ from expdesign.records.pose import (
     check_agreement,
     check_heading,
     check_jumps,
+    check_speed,
     kept_samples,
     left_out_notes,
     long_enough,
@@ -259,6 +260,7 @@ def _judged(table: Table, clock: Clock, request: Request) -> Table:
     table = check_jumps(table, clock.batches, clock.sample_time_s, needed=needed_columns(origins))
     if MEASURED in origins.values():
         table = check_agreement(table, clock.batches, clock.sample_time_s)
+    check_speed(table, clock.batches, clock.sample_time_s)
     if any(origins.get(output) != MEASURED for output in ("u", "v")):
         check_heading(table, clock.batches, clock.sample_time_s)
     return table.noted(*table_remarks(table))

@@ -21,6 +21,7 @@ from expdesign.records.pose.position import (
     check_agreement,
     check_heading,
     check_jumps,
+    check_speed,
     last_fix,
     with_continuous_angles,
     with_metres,

@@ -204,8 +204,14 @@ NOISE_RAD, NOISE_M = 0.2, 5.0
 BY_CHANCE = 1e-3  # probability from which noise may look like a mistake
 
 
+FASTEST_MPS = 60.0  # speed over ground that positions may show
 DEGREE = np.pi / 180.0
 
+LONG_TIMES = (
+    ("time_s is in minutes", 60.0),
+    ("time_s is in hours", 3600.0),
+    ("time_s is in days", 86400.0),
+)
 SPEED_UNITS = (
     ("u_mps and v_mps are in knots", 1 / KNOTS_PER_MPS),
     ("u_mps and v_mps are in km/h", 1 / 3.6),
@@ -213,6 +219,7 @@ SPEED_UNITS = (
     ("u_mps and v_mps are in cm/s", 0.01),
     ("time_s is in milliseconds, or u_mps and v_mps in mm/s", 0.001),
     ("u_mps and v_mps have the wrong sign", -1.0),
+    *LONG_TIMES,
 )
 RATE_UNITS = (
     ("r_radps is in degrees per second, or the heading in radians under a degree name", DEGREE),
@@ -220,6 +227,7 @@ RATE_UNITS = (
     ("the heading is in degrees under a radian name", 1.0 / DEGREE),
     ("r_radps is positive to port, or the heading counts counter-clockwise", -1.0),
     ("time_s is in milliseconds", 0.001),
+    *LONG_TIMES,
 )
 
 
@@ -271,6 +279,23 @@ def check_agreement(table: Table, batches: tuple[slice, ...], sample_time_s: flo
     return table
 
 
+def check_speed(table: Table, batches: tuple[slice, ...], sample_time_s: float) -> None:
+    """Raise where positions move faster than any ship, as they do with another unit of time or place.
+
+    Raises:
+        FileError: naming the speed.
+    """
+    windows = _windows(batches, sample_time_s)
+    if not {"north_m", "east_m"} <= set(table.columns) or not len(windows):
+        return
+    way = np.linalg.norm(_change(table.stack("north_m", "east_m"), windows), axis=1)
+    speed = float(np.median(way / (np.diff(windows, axis=1)[:, 0] * sample_time_s)))
+    if speed > FASTEST_MPS:
+        header, clock = (table.sources[name].header for name in ("north_m", "time_s"))
+        found = f"the position moves at {speed:.3g} m/s over ground, expected at most {FASTEST_MPS:g} m/s"
+        raise table.error("north_m", f"{found}; are {clock} and {header} in the units that their names say?")
+
+
 def check_heading(table: Table, batches: tuple[slice, ...], sample_time_s: float) -> None:
     """Compare the heading with the course over ground, where no velocity is measured.
 
@@ -292,7 +317,9 @@ def check_heading(table: Table, batches: tuple[slice, ...], sample_time_s: float
         return
     for axis, whence in ((0.0, ""), (np.pi / 2.0, " from east, as in mathematics")):
         if abs(np.angle(mirrored * np.exp(-1j * axis))) < COURSE_AXIS_RAD:
-            problem = f"counts counter-clockwise{whence}, as the positions show; expected clockwise from north"
+            names = [table.sources[name].header for name in ("north_m", "east_m")]
+            other = f", or {names[0]} and {names[1]} are exchanged" if axis else ""
+            problem = f"counts counter-clockwise{whence}, as the positions show{other}; expected clockwise from north"
             raise table.error("heading_rad", problem)
 
 
