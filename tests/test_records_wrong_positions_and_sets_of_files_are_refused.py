@@ -188,7 +188,7 @@ def test_positions_in_smaller_units_move_too_fast_for_a_ship(tmp_path: Path, fac
     data = {name: values for name, values in motion().items() if name not in ("u_mps", "v_mps", "r_radps")}
     shorter = {name: factor * data[name] for name in ("north_m", "east_m")}
     path = write_trial(tmp_path / "trial.csv", data | shorter)
-    with pytest.raises(FileError, match="jumps|the position moves at .* m/s over ground, expected at most 60 m/s"):
+    with pytest.raises(FileError, match=r"jumps|the position moves at .* m/s over ground, expected at most 60 m/s"):
         load_records(path)
 
 

@@ -159,6 +159,28 @@ def test_positions_that_were_measured_act_as_they_are():
     np.testing.assert_allclose(seen.inputs, given.mean(axis=1), atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("speed", "still"),
+    [
+        (Response(rate=0.5), False),
+        (Response(rate=0.5, offset=0.1), False),
+        (Response(rate=0.5, lag_s=3.0), True),
+        (Response(rate=0.5, delay_s=1.0), True),
+        (Response(rate=0.5, deadband=0.2), True),
+    ],
+)
+def test_what_a_recorded_input_is_taken_for_is_told_of_those_that_move(speed: Response, still: bool):
+    slow = ship(speed, Response(rate=0.1))
+    batch = sailed(slow)
+    inputs = np.array(batch.inputs)
+    inputs[:, 0] = 4.0 + np.sin(0.05 * np.arange(len(inputs)))  # n1, smooth
+    inputs[:, 1:] = (0.3, 2.0, 0.3)  # never moved
+    told = reduced(Record(batches=(replace(batch, inputs=inputs),)), slow).notes
+    (taken,) = [note for note in told if "is taken for the" in note]
+    assert taken.startswith("n1_rps changes no faster than 0.5 rps2, the stated rate, and is taken for the position")
+    assert ("; dead times, lags and dead bands still act." in taken) == still
+
+
 def test_a_signal_between_readings_is_within_the_stated_error():
     """3/128 h**4 max|d4x/dt4| inside, 1/24 of it at the ends, for a delay that is no whole number of samples."""
     for omega, delay, interval in ((0.3, 0.5, 0.0), (0.2, 2.3, 0.0), (0.1, 1.7, 3.0), (0.1, 0.0, 2.5)):
@@ -257,7 +279,7 @@ def test_winds_for_a_diagnosis_give_the_air_over_ground():
 def test_remarks_say_what_was_undone():
     record = reduced(Record(batches=(sailed(ALL, weather=WIND),)), ALL)
     for words in (
-        "n1, a1, n2, a2 answer commands", "positions are 1 s late", "velocities are measured 6 m forward and 2 m to",
+        "commands of n1, a1, n2, a2 act", "positions are 1 s late", "velocities are measured 6 m forward and 2 m to",
         "velocities are 2 s late; they are moved to their own time, and velocities are read every 2 s",
         "0.05 rad is taken off the headings", "axes 0.05 rad to starboard", "the yaw rate is divided by 1.1",
         "winds are measured 8 m forward", "winds are measured along axes 0.2 rad to starboard; they are turned",

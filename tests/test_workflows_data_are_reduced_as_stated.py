@@ -56,7 +56,7 @@ def test_estimates_and_their_run_check_are_of_the_ship_not_of_her_instruments(tm
         assert found[name] == pytest.approx(truth[name], rel=1e-6)
     assert min(content["oe"]["fit"]["estimation"]["one.csv"].values()) > 99.99
     page = (tmp_path / "out" / "estimate.html").read_text("utf-8")
-    for words in ("n1, a1, n2, a2 answer commands", "velocities are measured 6 m forward", "velocities are 2 s late"):
+    for words in ("commands of n1, a1, n2, a2 act", "velocities are measured 6 m forward", "velocities are 2 s late"):
         assert words in page
 
 
@@ -73,7 +73,7 @@ def test_the_rest_of_a_trial_is_planned_with_an_estimate_of_the_ship(tmp_path: P
     state = present_state(tmp_path / "story.toml", [data])
     off = np.abs(state.ship.model.parameters / TENDER.model.parameters - 1.0)
     assert np.median(off) < 0.02
-    assert any("n1, a1, n2, a2 answer commands" in note for note in state.notes)
+    assert any("commands of n1, a1, n2, a2 act" in note for note in state.notes)
 
 
 def test_indices_are_of_the_ships_own_track(tmp_path: Path):

@@ -305,8 +305,8 @@ def with_delivered_inputs(
     late = [name for name in names if not responses[name].follows and name not in record.batches[0].reached]
     if late:
         notes.append(
-            f"As the vessel file states, {', '.join(late)} answer commands with lags, dead times, dead bands or "
-            "offsets; what they deliver is used."
+            f"As the vessel file states, commands of {', '.join(late)} act with lags, dead times, dead bands or "
+            "offsets; what is delivered is used."
         )
     return replace(record, batches=batches, notes=tuple(notes))
 
@@ -317,17 +317,21 @@ def _slew_notes(record: Record, responses: Mapping[str, Response]) -> Iterator[s
         if name in record.batches[0].reached:
             yield f"reached_{column_name(name)} is used as measured; no rate, dead time, lag or dead band acts on it."
         elif math.isfinite(response.rate):
-            kept = [acting_response(batch, name, response).rate == math.inf for batch in record.batches]
+            moving = [batch for batch in record.batches if np.ptp(batch.inputs[:, batch.input_names.index(name)]) > 0]
+            kept = [acting_response(batch, name, response).rate == math.inf for batch in moving]
             column, rate = column_name(name), f"{response.rate:.3g} {RATE_UNITS[stem(name)]}"
+            if not kept:
+                continue  # what never moves may be either
             if not any(kept):
                 yield f"{column} is taken for the command; it is followed at {rate}, as the vessel file states."
             else:
                 where = (
                     "" if all(kept) else f" in {sum(kept)} of {len(kept)} batches, and for the command in the others"
                 )
+                still = "" if replace(response, offset=0.0).follows else "; dead times, lags and dead bands still act"
                 yield (
-                    f"{column} changes no faster than {rate}, the stated rate, and is taken for the position{where}. "
-                    f"A position that was measured is best named reached_{column}."
+                    f"{column} changes no faster than {rate}, the stated rate, and is taken for the position{where}"
+                    f"{still}. A position that was measured is best named reached_{column}."
                 )
 
 
